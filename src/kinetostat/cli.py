@@ -36,10 +36,8 @@ from kinetostat.commands.common import (
 from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.loaded import analyze_loaded
 from kinetostat.commands.optimize import add_optimize_commands
-from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.errors import InputError
@@ -202,10 +200,11 @@ def _parser() -> Parser:
     takes_json(analyze)
     add_question(commands, "forward")
     add_question(commands, "identify")
-    add_question(commands, "command")
-    add_path_command(commands)
+    for word in ("command", "path"):
+        add_question(commands, word)
     add_grid_commands(commands)
-    add_influence_commands(commands)
+    for word in ("workspace", "sensitivity", "guidelines"):
+        add_question(commands, word)
     add_question(commands, "modes")
     add_question(commands, "budget")
     add_compare_commands(commands)

@@ -9,8 +9,10 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.guideline_sentences import as_json, statements
+from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.guidelines import guidelines
+from kinetostat.views.data_forms import json_of
+from kinetostat.views.guidelines import GUIDELINES
 
 MACHINE = "zhang-gosselin-4dof"
 GRID = ["x=-2 cm:2 cm:5", "z=66 cm:70 cm:5"]
@@ -23,7 +25,7 @@ def paper():
 
 @pytest.fixture(scope="module")
 def data(paper):
-    return as_json(paper)
+    return json_of(GUIDELINES, paper)
 
 
 def element(data, name):
@@ -110,7 +112,7 @@ def test_what_it_prints_and_writes(tmp_path, capsys):
     assert "passive link 2 (80 %), not from the actuators" in said
     assert "never about z and along y, where nothing else is compliant" in said
     assert "[everywhere]" in said
-    assert "K_x = 0.0704587 k(actuator ×4)" in said
+    assert "K_x 0.0704587 k(actuator ×4)" in said
     names = {path.name for path in tmp_path.iterdir()}
     assert {"guidelines.json", "guidelines-design.png", "guidelines-rigid.svg"} <= names
     assert json.loads((tmp_path / "guidelines.json").read_text("utf-8"))["grid"]["answered"] == 25

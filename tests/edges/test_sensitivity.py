@@ -11,7 +11,9 @@ from kinetostat.machine.parameters import values, with_leg, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.guidelines import guidelines
-from kinetostat.studies.sensitivity import as_json, notes, sensitivity
+from kinetostat.studies.sensitivity import notes, sensitivity
+from kinetostat.views.data_forms import json_of
+from kinetostat.views.sensitivity import SENSITIVITY
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -42,7 +44,7 @@ pose = { x = 0.02, y = 0.01, z = 0.52 }
 
 
 def rows(machine=MACHINE, *settings):
-    return {row["path"]: row for row in as_json(sensitivity(load(machine, settings)))["parameters"]}
+    return {row["path"]: row for row in json_of(SENSITIVITY, sensitivity(load(machine, settings)))["parameters"]}
 
 
 def test_a_percent_more_changes_the_index_by_the_percentage():
@@ -109,7 +111,7 @@ def test_rounding_of_a_rigid_direction_is_no_index(tmp_path, capsys):
     """Three U-P-U legs, rigid but for their rams, hold every rotation: C_rr is 0, and what is computed is rounding."""
     path = tmp_path / "upu.toml"
     path.write_text(THREE_UPU, "utf-8")
-    found = as_json(sensitivity(load(path)))
+    found = json_of(SENSITIVITY, sensitivity(load(path)))
     for name in ("rx", "ry", "rz"):
         assert found["indices"][f"compliance_{name}"]["value"] == 0.0
         assert {row["percent_per_percent"][f"compliance_{name}"] for row in found["parameters"]} == {None}

@@ -58,7 +58,8 @@ def _fill(command: Parser, summary: str, where: str) -> None:
     if question.full:
         command.add_argument("--full", action="store_true", help=question.full)
     if question.suffixes:
-        command.add_argument("-o", "--output", metavar="FILE", type=Path, help=question.output)
+        words: dict[str, Any] = {"metavar": "FILE", "type": Path, "action": "append", "default": []}
+        command.add_argument("-o", "--output", help=question.output, **words)
     elif question.output:
         takes_figures(command, question.output)
     takes_json(command)
@@ -120,12 +121,13 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     Raises:
         InputError: what the question refuses, in the words of the command line.
     """
-    output = getattr(options, "output", None)
-    if output is not None and question.suffixes:
-        choice(output.suffix.lower(), question.suffixes, f'the suffix of "{output}"')
+    files = options.output if question.suffixes else []
+    for path in files:
+        choice(path.suffix.lower(), question.suffixes, f'the suffix of "{path}"')
     given = {option.name: getattr(options, option.name) for option in question.options}
     settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
     machine = load_machine(options, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
+    given = {name: value for name, value in given.items() if value not in (None, [])}  # else the function's defaults
     waiting = nullcontext() if question.reports_progress else said_when_slow(question.slow)
     try:
         with waiting, search_bar(question.slow) as update:
@@ -133,37 +135,36 @@ def ask(question: Question, options: argparse.Namespace) -> int:
             answer = question.answer(machine, **given, **reports)
     except InputError as error:
         raise InputError(_in_words(question, str(error))) from None
-    return show_answer(options, answer, to_file=bool(question.suffixes))
+    return show_answer(options, answer, to_files=bool(question.suffixes))
 
 
-def show_answer(options: argparse.Namespace, answer: Any, to_file: bool = False) -> int:
+def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False) -> int:
     """Write the files of an answer where the options name a place, and print it.
 
     Args:
         options: of the command.
         answer: of a kind that has a description.
-        to_file: whether `--output` is a file instead of a folder.
+        to_files: whether `--output` is a list of files instead of a folder.
 
     Returns:
         The exit code.
     """
-    from kinetostat.views.answers import description_of, save
+    from kinetostat.views.answers import description_of
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.terminal import tell
 
     description, output = description_of(answer), getattr(options, "output", None)
-    answered, full = description.answered(answer), getattr(options, "full", False)
-    if output is None or not answered:
-        written = []
-    else:
-        written = [save(answer, output)] if to_file else write_folder(options, description, answer)
+    answered, message = description.answered(answer), getattr(answer, "message", "")
+    full, written = getattr(options, "full", False), []
+    if output and (answered or not message):
+        written = (write_files if to_files else write_folder)(options, description, answer)
     return give(
         options,
         answered,
         lambda: json_of(description, answer),
         lambda console: tell(console, description, answer, full),
         written,
-        message=getattr(answer, "message", ""),
+        message=message,
     )
 
 
@@ -177,6 +178,17 @@ def _in_words(question: Question, message: str) -> str:
     first, space, rest = message.partition(" ")
     flags = {option.name: option.flag for option in question.options if not option.first}
     return f"{flags.get(first, first)}{space}{rest}"
+
+
+def write_files(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
+    """Write an answer to files in the form that the suffix of each says; pictures are of its first figure."""
+    from kinetostat.views.answers import FIGURE_SUFFIXES, save
+
+    paths: list[Path] = options.output
+    for path in paths:
+        picture = path.suffix.lower() in FIGURE_SUFFIXES
+        save(next(iter(description.drawings(answer).values()))() if picture else answer, path)
+    return paths
 
 
 def write_folder(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
@@ -194,5 +206,7 @@ def write_folder(options: argparse.Namespace, description: "Description", answer
                 continue
             write_content(content, path)
         written.append(path)
-    drawings = description.drawings(answer).items()
-    return written + write_figures(options, {f"{description.figure_prefix}{name}": draw for name, draw in drawings})
+    drawings = {
+        draw.file or f"{description.figure_prefix}{name}": draw for name, draw in description.drawings(answer).items()
+    }
+    return written + write_figures(options, drawings)

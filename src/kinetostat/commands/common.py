@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinetostat.spec.installation import as_typed
+from kinetostat.views.options import quantities_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,21 +33,6 @@ if TYPE_CHECKING:
 DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 """Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
-QUANTITIES = (
-    "compliance, stiffness or free_stiffness (all entries of the diagonal; the free stiffness is 1/C_ii, which a tool "
-    "feels; default: {default}); a single entry such as compliance_rx, stiffness_x_z, free_stiffness_z; "
-    "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
-    "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0: singular, 1: best), "
-    "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
-    "actuator_moment (the greatest under [load]), mass (of all moving parts), frequency (the six lowest natural "
-    "frequencies) or frequency_1, least_real_receptance and stable_width (across [cutting]); of the machine at rest "
-    "under its loads: "
-    'displacement (the default where [load] says state = "loaded"), tangent_stiffness, tangent_free_stiffness, '
-    "load_factor, slack_springs, loaded_frequency; repeatable"
-)
-"""Help on the quantities of sweeps, maps and sensitivities."""
-DISPLACED = "the machine at rest under its loads: its displacement, if no quantity is named"
-"""Help on `--loaded` of commands that name quantities."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
 PATIENCE = 0.3
@@ -165,7 +151,7 @@ def takes_ranges(command: Parser, meaning: str, required: bool = False) -> None:
 def takes_quantities(command: Parser, default: str) -> None:
     """Give a command `--quantity`."""
     command.add_argument(
-        "--quantity", metavar="NAME", action="append", dest="quantities", help=QUANTITIES.format(default=default)
+        "--quantity", metavar="NAME", action="append", dest="quantities", help=quantities_option(default).meaning
     )
 
 

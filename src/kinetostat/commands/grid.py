@@ -1,4 +1,4 @@
-"""The commands `sweep`, `map` and `workspace`: grids of poses or parameters, in memory or in a study folder.
+"""The commands `sweep` and `map`: grids of poses or parameters, in memory or in a study folder.
 
 No formula lives here.
 """
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
-    DISPLACED,
     add_command,
     give,
     list_written,
@@ -22,9 +21,9 @@ from kinetostat.commands.common import (
     takes_loaded,
     takes_machine,
     takes_quantities,
-    takes_ranges,
     write_figures,
 )
+from kinetostat.views.options import DISPLACED, VARIED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,26 +31,26 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.engine.chunks import Crew
     from kinetostat.studies.grid import GridQuestion
-    from kinetostat.studies.workspace import Workspace
 
-VARY = "FIELD=from:to:count[:log]"
 MOST_WORKERS = 1024
 
 
 def add_grid_commands(commands: "Commands") -> None:
-    """Add `sweep`, `map` and `workspace`."""
+    """Add `sweep` and `map`."""
     sweep = add_command(
         commands, "sweep", _sweep, "compute quantities along one parameter: table, curves and NetCDF",
         'kinetostat sweep zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log" --quantity compliance',
     )  # fmt: skip
-    sweep.add_argument("--vary", metavar=VARY, required=True, action="append", dest="ranges", help="parameter to vary")
+    sweep.add_argument(
+        "--vary", metavar=VARIED, required=True, action="append", dest="ranges", help="parameter to vary"
+    )
     sweep.set_defaults(default_quantity="stiffness")
     mapping = add_command(
         commands, "map", _map, "compute quantities over two to six parameters: contour maps and NetCDF",
         'kinetostat map zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps',
     )  # fmt: skip
     mapping.add_argument(
-        "--over", metavar=VARY, required=True, action="append", dest="ranges", help="an axis of the map"
+        "--over", metavar=VARIED, required=True, action="append", dest="ranges", help="an axis of the map"
     )
     mapping.set_defaults(default_quantity="compliance")
     mapping.add_argument(
@@ -72,25 +71,6 @@ def add_grid_commands(commands: "Commands") -> None:
         where.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
         where.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
         takes_json(command)
-    _add_workspace_command(commands)
-
-
-def _add_workspace_command(commands: "Commands") -> None:
-    command = add_command(
-        commands, "workspace", _workspace, "compute where the machine can work: volume, limits, pictures",
-        'kinetostat workspace hexapod --set "limits.longest_leg=20 cm" --over "x=-8 cm:8 cm:41" '
-        '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "free_stiffness_z > 20 N/um" -o out',
-    )  # fmt: skip
-    takes_machine(command)
-    takes_ranges(command, "a coordinate of the pose and its range; give two to six", required=True)
-    command.add_argument(
-        "--where", metavar="CONDITION", action="append", default=[], dest="conditions",
-        help='a condition that a pose must meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all must be met',
-    )  # fmt: skip
-    takes_loaded(command, "only poses at which the machine comes to rest under its loads")
-    command.add_argument("--seed", type=_seed, default=0, help="seed of the random points for the volume (default: 0)")
-    takes_figures(command, "NetCDF and pictures")
-    takes_json(command)
 
 
 def _workers(text: str) -> int:
@@ -243,36 +223,3 @@ def _draw_thinned(options: argparse.Namespace, path: Path) -> list[Path]:
 
     dataset = thinned_dataset(path)
     return _draw(options, dataset, path.stem, f"{dataset.attrs['machine']} (thinned)")
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text} is not a seed; give a whole number of at most nine digits")
-    return int(text)
-
-
-def _workspace(options: argparse.Namespace) -> int:
-    from kinetostat.studies.workspace import as_json, workspace
-    from kinetostat.views.grid_tables import print_workspace
-
-    machine = load_machine(options)
-    with progress_bar("computing") as progress:
-        result = workspace(machine, options.ranges, options.conditions, progress, options.seed)
-    written = _write_workspace(options, result) if options.output else []
-    return give(
-        options,
-        bool(result.exists),
-        lambda: as_json(result),
-        lambda console: print_workspace(console, result),
-        written,
-    )
-
-
-def _write_workspace(options: argparse.Namespace, result: "Workspace") -> list[Path]:
-    from kinetostat.studies.storage import write_dataset
-    from kinetostat.views.workspace_figures import pictures
-
-    written = [options.output / "workspace.nc"]
-    write_dataset(written[0], result.dataset)
-    drawn = pictures(result.dataset, result.verdicts, result.conditions, result.dataset.attrs["machine"])
-    return written + write_figures(options, {f"workspace{name}": draw for name, draw in drawn.items()})

@@ -24,9 +24,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.axes import chosen_axes, grid_of
 from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
-from kinetostat.studies.poses import PoseColumns
+from kinetostat.studies.poses import PoseColumns, chosen_axes, grid_of
 from kinetostat.tolerances import EXACT_LAW
 
 GRAVITY_ANGLE = "load.gravity_angle"

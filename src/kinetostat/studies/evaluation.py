@@ -1,4 +1,4 @@
-"""Quantities of a machine at poses of the user's own: arrays, plain data and CSV; `dataset` labels them for Python."""
+"""Quantities of a machine at poses of the user's own: arrays and CSV; `datasets` labels them for Python."""
 
 import csv
 import io
@@ -17,7 +17,6 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import several
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.studies.quantities import refuse_absent, resolve_quantities
 
@@ -44,6 +43,11 @@ class PoseAnswers:
     matrices: tuple[str, ...]
     values: Mapping[str, Array]
     status: Codes
+
+    @property
+    def answered(self) -> bool:
+        """Whether any pose has a result."""
+        return bool((self.status == Status.OK).any())
 
     @property
     def failures(self) -> dict[Status, list[int]]:
@@ -84,25 +88,6 @@ def answers_at(
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
     return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status)
-
-
-def as_json(answers: PoseAnswers) -> dict[str, Any]:
-    """The answers as plain data, SI: lists with one entry for each pose, null where there is no finite value."""
-    words = [Status(code).word for code in answers.status.tolist()]
-    variables = {name: {"units": QUANTITIES[name].unit, "values": answers.values[name]} for name in answers.names}
-    return as_answer(
-        {
-            "name": answers.machine.name,
-            "poses": {
-                field.path: {"units": field.unit, "values": values}
-                for field, values in zip(answers.poses.fields, answers.poses.values, strict=True)
-            },
-            "variables": variables,
-            "matrices": {name: answers.matrix(name) for name in answers.matrices},
-            "components": answers.machine.family.component_names,
-            "status": words,
-        }
-    )
 
 
 def as_csv(answers: PoseAnswers) -> str:

@@ -16,9 +16,9 @@ from kinetostat.machine.parameters import Parameter, dimension
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range
-from kinetostat.studies.axes import chosen_axes, grid_of
 from kinetostat.studies.datasets import ABOUT_STATUS, about_field, about_quantity, origin_of
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.quantities import refuse_absent, resolve_quantities
 
 IN_MEMORY = 5_000_000

@@ -1,4 +1,4 @@
-"""Guidelines in plain sentences, each with the share of the poses of a grid at which it holds, and as plain data.
+"""Guidelines in plain sentences, each with the share of the poses of a grid at which it holds.
 
 One kind of statement is one function, in the order of the paper's section 4.2. Nothing is derived here.
 """
@@ -6,8 +6,6 @@ One kind of statement is one function, in the order of the paper's section 4.2. 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -15,15 +13,14 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.display import number
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles
-from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
+from kinetostat.studies.guidelines import Guidelines, Move, Roles
 from kinetostat.tolerances import NO_ROLE
 
 MATTERS = 0.01
 """Share of an entry of C from which an element is named as one that decides it."""
 APART = 10.0
 """Ratio of limits of rigidity from which directions get a limit each."""
-LEAST = 0.005
+LEAST_EFFECT = 0.005
 """Percent per percent below which a sentence says that a parameter has no effect."""
 MOST_MOVES = 8
 """Parameters of which a sentence is made."""
@@ -60,7 +57,7 @@ def statements(answer: Guidelines) -> list[Statement]:
 
 def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """Which elements each direction depends on; directions of which the same is true share a sentence."""
-    single, over = _single(answer), _over(answer)
+    single, over = _single(answer), answer.over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
     for i in _compliant(here):
         mask = here.shares[single, i] >= MATTERS
@@ -85,7 +82,7 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
 
 def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
-    single, over = _single(answer), _over(answer)
+    single, over = _single(answer), answer.over_grid
     if not single:
         return
     best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
@@ -135,7 +132,7 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
 
 def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     """The limit that is enough at every pose of the grid, in those directions in which there is one."""
-    over = _over(answer)
+    over = answer.over_grid
     if over is None:
         return ""
     most = {i: float(over.rigid[k, i].max()) for i in directions}
@@ -150,9 +147,9 @@ def _design(answer: Guidelines) -> Iterator[Statement]:
     """Which parameter stiffens or softens which direction."""
     for move in answer.parameters[:MOST_MOVES]:
         directions = [(i, p) for i, p in enumerate(move.percents) if p is not None]
-        rising = sorted(((i, p) for i, p in directions if p > LEAST), key=lambda pair: -pair[1])
-        falling = sorted(((i, p) for i, p in directions if p < -LEAST), key=lambda pair: pair[1])
-        none = [answer.components[i] for i, p in directions if abs(p) <= LEAST]
+        rising = sorted(((i, p) for i, p in directions if p > LEAST_EFFECT), key=lambda pair: -pair[1])
+        falling = sorted(((i, p) for i, p in directions if p < -LEAST_EFFECT), key=lambda pair: pair[1])
+        none = [answer.components[i] for i, p in directions if abs(p) <= LEAST_EFFECT]
         clauses = [
             f"{word} in {', '.join(f'{answer.components[i]} {p:+.2g}' for i, p in pairs)}"
             for word, pairs in (("stiffer", rising), ("softer", falling))
@@ -171,7 +168,7 @@ def _same_signs(answer: Guidelines, move: Move) -> float | None:
     shares = [
         move.stiffer[i] if p > 0.0 else move.softer[i]
         for i, p in enumerate(move.percents)
-        if p is not None and abs(p) > LEAST
+        if p is not None and abs(p) > LEAST_EFFECT
     ]
     return min(shares, default=None)
 
@@ -190,11 +187,6 @@ def _single(answer: Guidelines) -> list[int]:
 def _compliant(roles: Roles) -> list[int]:
     """Places of the directions that are neither rigid nor free; none where the machine has no elements."""
     return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
-
-
-def _over(answer: Guidelines) -> Roles | None:
-    """Roles over the grid, if there is one with any answer."""
-    return answer.everywhere if answer.everywhere is not None and answer.poses[0] else None
 
 
 def _share_of(true: Mask) -> float:
@@ -269,71 +261,3 @@ def _listed(words: Sequence[str], last: str = "and") -> str:
 
 def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
-
-
-def as_json(answer: Guidelines) -> dict[str, Any]:
-    """Guidelines as plain data, their sentences among them; directions by name."""
-    names, here = answer.components, answer.here
-    by_direction = partial(_by_direction, names)
-    return as_answer(
-        {
-            "name": answer.machine.name,
-            "status": answer.status.word,
-            "message": answer.message,
-            "components": names,
-            "rigid_within": EXCESS,
-            "compliance_diagonal": answer.compliance_diagonal or None,
-            "elements": [_element_json(answer, here, k) for k in range(len(answer.elements))] if here else [],
-            "stiffness_equations": answer.stiffness_equations
-            and {name: by_direction(row) for name, row in answer.stiffness_equations.items()},
-            "parameters": [_move_json(move, names) for move in answer.parameters],
-            "without_influence": answer.without_influence,
-            "left_out": dict(answer.left_out),
-            "statements": statements(answer),
-            "grid": {"over": answer.ranges, "poses": answer.poses[1], "answered": answer.poses[0]}
-            if answer.ranges
-            else None,
-        }
-    )
-
-
-def _by_direction(names: Sequence[str], row: Any) -> dict[str, Any]:
-    return dict(zip(names, row, strict=True))
-
-
-def _element_json(answer: Guidelines, here: Roles, k: int) -> dict[str, Any]:
-    element, over, actuator = answer.elements[k], _over(answer), answer.actuator
-    by_direction = partial(_by_direction, answer.components)
-    limits = [None if element.stiffness is None else limit_of(element.stiffness, f) for f in here.rigid[k, :, 0]]
-    ratio = actuator.stiffness if actuator else None
-    data: dict[str, Any] = {
-        "name": element.name,
-        "parts": element.parts,
-        "actuated": element.actuated,
-        "units": element.unit or None,
-        "stiffness": stiffness_of_spring(element.stiffness),
-        "compliance_share": by_direction(here.shares[k, :, 0]),
-        "rigid_from_factor": by_direction(here.rigid[k, :, 0]),
-        "rigid_from": by_direction(limits),
-        "rigid_from_per_actuator": by_direction([limit and ratio and limit / ratio for limit in limits]),
-        "doubling_lowers_compliance": by_direction(here.gains[k, :, 0]),
-    }
-    if over is not None:
-        data["over_grid"] = {
-            "least_share": by_direction(over.shares[k].min(axis=1)),
-            "greatest_share": by_direction(over.shares[k].max(axis=1)),
-            "rigid_from_factor": by_direction(over.rigid[k].max(axis=1)),
-        }
-    return data
-
-
-def _move_json(move: Move, names: Sequence[str]) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "path": move.path,
-        "one_percent": "0.01 rad" if move.turning else "1 %",
-        "stiffer_percent_per_percent": _by_direction(names, move.percents),
-    }
-    if move.stiffer:
-        data["stiffer_at"] = _by_direction(names, move.stiffer)
-        data["softer_at"] = _by_direction(names, move.softer)
-    return data

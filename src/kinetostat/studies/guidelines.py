@@ -34,7 +34,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.axes import chosen_axes, grid_of
+from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.sensitivity import (
     Sensitivity,
     greatest_of,
@@ -153,6 +153,11 @@ class Guidelines(Immutable):
     def __repr__(self) -> str:
         count = len(self.parameters)
         return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
+
+    @property
+    def over_grid(self) -> Roles | None:
+        """Roles over the grid, if there is one with any answer."""
+        return self.everywhere if self.poses[0] else None
 
     @property
     def actuator(self) -> Element | None:

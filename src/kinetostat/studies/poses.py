@@ -1,4 +1,4 @@
-"""Poses from outside: tables of Python programs and CSV files, as SI numbers by field. Nothing is evaluated.
+"""Poses from outside: tables of Python programs, CSV files and ranges, as SI numbers by field. Nothing is evaluated.
 
 Whatever they come from, they become columns, of which every value is checked in one place (`read_columns`). Tables of
 pandas, polars and xarray are read by what they can do, so that none of these libraries need be there.
@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLE, ANGLES, PURE, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, quantities
+from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.units import UnitError, parse
 
 MOST_GIVEN_POSES = 5_000_000
@@ -195,6 +197,8 @@ def _check(value: float, quantity: Quantity, place: str) -> None:
         raise InputError(f"{place} is {quantity.show(value)}: {error}.") from None
 
 
+MOST_DIMENSIONS = 6
+"""Axes of one grid."""
 POSE_FORMS = (
     "give a DataFrame or a dictionary with a column for each field that changes, an array with a column for each "
     "coordinate of the pose, an xarray Dataset, or the path of a CSV file"
@@ -375,3 +379,29 @@ def _head(path: Path, text: str) -> tuple[str, str]:
     if match is None:
         raise InputError(f'"{path}": a column is called {shorten(text)}; write its name, with a unit, e.g. x [mm].')
     return match[1], match[2] or match[3] or ""
+
+
+def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Parameter]]:
+    """Read the axes of a grid: ranges as written, and the parameters that they are about.
+
+    Raises:
+        InputError: an unknown field, a bad range, a field twice, or more than six dimensions.
+    """
+    ranges = several(ranges)
+    if len(ranges) > MOST_DIMENSIONS:
+        raise InputError(
+            f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
+            "give the others one value each with --set."
+        )
+    wanted = [parse_range(text) for text in ranges]
+    chosen = [find(machine.family, span.field) for span in wanted]
+    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is varied twice; give each field one range.")
+    return list(zip(wanted, chosen, strict=True))
+
+
+def grid_of(axes: Sequence[tuple[Range, Parameter]]) -> Grid:
+    """The points of a grid with these axes."""
+    return Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in axes])

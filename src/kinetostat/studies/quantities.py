@@ -62,6 +62,11 @@ def _exists(name: str, components: Sequence[str]) -> bool:
     return all(part in components for part in QUANTITIES[name].components)
 
 
+def usual_quantities(machine: Machine, usual: str) -> list[str]:
+    """Return what is shown where nobody names a quantity: the usual one, or how far a loaded machine moves."""
+    return ["displacement" if machine.loaded else usual]
+
+
 def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> str | None:
     """The first quantity about loaded machines or cuts whose derivatives are not known; None if there is none.
 

@@ -22,8 +22,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.spec.requirements import Requirement
-from kinetostat.studies.axes import grid_of
-from kinetostat.studies.poses import GivenColumn, read_columns
+from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
 

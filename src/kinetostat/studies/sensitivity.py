@@ -6,7 +6,7 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import ranked
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
@@ -282,36 +281,6 @@ def _influence(
         measure,
         tuple(None if math.isnan(slope) else slope for slope in slopes),
         tuple(None if math.isnan(percent) else percent for percent in percents),
-    )
-
-
-def as_json(answer: Sensitivity) -> dict[str, Any]:
-    """A sensitivity as plain data."""
-    names = answer.quantities
-    return as_answer(
-        {
-            "name": answer.machine.name,
-            "status": answer.status.word,
-            "message": answer.message,
-            "characteristic_length": answer.characteristic_length if answer.parameters else None,
-            "indices": {
-                name: {"value": value, "units": QUANTITIES[name].unit}
-                for name, value in zip(names, answer.indices, strict=True)
-            },
-            "parameters": [
-                {
-                    "path": parameter.path,
-                    "value": parameter.value,
-                    "units": KINDS[parameter.kind].unit,
-                    "one_percent_of": {"measure": parameter.measure, "value": parameter.percent_of},
-                    "derivatives": dict(zip(names, parameter.derivatives, strict=True)),
-                    "percent_per_percent": dict(zip(names, parameter.percents, strict=True)),
-                }
-                for parameter in answer.parameters
-            ],
-            "without_influence": answer.without_influence,
-            "without_derivative": dict(answer.without_derivative),
-        }
     )
 
 

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,9 +25,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.axes import MOST_DIMENSIONS
-from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, field_of, grid_question
-from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question
+from kinetostat.studies.poses import MOST_DIMENSIONS
 from kinetostat.studies.workspace_borders import borders
 from kinetostat.studies.workspace_verdicts import INSIDE, Demand, Judge, PoseCondition, Poses, demands, parse_condition
 
@@ -123,6 +121,7 @@ class Workspace(Immutable):
     """The workspace of a machine over a grid of poses.
 
     Attributes:
+        machine: with its limits.
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
             quantities of the conditions, and for each axis the share of the step to the next node at which the verdict
@@ -138,6 +137,7 @@ class Workspace(Immutable):
         limits: names of the limits that the machine's file sets.
     """
 
+    machine: Machine
     dataset: xr.Dataset
     verdicts: tuple[str, ...]
     nodes: dict[str, int]
@@ -151,7 +151,7 @@ class Workspace(Immutable):
 
     def __repr__(self) -> str:
         of = sum(self.nodes.values())
-        return f"<Workspace of {self.dataset.attrs['machine']!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
+        return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
 
     @property
     def exists(self) -> bool:
@@ -197,6 +197,7 @@ def workspace(
     home = _home(question)
     connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
     return Workspace(
+        machine,
         _dataset(nodes, verdict, connected, judge, volume, edges),
         judge.labels,
         {label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
@@ -317,45 +318,3 @@ def _dataset(
     uncounted = state_of(judge.machine).left_out
     left_out = {LEFT_OUT: uncounted} if uncounted and limits_loads(judge.machine.tables["limits"]) else {}
     return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **left_out, **pose})
-
-
-def as_json(workspace: Workspace) -> dict[str, Any]:
-    """Volume, counts and ranges as plain data; the nodes themselves are in the NetCDF file."""
-    dataset, volume = workspace.dataset, workspace.volume
-    coordinates = {
-        field_of(dataset[dim]): {
-            "units": dataset[dim].attrs["units"],
-            "from": dataset[dim].values[0],
-            "to": dataset[dim].values[-1],
-            "count": dataset.sizes[dim],
-            "inside": workspace.extents.get(field_of(dataset[dim])),
-        }
-        for dim in dataset["verdict"].dims
-    }
-    return as_answer(
-        {
-            "name": dataset.attrs["machine"],
-            "coordinates": coordinates,
-            "volume": {
-                "value": volume.value,
-                "standard_error": None if math.isnan(volume.standard_error) else volume.standard_error,
-                "unknown": volume.unknown,
-                "units": volume.unit,
-                "share_of_box": volume.share,
-                "cells": volume.cells,
-                "method": METHOD,
-            },
-            "assembly_mode": dataset.attrs.get("assembly_mode"),
-            "limits": list(workspace.limits),
-            LEFT_OUT: dataset.attrs.get(LEFT_OUT, ""),
-            "nodes": workspace.nodes,
-            "connected": workspace.connected,
-            "singularities_divide": workspace.singularities_divide,
-            "demands": workspace.demands,
-        }
-    )
-
-
-def as_dataset(workspace: Workspace) -> xr.Dataset:
-    """Return what a NetCDF file of the workspace holds."""
-    return workspace.dataset

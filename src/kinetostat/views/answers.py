@@ -115,6 +115,7 @@ KINDS = (
         "studies.carrying.as_json",
         {".nc": "studies.carrying.as_dataset"},
     ),
+    Kind("studies.evaluation.PoseAnswers", description="views.path.PATH"),
     Kind(
         "xarray.Dataset",
         "views.grid_tables.print_grid",
@@ -122,26 +123,10 @@ KINDS = (
         "studies.grid.as_json",
         {".nc": "studies.grid.as_dataset"},
     ),
-    Kind(
-        "studies.workspace.Workspace",
-        "views.grid_tables.print_workspace",
-        "views.workspace_figures.workspace_figures",
-        "studies.workspace.as_json",
-        {".nc": "studies.workspace.as_dataset"},
-    ),
-    Kind(
-        "studies.sensitivity.Sensitivity",
-        "views.influence_tables.print_sensitivity",
-        "views.influence_figures.sensitivity_figures",
-        "studies.sensitivity.as_json",
-    ),
+    Kind("studies.workspace.Workspace", description="views.workspace.WORKSPACE"),
+    Kind("studies.sensitivity.Sensitivity", description="views.sensitivity.SENSITIVITY"),
     Kind("studies.identification.identification.Identification", description="views.identification.IDENTIFICATION"),
-    Kind(
-        "studies.guidelines.Guidelines",
-        "views.influence_tables.print_guidelines",
-        "views.influence_figures.guideline_figures",
-        "studies.guideline_sentences.as_json",
-    ),
+    Kind("studies.guidelines.Guidelines", description="views.guidelines.GUIDELINES"),
     Kind(
         "studies.budget.budget.Budget",
         files={".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.budget_dataset"},
@@ -265,7 +250,8 @@ def _writers(what: object) -> dict[str, Writer]:
 
 def write_form(description: Description, answer: object, form: str, path: Path) -> None:
     """Write an answer as "json", "csv" or "nc"."""
-    content = late(f"views.data_forms.{FORMS[form]}")(description, answer)
+    maker = description.makers.get(form)
+    content = late(maker)(answer) if maker else late(f"views.data_forms.{FORMS[form]}")(description, answer)
     if form == "json":
         write_json(path, content)
     else:

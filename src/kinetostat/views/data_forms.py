@@ -22,13 +22,15 @@ def json_of(description: Description, answer: Any) -> dict[str, Any]:
 
 def _object(fields: Sequence[Field | Records], item: Any) -> dict[str, Any]:
     """Keys and values of the fields that JSON has."""
-    return {
-        part.key: [_object(part.fields, record) for record in part.of(item)]
-        if isinstance(part, Records)
-        else part.of(item)
-        for part in fields
-        if "json" in part.forms
-    }
+    result: dict[str, Any] = {}
+    for part in fields:
+        if "json" not in part.forms:
+            continue
+        if isinstance(part, Records):
+            result[part.key] = [_object(part.fields, record) for record in part.of(item)]
+        elif (value := part.of(item)) is not None or not part.optional:
+            result[part.key] = value
+    return result
 
 
 def csv_of(description: Description, answer: Any) -> str:

@@ -23,9 +23,10 @@ from kinetostat.studies.guideline_sentences import limit_of
 from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
-from kinetostat.views.influence_tables import NEGLIGIBLE
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title, slim_bar
 from kinetostat.views.lettering import width_of
+from kinetostat.views.question import Drawing
+from kinetostat.views.sensitivity import NEGLIGIBLE
 from kinetostat.views.usual_values import usual_range
 
 MOST_LINES = 30
@@ -42,11 +43,13 @@ DARK = 0.6
 """Share of the colour scale beyond which text on it is white."""
 
 
-def sensitivity_figure(sensitivity: Sensitivity) -> Figure:
+def sensitivity_figure(sensitivity: Sensitivity, title: str = "{}") -> Figure:
     """Draw a table of coloured cells: red where the index grows with the parameter, blue where it falls."""
     rows = {with_leg(sensitivity.machine, influence.path): influence.percents for influence in sensitivity.parameters}
     heads = [QUANTITIES[name].symbol for name in sensitivity.quantities]
-    return coloured_table((sensitivity.machine.name, setting_of(sensitivity.machine)), rows, heads, "RdBu_r", PER)
+    return coloured_table(
+        (title.format(sensitivity.machine.name), setting_of(sensitivity.machine)), rows, heads, "RdBu_r", PER
+    )
 
 
 def coloured_table(
@@ -107,19 +110,18 @@ DECADES = 1.0
 """How far curves go beyond the limits of rigidity and the present stiffness, in powers of ten."""
 
 
-def guideline_figures(guidelines: Guidelines) -> Drawings:
+def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:
     """Return the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
     if guidelines.here is None:
         return {}
-    drawings: Drawings = {"design": partial(design_figure, guidelines)} if guidelines.parameters else {}
+    draw = partial(design_figure, guidelines)
+    effect = Drawing("Effect of each parameter on each direction.", draw, minor=True, file="guidelines-design")
+    drawings = {"design": effect} if guidelines.parameters else {}
     limited = _limited(guidelines)
-    return {**drawings, "rigid": partial(rigid_figure, guidelines, limited)} if limited else drawings
-
-
-def limit_figure(guidelines: Guidelines) -> Figure | None:
-    """Draw the stiffness of each direction against that of elements; None if no element has a limit of rigidity."""
-    limited = _limited(guidelines)
-    return rigid_figure(guidelines, limited) if limited else None
+    caption = "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
+    if limited:
+        drawings["rigid"] = Drawing(caption, partial(rigid_figure, guidelines, limited), file="guidelines-rigid")
+    return drawings
 
 
 def _limited(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
@@ -135,15 +137,19 @@ def _limited(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
     return shown[-MOST_PANELS:]
 
 
-def design_figure(guidelines: Guidelines) -> Figure:
+def design_figure(guidelines: Guidelines, title: str = "{}: effect of each parameter") -> Figure:
     """Draw parameters against directions: blue where 1 % more makes a direction stiffer, red where softer."""
     rows = {with_leg(guidelines.machine, move.path): move.percents for move in guidelines.parameters}
-    titles = f"{guidelines.machine.name}: effect of each parameter", setting_of(guidelines.machine)
+    titles = title.format(guidelines.machine.name), setting_of(guidelines.machine)
     label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
     return coloured_table(titles, rows, guidelines.components, "RdBu", label)
 
 
-def rigid_figure(guidelines: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:
+def rigid_figure(
+    guidelines: Guidelines,
+    shown: list[tuple[Element, np.ndarray]],
+    title: str = "{}: stiffness from which an element counts as rigid",
+) -> Figure:
     """Draw the stiffness of each direction against that of each element, with dots where it becomes rigid."""
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
@@ -158,7 +164,7 @@ def rigid_figure(guidelines: Guidelines, shown: list[tuple[Element, np.ndarray]]
         lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
-        set_title(figure, f"{guidelines.machine.name}: stiffness from which an element counts as rigid")
+        set_title(figure, title.format(guidelines.machine.name))
         note_setting(figure, setting_of(guidelines.machine))
         fix_layout(figure)
     return figure
@@ -187,6 +193,8 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
     panel.margins(x=0.0)
 
 
-def sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
+def sensitivity_figures(sensitivity: Sensitivity) -> dict[str, Drawing]:
     """Return the table of influences as a figure; none where no parameter has an influence."""
-    return {"influences": partial(sensitivity_figure, sensitivity)} if sensitivity.parameters else {}
+    caption = "Percent by which each index changes per percent of a parameter."
+    draw = partial(sensitivity_figure, sensitivity)
+    return {"influences": Drawing(caption, draw, minor=True, file="sensitivity")} if sensitivity.parameters else {}

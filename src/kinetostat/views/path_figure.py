@@ -1,5 +1,7 @@
 """The picture along a path: quantities, and below them the coordinates that vary, over the numbers of the poses."""
 
+from functools import partial
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +13,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.question import Drawing
 
 ABSENT = "#dddddd"
 """Behind poses that have no result."""
@@ -18,7 +21,12 @@ FEW = 60
 """Poses up to which each is marked with a dot."""
 
 
-def path_figure(answers: PoseAnswers) -> Figure:
+def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
+    """Return the one figure of quantities along a path."""
+    return {"path": Drawing("Quantities along the poses.", partial(path_figure, answers))}
+
+
+def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
     """Draw quantities along a path, a panel for each unit; poses without a result are grey.
 
     Args:
@@ -43,7 +51,7 @@ def path_figure(answers: PoseAnswers) -> Figure:
             scale = answers.machine.display.scale(shown[0][0].unit)
             _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
         panels[-1].set_xlabel("pose")
-        set_title(figure, answers.machine.name)
+        set_title(figure, title.format(answers.machine.name))
         note_setting(figure, *_notes(answers))
         fix_layout(figure)
     return figure

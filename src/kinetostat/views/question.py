@@ -41,6 +41,7 @@ class Field:
         long_name: what it is, in words.
         axes: names of the axes of its array; of a mapping, the name of its one axis.
         forms: files that have it, some of "json", "csv" and "nc".
+        optional: whether JSON leaves it out where it is None.
         column: its name in CSV and NetCDF if that is not the key. In CSV a mapping has a column for each entry, of the
             name "column_entry", or "entry" alone where `column` is "*".
     """
@@ -51,6 +52,7 @@ class Field:
     long_name: str = ""
     axes: tuple[str, ...] = ()
     forms: tuple[str, ...] = ("json", "csv", "nc")
+    optional: bool = False
     column: str = ""
 
     @property
@@ -107,11 +109,13 @@ class Drawing:
         caption: a sentence for a report.
         draw: draws it.
         minor: whether a report leaves it out.
+        file: name of its file without the suffix, if that is not the name of the figure.
     """
 
     caption: str
     draw: "Callable[..., Figure]"
     minor: bool = False
+    file: str = ""
 
     def __call__(self, **options: Any) -> "Figure":
         """Draw the figure."""
@@ -134,6 +138,7 @@ class Description:
         lines: the sentences, the answer first. The line "Pose" is left out where a report has said it.
         tables: the tables, each with a title; `full` wants every row.
         figures: drawings by name, the most telling first.
+        makers: functions that make a form of their own, such as the dataset that an answer already holds.
         axes: of the arrays in NetCDF.
         state: what stands behind the name of the machine in the first line.
         answered: whether there is an answer; where there is none, `message` of the answer says why.
@@ -148,6 +153,7 @@ class Description:
     lines: Callable[[Any], Lines] = NO_PARTS
     tables: "Callable[..., Iterable[Table]]" = NO_PARTS
     figures: Late | None = None
+    makers: Mapping[str, Late] = field(default_factory=dict)
     axes: tuple[Axis, ...] = ()
     state: Callable[[Any], str] = lambda answer: answer.status.word
     answered: Callable[[Any], bool] = lambda _answer: True
@@ -156,11 +162,12 @@ class Description:
 
     @property
     def forms(self) -> tuple[str, ...]:
-        """Files that an answer can be: JSON, CSV where it has records, NetCDF where it has arrays or records."""
+        """Files that an answer can be: JSON, CSV where it has records, NetCDF where it has arrays; and what is made."""
         tables = [part for part in self.fields if isinstance(part, Records)]
         arrays = [part for part in self.fields if isinstance(part, Field) and part.axes and "nc" in part.forms]
         csv = ("csv",) if any("csv" in part.forms for part in tables) else ()
-        return ("json", *csv, *(("nc",) if arrays or any("nc" in part.forms for part in tables) else ()))
+        nc = ("nc",) if arrays or any("nc" in part.forms for part in tables) else ()
+        return tuple(dict.fromkeys(["json", *csv, *nc, *self.makers]))
 
     def drawings(self, answer: Any) -> "dict[str, Drawing]":
         """The figures of an answer by name; none where nothing can be drawn."""
@@ -217,8 +224,8 @@ class Question:
         answer: the function: takes a machine and the options by name, and `progress` if it takes long.
         options: what it takes besides the machine.
         loaded: help on `--loaded`, where the state of the machine matters.
-        output: words on what a folder of results gets; empty if nothing is written.
-        suffixes: of the file that `--output` names, where an answer is written to a single file instead of a folder.
+        output: words on what a folder of results gets, or on the files; empty if nothing is written.
+        suffixes: of the files that `--output` names, where an answer is written to files instead of a folder.
         slow: words on what is being done, where the function takes `progress` or people would wonder.
         reports_progress: whether the function takes `progress`.
         full: help on `--full`; empty if there is nothing more to show.

@@ -4,6 +4,16 @@ from collections.abc import Mapping
 
 QUESTIONS: Mapping[str, tuple[str, str]] = {
     "forward": ("compute the poses that actuator coordinates give", "views.forward.FORWARD"),
+    "path": ("compute quantities at the poses of a CSV file: table, CSV and picture", "views.path.POSES_OF_A_FILE"),
+    "workspace": ("compute where the machine can work: volume, limits, pictures", "views.workspace.REACHED_POSES"),
+    "sensitivity": (
+        "rank the parameters by their effect on the stiffness at a pose",
+        "views.sensitivity.SENSITIVITIES",
+    ),
+    "guidelines": (
+        "show what stiffness depends on, what counts as rigid, what to change",
+        "views.guidelines.DESIGN_GUIDELINES",
+    ),
     "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
     "budget": (
         "compute the error of the tool that tolerances allow, and what it is made of",

@@ -19,7 +19,7 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
         answer: of any kind that has a machine.
         full: whether tables show every row.
     """
-    console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}"))
+    console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
     lines = Table.grid(padding=(0, 2, 0, 0))
     for head, sentence in description.lines(answer):
         lines.add_row(Text(head, "bold"), sentence)

@@ -44,6 +44,7 @@ from kinetostat.views.figures import (
     slim_bar,
 )
 from kinetostat.views.grid_tables import display_of
+from kinetostat.views.question import Drawing
 from kinetostat.views.usual_values import WIDE, usual_range
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
@@ -278,7 +279,11 @@ def _lit(triangles: Array) -> Array:
     return np.asarray(0.76 + 0.24 * facing)[:, None]
 
 
-def workspace_figures(workspace: Workspace) -> Drawings:
+def workspace_figures(workspace: Workspace) -> dict[str, Drawing]:
     """Return the pictures of a workspace by name; its region over two coordinates is "region"."""
-    drawn = pictures(workspace.dataset, workspace.verdicts, workspace.conditions, workspace.dataset.attrs["machine"])
-    return {name.removeprefix("-") or "region": figure for name, figure in drawn.items()}
+    name, dataset = workspace.machine.name, workspace.dataset
+    drawn = pictures(dataset, workspace.verdicts, workspace.conditions, name)
+    return {
+        suffix.removeprefix("-") or "region": Drawing("The workspace.", draw, file=f"workspace{suffix}")
+        for suffix, draw in drawn.items()
+    }

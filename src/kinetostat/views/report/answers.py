@@ -19,6 +19,7 @@ from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.answers import described, kind_of
 from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
 from kinetostat.views.identification_figures import CAPTIONS
 from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
@@ -40,10 +41,12 @@ from kinetostat.views.question import Description
 from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section
 from kinetostat.views.report.pictures import figure_of
 from kinetostat.views.report.typesetting import as_table, typeset
+from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 
 ANSWERS_WITH_SECTIONS = ("under_load", "vibration", "budget")
 """Answers of `studies.report.QUESTIONS` with a section, in the order of a report."""
+LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
 SAID_BEFORE = "Pose"
 """Line that a report has on its first page."""
 
@@ -62,6 +65,16 @@ def answer_sections(answers: Answers) -> Iterator[Section]:
             yield WRITTEN_SECTIONS[name](answer, answers)
     if answers.fit:
         yield _fit_section(answers.machine, answers.fit)
+
+
+def design_sections(answers: Answers) -> Iterator[Section]:
+    """Write the sections for the designer: guidelines, and the parameters ranked by influence."""
+    for name, description in (("guidelines", GUIDELINES), ("sensitivity", SENSITIVITY)):
+        answer = answers.of(name)
+        if answer is None:
+            yield Section(description.title, (Paragraph(LEFT_OUT_SENTENCES[name]),))
+        else:
+            yield described_section(description, answer)
 
 
 def described_section(description: Description, answer: Any, more: Iterable[Block] = ()) -> Section:

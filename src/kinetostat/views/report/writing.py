@@ -24,9 +24,14 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.answers import plain_of
-from kinetostat.views.report.answers import ANSWERS_WITH_SECTIONS, answer_sections, study_section, validation_section
+from kinetostat.views.report.answers import (
+    ANSWERS_WITH_SECTIONS,
+    answer_sections,
+    design_sections,
+    study_section,
+    validation_section,
+)
 from kinetostat.views.report.content import Report
-from kinetostat.views.report.design import guideline_section, sensitivity_section
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
@@ -210,8 +215,7 @@ def report_of(
         load_section(analysis, pictures),
         *answer_sections(answers),
         workspace_section(answers),
-        guideline_section(answers),
-        sensitivity_section(answers.of("sensitivity")),
+        *design_sections(answers),
         validation_section(validation),
         method_section(),
         record_section(origin, engine),

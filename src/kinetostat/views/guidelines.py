@@ -1,0 +1,287 @@
+"""Design guidelines: the question, and the description of its answer. Only rounding is computed here."""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from rich.text import Text
+
+from kinetostat.display import number
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.parameters import with_leg
+from kinetostat.studies.guideline_sentences import LEAST_EFFECT, MATTERS, limit_of, statements
+from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guidelines
+from kinetostat.studies.plain_data import stiffness_of_spring
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.options import ranges_option
+from kinetostat.views.question import Description, Field, Lines, Question, Records
+from kinetostat.views.tables import numeric_table, omitted, text_table
+
+TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "design": "Design"}
+"""Words before the sentences of a topic."""
+DIGITS_OF_K = 6
+"""Digits of the coefficients of K, which are compared with those of papers."""
+BOLD_SHARE = 0.5
+"""Share from which an element is printed in bold."""
+MOST_MOVES = 16
+"""Parameters that have a line unless all are wanted."""
+MOST_NAMED_PATHS = 8
+
+
+def _lines(answer: Guidelines) -> Lines:
+    answered, poses = answer.poses
+    about = f"{' '.join(answer.components)} (base axes): deflection under a load in the same direction."
+    if poses:
+        about += f" Over {', '.join(answer.ranges)}: {answered:,} of {poses:,} poses have a result."
+    yield "Directions", about
+    for statement in statements(answer):
+        aside = "" if statement.holds is None else f" [{over_poses(statement.holds)}]"
+        yield TOPICS[statement.topic], f"{statement.text}{aside}"
+    if answer.here is not None:
+        yield "Percent", answer.meaning
+        yield from (("Others", sentence) for sentence in _left_out(answer))
+
+
+def over_poses(share: float) -> str:
+    """Say at how many poses a statement is true."""
+    return "everywhere" if share == 1.0 else f"at {100 * share:.3g} % of the poses"
+
+
+def _left_out(answer: Guidelines) -> Iterator[str]:
+    """Write sentences on the parameters that the tables omit, and why."""
+    hidden = len(answer.parameters) - MOST_MOVES
+    if hidden > 0:
+        yield f"{omitted(hidden)} (--full shows them)."
+    if answer.without_influence:
+        yield f"No direction depends on {_few(answer.without_influence)}."
+    for reason in dict.fromkeys(why for _, why in answer.left_out):
+        yield f"Omitted {reason}: {_few([path for path, why in answer.left_out if why == reason])}."
+
+
+def _few(paths: Sequence[str]) -> str:
+    rest = len(paths) - MOST_NAMED_PATHS
+    return ", ".join(paths[:MOST_NAMED_PATHS]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
+    if answer.here is None:
+        return
+    if answer.stiffness_equations is not None:
+        yield _equation_table(answer, answer.stiffness_equations)
+    if answer.elements:
+        yield _element_table(answer, answer.here)
+        yield _limit_table(answer, answer.here)
+    if answer.parameters:
+        yield _move_table(answer, len(answer.parameters) if full else MOST_MOVES)
+
+
+def _equation_table(answer: Guidelines, rows: dict[str, tuple[float, ...]]) -> FittedTable:
+    """K as sums over elements, in the form of the paper's equations 33-38."""
+    table = text_table("K at this pose as a sum over elements; k is the stiffness of one part (SI)", "entry", "sum")
+    for i, name in enumerate(answer.components):
+        parts = (f"{number(row[i], digits=DIGITS_OF_K)} k({element})" for element, row in rows.items() if row[i] != 0.0)
+        table.add_row(f"K_{name}", " + ".join(parts) or "0")
+    return table
+
+
+def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
+    """The share of each element in the compliance of each direction."""
+    table = numeric_table("Attribution: share of each element in the diagonal of C", "element", answer.components)
+    for element, row in zip(answer.elements, here.shares[:, :, 0].tolist(), strict=True):
+        table.add_row(element.name, *(_share(part) for part in row))
+    return table
+
+
+def _share(part: float) -> Text:
+    if math.isnan(part) or part == 0.0:
+        return Text("–" if part else "·")
+    return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= MATTERS else "dim")
+
+
+def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
+    """The stiffness from which each element counts as rigid.
+
+    An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
+    """
+    title = (
+        "Stiffness from which an element counts as rigid, within 1 % (· any stiffness suffices; never: nothing else is "
+        "compliant in that direction)"
+    )
+    table = numeric_table(title, "element", ["now", *answer.components])
+    for k, element in enumerate(answer.elements):
+        row = here.rigid[k, :, 0].tolist()
+        scale = answer.machine.display.scale(element.unit)
+        if element.stiffness is None:
+            table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
+        else:
+            rigid = element.stiffness == math.inf
+            present = 1.0 if rigid else element.stiffness
+            now = f"rigid ({scale.unit})" if rigid else f"{_limit(element.stiffness * scale.factor)} {scale.unit}"
+            table.add_row(element.name, now, *(_limit(factor * present * scale.factor) for factor in row))
+    return table
+
+
+def _limit(value: float) -> str:
+    """Return a limit in at most five characters."""
+    if math.isnan(value):
+        return "–"
+    if value == 0.0 or math.isinf(value):
+        return "·" if value == 0.0 else "never"
+    text = f"{value:.2g}" if value >= 1000.0 else f"{value:.3g}"
+    return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
+
+
+def _move_table(answer: Guidelines, count: int) -> FittedTable:
+    """The effect of the first parameters on each direction."""
+    grid = bool(answer.poses[0])
+    title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
+    if grid:
+        title += "; poses: share of the poses at which all arrows of the row point the same way as here"
+    table = numeric_table(title, "parameter", [*answer.components, *(["poses"] if grid else [])])
+    for move in answer.parameters[:count]:
+        name = with_leg(answer.machine, move.path)
+        table.add_row(name, *(_arrow(p) for p in move.percents), *([_share_alike(move)] if grid else []))
+    return table
+
+
+def _arrow(percent: float | None) -> Text:
+    if percent is None or abs(percent) < LEAST_EFFECT:
+        return Text("–" if percent is None else "·")
+    size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
+    return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
+
+
+def _share_alike(move: Move) -> str:
+    shares = [
+        move.stiffer[i] if p > 0.0 else move.softer[i]
+        for i, p in enumerate(move.percents)
+        if p is not None and abs(p) >= LEAST_EFFECT
+    ]
+    least = min(shares, default=1.0)
+    return "all" if least == 1.0 else f"{100 * least:.0f} %"
+
+
+def _elements(answer: Guidelines) -> list[dict[str, Any]]:
+    """The elements with their roles at the pose and over the grid, by direction."""
+    here, over, actuator = answer.here, answer.over_grid, answer.actuator
+    if here is None:
+        return []
+    by_direction = partial(_by_direction, answer)
+    of_actuator = actuator.stiffness if actuator else None
+    rows = []
+    for k, element in enumerate(answer.elements):
+        limits = [None if element.stiffness is None else limit_of(element.stiffness, f) for f in here.rigid[k, :, 0]]
+        row: dict[str, Any] = {
+            "name": element.name,
+            "parts": element.parts,
+            "actuated": element.actuated,
+            "units": element.unit or None,
+            "stiffness": stiffness_of_spring(element.stiffness),
+            "compliance_share": by_direction(here.shares[k, :, 0]),
+            "rigid_from_factor": by_direction(here.rigid[k, :, 0]),
+            "rigid_from": by_direction(limits),
+            "rigid_from_per_actuator": by_direction(
+                [limit and of_actuator and limit / of_actuator for limit in limits]
+            ),
+            "doubling_lowers_compliance": by_direction(here.gains[k, :, 0]),
+        }
+        if over is not None:
+            row["over_grid"] = {
+                "least_share": by_direction(over.shares[k].min(axis=1)),
+                "greatest_share": by_direction(over.shares[k].max(axis=1)),
+                "rigid_from_factor": by_direction(over.rigid[k].max(axis=1)),
+            }
+        rows.append(row)
+    return rows
+
+
+def _parameters(answer: Guidelines) -> list[dict[str, Any]]:
+    """The parameters with their effects by direction."""
+    rows = []
+    for move in answer.parameters:
+        row: dict[str, Any] = {
+            "path": move.path,
+            "one_percent": "0.01 rad" if move.turning else "1 %",
+            "stiffer_percent_per_percent": _by_direction(answer, move.percents),
+        }
+        if move.stiffer:
+            row["stiffer_at"] = _by_direction(answer, move.stiffer)
+            row["softer_at"] = _by_direction(answer, move.softer)
+        rows.append(row)
+    return rows
+
+
+def _by_direction(answer: Guidelines, row: Any) -> dict[str, Any]:
+    return dict(zip(answer.components, row, strict=True))
+
+
+def _equations(answer: Guidelines) -> dict[str, dict[str, Any]] | None:
+    """The coefficients of K by element and direction."""
+    rows = answer.stiffness_equations
+    return None if rows is None else {name: _by_direction(answer, row) for name, row in rows.items()}
+
+
+def _grid(answer: Guidelines) -> dict[str, Any] | None:
+    answered, poses = answer.poses
+    return {"over": answer.ranges, "poses": poses, "answered": answered} if answer.ranges else None
+
+
+DIRECTIONS = ("component",)
+ELEMENT = (
+    Field("name", long_name="elastic element", column="element_name"),
+    Field("parts", forms=("json",)),
+    Field("actuated"),
+    Field("units", forms=("json",)),
+    Field("stiffness", forms=("json",)),
+    Field("compliance_share", unit="1", long_name="share of the diagonal of C", axes=DIRECTIONS),
+    Field("rigid_from_factor", unit="1", long_name="multiple of the stiffness from which it is rigid", axes=DIRECTIONS),
+    Field("rigid_from", long_name="stiffness from which it is rigid, SI", axes=DIRECTIONS),
+    Field("rigid_from_per_actuator", long_name="that as a multiple of an actuator's", axes=DIRECTIONS),
+    Field("doubling_lowers_compliance", unit="1", long_name="share that doubling gains", axes=DIRECTIONS),
+    Field("over_grid", lambda row: row.get("over_grid"), forms=("json",), optional=True),
+)
+PARAMETER = (
+    Field("path", long_name="parameter"),
+    Field("one_percent", long_name="change that counts as one percent"),
+    Field("stiffer_percent_per_percent", unit="1", long_name="percent stiffer per percent more", axes=DIRECTIONS),
+    Field("stiffer_at", lambda row: row.get("stiffer_at"), forms=("json", "csv"), optional=True),
+    Field("softer_at", lambda row: row.get("softer_at"), forms=("json", "csv"), optional=True),
+)
+GUIDELINES = Description(
+    type="studies.guidelines.Guidelines",
+    title="Guidelines",
+    fields=(
+        Field("name", "machine.name"),
+        Field("status", "status.word"),
+        Field("message"),
+        Field("components"),
+        Field("rigid_within", lambda _answer: EXCESS),
+        Field("compliance_diagonal", lambda answer: answer.compliance_diagonal or None),
+        Records("elements", "element", ELEMENT, _elements, forms=("json", "nc")),
+        Field("stiffness_equations", _equations),
+        Records("parameters", "parameter", PARAMETER, _parameters),
+        Field("without_influence"),
+        Field("left_out", lambda answer: dict(answer.left_out)),
+        Field("statements", statements),
+        Field("grid", _grid),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.influence_figures.guideline_figures",
+    state=lambda answer: "design guidelines" if answer.status is Status.OK else answer.status.word,
+    answered=lambda answer: answer.status is Status.OK,
+    files={"guidelines.json": "json"},
+)
+DESIGN_GUIDELINES = Question(
+    example='kinetostat guidelines zhang-gosselin-4dof --over "x=-2 cm:2 cm:11" --over "z=66 cm:70 cm:11" -o out',
+    answer=guidelines,
+    options=(
+        ranges_option(
+            "a coordinate of the pose and its range: count at how many poses the guidelines hold; repeatable"
+        ),
+    ),
+    output="the figures and JSON",
+    reports_progress=True,
+    full="show every parameter",
+)
