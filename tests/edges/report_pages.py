@@ -24,7 +24,7 @@ def reported(path, subject, *words):
 
 def small_pictures(patch):
     """Draw the machine small, because that is what takes longest."""
-    patch.setattr(pictures, "SIZE", (160, 112))
+    patch.setattr(pictures, "PICTURE_SIZE", (160, 112))
 
 
 def no_pictures(patch):
