@@ -89,7 +89,7 @@ def drawing(machine: Machine, response: Response, joints: Joints | None) -> Draw
     for leg in written_legs(machine):
         start, remaining = remaining[: leg.size], remaining[leg.size :]
         placements = closed_placements(leg, start, target @ np.linalg.inv(home), length)
-        legs.append(leg.placed(placements))
+        legs.append(leg.at_pose(placements))
         members += [body.member(leg.name, placements) for body in leg.bodies]
     axes = [vector(axis) for axis in target[:3, :3].T]
     platform = Displacement(Rotation(*axes), vector(target[:3, 3]))

@@ -69,7 +69,7 @@ class Engine:
         Raises:
             InputError: if the engine is not installed, has no counterpart of a part of the machine, or fails.
         """
-        return self._asked(lambda: import_module(self.builder).solve(configuration, reference))
+        return self._answer_of(lambda: import_module(self.builder).solve(configuration, reference))
 
     def frequencies(self, machine: Machine) -> Array:
         """Return the natural frequencies of a machine at its pose, ascending, Hz; none if the engine has no modes.
@@ -77,10 +77,10 @@ class Engine:
         Raises:
             InputError: see `solve`.
         """
-        return self._asked(lambda: import_module(self.modes).frequencies(machine)) if self.modes else np.zeros(0)
+        return self._answer_of(lambda: import_module(self.modes).frequencies(machine)) if self.modes else np.zeros(0)
 
-    def _asked(self, question: Callable[[], Any]) -> Any:
-        """What a question to the engine returns; its trouble is an InputError."""
+    def _answer_of(self, question: Callable[[], Any]) -> Any:
+        """Answer of the engine to a question; its trouble is an InputError."""
         if self.version is None:
             raise InputError(f"The engine {self.name} is not installed. {INSTALL.format(adding('validate'))}")
         try:

@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.arrays import Array
 
 TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
-"""Where Exudyn's x y z rx ry rz are in kinetostat's rx ry rz x y z, and the other way round."""
+"""Places of Exudyn's x y z rx ry rz in kinetostat's rx ry rz x y z, and the other way round."""
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ class LegPart:
         point = apply(before, array(joint.point))
         return np.concatenate([axis, np.cross(point, axis) + float(joint.pitch) * axis])
 
-    def placed(self, before: Array, after: Array) -> Element:
+    def at_pose(self, before: Array, after: Array) -> Element:
         """The part where it is at the pose.
 
         Args:
@@ -152,7 +152,7 @@ class MovingLeg:
 
     @property
     def size(self) -> int:
-        """How many joint coordinates it has."""
+        """Number of its joint coordinates."""
         return sum(part.moves for part in self.parts)
 
     def placements(self, coordinates: Sequence[float]) -> list[Array]:
@@ -169,10 +169,10 @@ class MovingLeg:
         pairs = zip(self.parts, placements, strict=False)
         return np.array([part.rate(before, next(given)) for part, before in pairs if part.moves]).reshape(-1, 6).T
 
-    def placed(self, placements: Sequence[Array]) -> Leg:
+    def at_pose(self, placements: Sequence[Array]) -> Leg:
         """The leg at the pose, its rods as long as the pose makes them."""
         pairs = list(zip(self.parts, placements, placements[1:], strict=False))
-        chain = [part.placed(before, after) for part, before, after in pairs]
+        chain = [part.at_pose(before, after) for part, before, after in pairs]
         for i, part in enumerate(self.parts):
             if part.rod:
                 start, end = self._rod_ends(i, chain)

@@ -36,7 +36,7 @@ TRAVELS = dict.fromkeys(("prismatic", "cylindrical", "planar", "helical"), True)
 """Whether the bearings of a joint go with the body that it moves, by type. A type that is not here is taken from its
 row in `JOINT_TYPES`."""
 TENSOR_PLACES = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
-"""Where the entries of a tensor are in xx, yy, zz, xy, xz, yz."""
+"""Places of the entries of a tensor in xx, yy, zz, xy, xz, yz."""
 
 
 def written_legs(machine: Machine) -> list[MovingLeg]:
@@ -139,7 +139,7 @@ def _joint(leg: str, joint: Numbers, document: Numbers) -> list[LegPart]:
 
 
 def _elements(name: PartName, joint: Numbers) -> Sequence[Element]:
-    """What moves in a joint, from the base side to the platform side."""
+    """The elements of a joint that move, from the base side to the platform side."""
     kind = joint["type"]
     if kind == "parallelogram":
         ends = vector(joint["point"]), vector(joint["far"])

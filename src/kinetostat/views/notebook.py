@@ -107,7 +107,7 @@ class _Page(Console):
             if isinstance(whole, Table):
                 self.parts.append(_table(whole))
             else:
-                self._line += _styled(_text(whole), style)
+                self._line += _html_with_style(_text(whole), style)
         if end == "\n" and self._line.strip():
             self.parts += [f"<p>{line}</p>" for line in self._line.split("\n") if line.strip()]
             self._line = ""
@@ -117,7 +117,7 @@ def _text(thing: object) -> Text:
     return thing if isinstance(thing, Text) else Text(str(thing))
 
 
-def _styled(text: Text, style: str | Style | None = None) -> str:
+def _html_with_style(text: Text, style: str | Style | None = None) -> str:
     """Text with its styles as HTML, inside a style for all of it."""
     plain = Console(file=io.StringIO(), width=WIDTH)
     parts = [_within(escape(part.text), part.style) for part in text.render(plain)]
@@ -144,4 +144,4 @@ def _table(shown: Table) -> str:
 
 
 def _markup(content: object, style: str | Style | None = None) -> Markup:
-    return Markup(_styled(_text(content), style).replace("\n", "<br>"))
+    return Markup(_html_with_style(_text(content), style).replace("\n", "<br>"))

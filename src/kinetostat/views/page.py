@@ -1,4 +1,4 @@
-"""What all pages share: their frame, their look, tables. Texts are escaped here; what is HTML already is a `Markup`."""
+"""The frame, the look and the tables of all pages. Texts are escaped here; what is HTML already is a `Markup`."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -40,7 +40,7 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], num
         rows: cells as text, or as HTML where they are a `Markup`.
         numeric: for each column, whether it holds numbers (aligned to the right).
     """
-    above = f"<caption>{marked(caption)}</caption>" if caption else ""
+    above = f"<caption>{as_markup(caption)}</caption>" if caption else ""
     top = f"<thead>{_row('th', heads, numeric)}</thead>" if any(heads) else ""
     body = "".join(_row("td", row, numeric) for row in rows)
     return f'<div class="scroll"><table>{above}{top}<tbody>{body}</tbody></table></div>'
@@ -48,14 +48,14 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], num
 
 def _row(tag: str, cells: Sequence[str], numeric: Sequence[bool]) -> str:
     kinds = (' class="n"' if number else "" for number in numeric)
-    return f"<tr>{''.join(f'<{tag}{kind}>{marked(c)}</{tag}>' for c, kind in zip(cells, kinds, strict=True))}</tr>"
+    return f"<tr>{''.join(f'<{tag}{kind}>{as_markup(c)}</{tag}>' for c, kind in zip(cells, kinds, strict=True))}</tr>"
 
 
 def figure(picture: str, caption: str) -> str:
     """A picture (an HTML element) with its caption."""
-    return f"<figure>{picture}<figcaption>{marked(caption)}</figcaption></figure>"
+    return f"<figure>{picture}<figcaption>{as_markup(caption)}</figcaption></figure>"
 
 
-def marked(text: str) -> str:
+def as_markup(text: str) -> str:
     """A text as HTML."""
     return text if isinstance(text, Markup) else escape(text)

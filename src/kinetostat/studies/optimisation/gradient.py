@@ -35,7 +35,7 @@ ROUNDS = 5
 GAIN = 1e-7
 """Relative gain below which a round has gained nothing."""
 BLOCKED = 1e6
-"""What counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
+"""Value that counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
 there."""
 
 

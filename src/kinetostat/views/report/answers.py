@@ -85,10 +85,10 @@ def described_section(description: Description, answer: Any, more: Iterable[Bloc
         answer: at the pose of the report.
         more: blocks that stand behind it.
     """
-    return Section(description.title, (*_described(description, answer), *more))
+    return Section(description.title, (*_description_blocks(description, answer), *more))
 
 
-def _described(description: Description, answer: Any) -> Iterator[Block]:
+def _description_blocks(description: Description, answer: Any) -> Iterator[Block]:
     if not description.answered(answer):
         yield Paragraph(typeset(answer.message))
         return
@@ -118,7 +118,7 @@ def loaded_section(state: LoadedState, answers: Answers) -> Section:
         state: of the machine under its loads.
         answers: of the report; its analysis is that of the machine without loads.
     """
-    return Section("Under load", tuple(_loaded(state, answers.analysis)))
+    return Section("Under load", tuple(_loaded_blocks(state, answers.analysis)))
 
 
 def verdict_of(state: LoadedState) -> Paragraph:
@@ -127,7 +127,7 @@ def verdict_of(state: LoadedState) -> Paragraph:
     return Paragraph(typeset(f"{state.message}{stability}"), f"Under load, {state.rest.word}:")
 
 
-def _loaded(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
+def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield verdict_of(state)
     if not state.displacement:
         return

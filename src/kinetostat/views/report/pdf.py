@@ -20,7 +20,7 @@ from kinetostat.views.report.content import Block, Figure, Formula, Report, Sect
 
 TEMPLATE = Path(__file__).with_name("report.typ")
 INSTALL = "A PDF needs Typst; install it with `{}`, or write an HTML page: -o report.html."
-FAR = "\u2e80"
+FIRST_SYSTEM_CHARACTER = "\u2e80"
 """From this character on, a text may need the fonts of the system. Without such characters the system's fonts are
 ignored, so that the bytes are the same on every computer."""
 
@@ -41,7 +41,7 @@ def pdf_bytes(report: Report) -> bytes:
     Raises:
         InputError: Typst is not installed.
     """
-    return bytes(_compiled(report, format="pdf"))
+    return bytes(_compile(report, format="pdf"))
 
 
 def page_pictures(report: Report, dots: float) -> list[bytes]:
@@ -50,10 +50,10 @@ def page_pictures(report: Report, dots: float) -> list[bytes]:
     Raises:
         InputError: Typst is not installed.
     """
-    return list(_compiled(report, format="png", ppi=dots))
+    return list(_compile(report, format="png", ppi=dots))
 
 
-def _compiled(report: Report, **form: Any) -> Any:
+def _compile(report: Report, **form: Any) -> Any:
     check_typst()
     compiler: Any = import_module("typst")
 
@@ -68,7 +68,7 @@ def _compiled(report: Report, **form: Any) -> Any:
     text = json.dumps(content, ensure_ascii=False)
     sources: dict[str, Any] = {"main": TEMPLATE.read_bytes(), "report.json": text.encode(), **files}
     fonts = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
-    plain = max(text) < FAR
+    plain = max(text) < FIRST_SYSTEM_CHARACTER
     return compiler.compile(sources, font_paths=fonts, ignore_system_fonts=plain, **form)
 
 
@@ -82,14 +82,14 @@ def _block(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
             return _section(block, files)
         case Figure(caption, picture, width):
             name = f"figure-{len(files) + 1}.svg"
-            files[name] = (picture if isinstance(picture, str) else _wrapped(picture)).encode()
+            files[name] = (picture if isinstance(picture, str) else _svg_around(picture)).encode()
             return {"kind": "figure", "caption": caption, "file": name, "width": width}
         case Formula(_, typst):
             return {"kind": "formula", "typst": typst}
     return {"kind": type(block).__name__.lower(), **asdict(block)}
 
 
-def _wrapped(png: bytes) -> str:
+def _svg_around(png: bytes) -> str:
     """A PNG inside an SVG element, because the files handed to Typst must be text."""
     width, height = struct.unpack(">II", png[16:24])
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'

@@ -54,12 +54,12 @@ MOTION = Formula(
     ]),
     "bold(w) = bold(K) thin bold(t), quad quad bold(t) = bold(C) thin bold(w)",
 )  # fmt: skip
-"""How a load and the small motion that it causes belong together."""
+"""Relation of a load and the small motion that it causes."""
 LEG = Formula(
     "".join([*_CARRIED, _AND, *_DEFLECTING]),
     "bold(J)_p^T bold(W)_i = 0, quad quad bold(G)_i = bold(W)_i^T bold(J)_e bold(S) bold(J)_e^T bold(W)_i",
 )
-"""What a leg carries and how it deflects."""
+"""Wrenches that a leg carries, and its deflection."""
 ASSEMBLY = Formula(
     "".join([
         _matrix("K"), _EQUALS, f"<munder><mo>∑</mo>{_LEG}</munder>", _matrix("W", _LEG), _matrix("G", _LEG, _INVERSE),
@@ -67,7 +67,7 @@ ASSEMBLY = Formula(
     ]),
     "bold(K) = sum_i bold(W)_i bold(G)_i^(-1) bold(W)_i^T",
 )  # fmt: skip
-"""How the stiffnesses of the legs add up."""
+"""Sum of the stiffnesses of the legs."""
 
 
 def method_section() -> Section:
@@ -81,7 +81,7 @@ def method_section() -> Section:
 
 @dataclass(frozen=True)
 class Origin:
-    """What a report was made from.
+    """The sources of a report.
 
     Attributes:
         command: that makes it again.
