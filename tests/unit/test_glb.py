@@ -13,7 +13,7 @@ from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.scene.mesh import placed
+from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import LOOKS, Scene, Solid
 from machines import every_machine
 
@@ -37,7 +37,7 @@ def parts_of(data):
 def test_every_body_stands_where_the_scene_has_it(case):
     """Another program finds the same corners and volumes, in metres with y up."""
     scene = scene_of(case.machine)
-    shown = {solid.name: placed(solid) for solid in scene.solids if solid.layer != "frames"}
+    shown = {solid.name: placed_mesh(solid) for solid in scene.solids if solid.layer != "frames"}
     found = read(glb(scene))
     nodes = set(found.graph.nodes_geometry)
     assert nodes == set(shown)

@@ -11,7 +11,7 @@ from kinetostat.views.influence_figures import coloured_table
 
 
 def test_a_character_without_a_font_is_shown_by_its_number(monkeypatch):
-    monkeypatch.setattr(lettering, "_known", lambda: frozenset(map(ord, "abc µ")))
+    monkeypatch.setattr(lettering, "_known_characters", lambda: frozenset(map(ord, "abc µ")))
     assert lettering.drawable("ab 機µ") == "ab [U+6A5F]µ"
 
 
@@ -54,7 +54,7 @@ def test_a_name_with_dollar_signs_is_no_mathematics_in_a_legend_either():
 
 
 def test_names_beside_an_axis_are_drawn_as_they_are_and_fit(monkeypatch):
-    monkeypatch.setattr(lettering, "_known", lambda: frozenset(range(128)))
+    monkeypatch.setattr(lettering, "_known_characters", lambda: frozenset(range(128)))
     names = ["leg $a$ 1", "脚 of leg " + 40 * "m"]
     figure = coloured_table(("title", "setting"), {name: [1.0] for name in names}, ["x"], "RdBu_r", "percent")
     labels = figure.axes[0].get_yticklabels()

@@ -9,15 +9,15 @@ from kinetostat.algebra.vector import Displacement, Vector, rotation_along
 from kinetostat.kinetostatics.response import respond
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import machine_scene
-from kinetostat.views.scene.mesh import AROUND, ROUNDING, WIRE, mesh_of, placed
-from kinetostat.views.scene.polygon import cut_in_triangles, narrowed, rounded_hull
+from kinetostat.views.scene.mesh import CHAMFER_STEPS, REVOLVED_SIDES, WIRE_SIDES, mesh_of, placed_mesh
+from kinetostat.views.scene.polygon import cut_in_triangles, inset_outline, rounded_hull
 from kinetostat.views.scene.proportions import proportions_of
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit
 from machines import every_machine
 
-ROUND = AROUND / math.tau * math.sin(math.tau / AROUND)
+ROUND = REVOLVED_SIDES / math.tau * math.sin(math.tau / REVOLVED_SIDES)
 """Area of a regular polygon as a share of its circumscribed circle's."""
-WIRE_ROUND = WIRE / math.tau * math.sin(math.tau / WIRE)
+WIRE_ROUND = WIRE_SIDES / math.tau * math.sin(math.tau / WIRE_SIDES)
 EXACT = 1e-9
 BENT = 0.6
 """Least cosine between a face and the normals at its corners: half the corner of a bent wire, and its facets."""
@@ -86,7 +86,7 @@ def test_every_body_of_every_machine_encloses_a_volume(case):
     configuration = respond(case.machine).configuration
     scene = machine_scene(case.machine, configuration, proportions_of(case.machine, configuration))
     for solid in scene.solids:
-        mesh = placed(solid)
+        mesh = placed_mesh(solid)
         assert np.isfinite(mesh.points).all()
         assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0)
         assert mesh.volume > 0.0
@@ -116,8 +116,8 @@ def test_the_volume_of_round_bodies_comes_near_theirs():
 def test_a_broken_edge_takes_away_what_lies_outside_its_steps():
     """Of a long edge of length l: area between the corner and the chord polygon of a quarter circle."""
     chamfer, side, height = 0.001, 10.0, 0.1
-    step = 0.5 * math.pi / ROUNDING
-    removed = chamfer**2 * (1.0 - 0.5 * ROUNDING * math.sin(step))
+    step = 0.5 * math.pi / CHAMFER_STEPS
+    removed = chamfer**2 * (1.0 - 0.5 * CHAMFER_STEPS * math.sin(step))
     whole = side**2 * height
     broken = mesh_of(shapes.block(side, side, height, chamfer)).volume
     assert whole - broken == pytest.approx(8 * side * removed, rel=1e-3)
@@ -151,7 +151,7 @@ def test_a_solid_stands_in_the_base_frame_with_normals_of_the_scaled_body():
     axis, angle = unit(Vector(1.0, 2.0, -0.5)), 0.8
     place = Displacement(rotation_along(axis, math.cos(angle), math.sin(angle)), Vector(0.3, -0.2, 0.1))
     scale = (1.0, 2.0, 0.5)
-    ball = placed(Solid("ellipsoid", shapes.ball(1.0), "steel", place, scale))
+    ball = placed_mesh(Solid("ellipsoid", shapes.ball(1.0), "steel", place, scale))
     own = np.array([place.inverse().apply(Vector(*p)).components() for p in ball.points])
     assert np.sum((own / scale) ** 2, axis=1) == pytest.approx(1.0)
     assert ball.volume == pytest.approx(mesh_of(shapes.ball(1.0)).volume)
@@ -175,4 +175,4 @@ def test_an_outline_with_hollows_is_cut_without_overlap():
 
 def test_a_narrowed_square_has_its_edges_moved_in():
     square = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)])
-    assert narrowed(square, 0.25) == pytest.approx(np.clip(square, 0.25, 1.75))
+    assert inset_outline(square, 0.25) == pytest.approx(np.clip(square, 0.25, 1.75))

@@ -10,9 +10,9 @@ from PIL import Image
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x
 from kinetostat.machine.loading import load
 from kinetostat.views.picture import machine_picture, picture
-from kinetostat.views.rendering.camera import VIEWS, camera_on
+from kinetostat.views.rendering.camera import VIEWPOINTS, camera_on
 from kinetostat.views.rendering.light import light_on
-from kinetostat.views.rendering.visibility import Body, hits_of, nearest_triangles, normals_at
+from kinetostat.views.rendering.visibility import Triangles, hits_of, nearest_triangles, normals_at
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
@@ -92,11 +92,11 @@ def test_labels_are_written_where_they_stand():
     assert (x.mean(), y.mean()) == pytest.approx((150, 150), abs=12)
 
 
-@pytest.mark.parametrize("view", [*VIEWS, (1.0, 2.0, 3.0)])
+@pytest.mark.parametrize("view", [*VIEWPOINTS, (1.0, 2.0, 3.0)])
 @pytest.mark.parametrize("size", [(400, 300), (300, 400)])
 def test_a_camera_fills_its_picture_and_no_more(view, size):
     points = mesh_of(shapes.block(0.3, 1.2, 0.7)).points + np.array([3.0, -1.0, 2.0])
-    places, nearness = camera_on(points, VIEWS[view] if isinstance(view, str) else view, *size).project(points)
+    places, nearness = camera_on(points, VIEWPOINTS[view] if isinstance(view, str) else view, *size).project(points)
     low, high = places.min(axis=0), places.max(axis=0)
     assert low.min() > 0.0
     assert (high < size).all()
@@ -128,7 +128,7 @@ def test_triangles_cover_every_pixel_between_them_once():
 
 def test_rays_meet_a_floor_where_it_is_however_steeply_it_runs_away():
     place = Displacement(rotation_x(1.0, 0.0), Vector(0.0, 0.0, -0.1))
-    slab = Body([Solid("slab", shapes.block(20.0, 60.0, 0.1), "steel", place)])
+    slab = Triangles([Solid("slab", shapes.block(20.0, 60.0, 0.1), "steel", place)])
     seen = hits_of(slab, camera_on(slab.points, (0.0, -1.0, 0.3), 200, 150), 1)
     top = seen.normals[:, 2] > 0.99
     assert top.sum() > 100
@@ -137,7 +137,7 @@ def test_rays_meet_a_floor_where_it_is_however_steeply_it_runs_away():
 
 
 def test_normals_are_those_of_the_corners_and_in_between_by_area():
-    body = Body([])
+    body = Triangles([])
     body.points, body.triangles = np.array([(0.0, 0.0, 0.0), (0.0, 4.0, 0.0), (4.0, 0.0, 0.0)]), np.array([(0, 1, 2)])
     body.normals = np.eye(3)
     normals = normals_at(body, np.array([0, 0]), np.array([(0.0, 4.0, 0.0), (1.0, 1.0, 0.0)]))
@@ -154,7 +154,7 @@ def test_triangles_that_face_away_are_not_seen():
 def test_light_falls_on_what_is_open_and_not_below_a_roof():
     """Over open ground all of sun and sky, under a wide plate nothing, away from a lamp's side neither."""
     place = Displacement(rotation_x(1.0, 0.0), Vector(0.0, 0.0, 0.2))
-    casters = Body([Solid("roof", shapes.block(2.0, 2.0, 0.1), "steel", place)])
+    casters = Triangles([Solid("roof", shapes.block(2.0, 2.0, 0.1), "steel", place)])
     points = np.array([(0.0, 0.0, 0.0), (50.0, 0.0, 0.0), (50.0, 0.0, 0.0)])
     normals = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
     light = light_on(points, normals, casters, 400)

@@ -7,7 +7,7 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
 from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.scene.mesh import placed
+from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import BASE, LOOKS, Scene, Solid, linear
 from machines import one_of_each
 
@@ -39,7 +39,7 @@ def scene_with(*solids):
 
 
 def shown(scene):
-    return {solid.name: placed(solid) for solid in scene.solids if solid.layer == "machine"}
+    return {solid.name: placed_mesh(solid) for solid in scene.solids if solid.layer == "machine"}
 
 
 def centre_of(mesh):

@@ -16,11 +16,11 @@ from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
-VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
-MARGIN = 0.12
+THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
+VIEW_MARGIN = 0.12
 """Room beside a machine, as a share of its size."""
 MILLIMETRES = 1e3
-LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
+LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
 """Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 
@@ -50,7 +50,7 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
         configuration: of the machine.
         draw: fills a panel, given the axes across and up.
     """
-    views = VIEWS if configuration.plane is None else VIEWS[2:]
+    views = THREE_VIEWS if configuration.plane is None else THREE_VIEWS[2:]
     figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
     panels = dict(zip(views, figure.subplots(1, len(views), squeeze=False).flat, strict=True))
     ends: dict[str, list[float]] = {}
@@ -63,7 +63,7 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
     size = max(max(part) - min(part) for part in ends.values())
     if 0.0 < size < math.inf:
         middle = {axis: 0.5 * (max(part) + min(part)) for axis, part in ends.items()}
-        half = (0.5 + MARGIN) * size
+        half = (0.5 + VIEW_MARGIN) * size
         for (_, across, up), panel in panels.items():
             panel.set_xlim(middle[across] - half, middle[across] + half)
             panel.set_ylim(middle[up] - half, middle[up] + half)
@@ -75,7 +75,7 @@ def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: 
     actuated = [leg for leg in configuration.legs if leg.actuated]
     standing = [leg for leg in actuated if len(leg.path) > 1]
     for plate in (loop([leg.path[0] for leg in standing]), loop([leg.path[-1] for leg in standing])):
-        panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
+        panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
     marks = {"P": reference} if (tool - reference).norm() == 0.0 else {"P": reference, "T": tool}
@@ -87,7 +87,7 @@ def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: 
 
 def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> None:
     x, y = flat(list(leg.path), across, up)
-    colour = LEG if actuated else CONSTRAINT
+    colour = LEG_COLOUR if actuated else CONSTRAINT_COLOUR
     panel.plot(x, y, "-", color=colour, linewidth=1.4 if actuated else 2.2, solid_capstyle="round")
     panel.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=4 if actuated else 5, markeredgewidth=1.0)
     if actuated and len(x) > 1:

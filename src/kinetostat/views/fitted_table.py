@@ -15,9 +15,9 @@ from rich.table import Column, Table
 from rich.text import Text
 
 _DECIMAL = re.compile(r"([-+−]?[\d,]+)((?:\.\d+)?)")
-GAP = 3
+COLUMN_GAP = 3
 """Characters between two columns, and 1 where room is short."""
-EDGES = 2
+EDGE_SPACE = 2
 """Characters left and right of a table."""
 
 
@@ -32,19 +32,19 @@ class FittedTable(Table):
         """Print the title, and the table in one block or in as many as its columns need."""
         if self.title:
             yield Text(str(self.title), "bold")
-        columns = [_Shown(column) for column in self.columns]
-        gap = GAP if _fits(columns, GAP, options.max_width) else 1
+        columns = [_ColumnWidths(column) for column in self.columns]
+        gap = COLUMN_GAP if _fits(columns, COLUMN_GAP, options.max_width) else 1
         for block in _blocks(columns, gap, options.max_width):
             yield from self._part(block, gap, options.max_width).__rich_console__(console, options)
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
         """Return the widths that the table may have: at most that at which nothing is broken."""
-        columns = [_Shown(column) for column in self.columns]
-        whole = sum(column.aligned for column in columns) + GAP * (len(columns) - 1) + EDGES
+        columns = [_ColumnWidths(column) for column in self.columns]
+        whole = sum(column.aligned for column in columns) + COLUMN_GAP * (len(columns) - 1) + EDGE_SPACE
         most = min(max(whole, cell_len(str(self.title or ""))), options.max_width)
-        return Measurement(min(most, EDGES + max((column.least for column in columns), default=0)), most)
+        return Measurement(min(most, EDGE_SPACE + max((column.least for column in columns), default=0)), most)
 
-    def _part(self, shown: "Sequence[_Shown]", gap: int, width: int) -> Table:
+    def _part(self, shown: "Sequence[_ColumnWidths]", gap: int, width: int) -> Table:
         """Return a table of some columns, of fixed widths."""
         space = (gap - 1) // 2
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, space))
@@ -59,7 +59,7 @@ class FittedTable(Table):
         return table
 
 
-class _Shown:
+class _ColumnWidths:
     """A column with the widths that it may have."""
 
     def __init__(self, column: Column) -> None:
@@ -86,14 +86,14 @@ class _Shown:
             yield cell
 
 
-def _fits(columns: Sequence[_Shown], gap: int, width: int) -> bool:
-    return sum(column.least for column in columns) + gap * (len(columns) - 1) + EDGES <= width
+def _fits(columns: Sequence[_ColumnWidths], gap: int, width: int) -> bool:
+    return sum(column.least for column in columns) + gap * (len(columns) - 1) + EDGE_SPACE <= width
 
 
-def _blocks(columns: Sequence[_Shown], gap: int, width: int) -> Iterator[list[_Shown]]:
+def _blocks(columns: Sequence[_ColumnWidths], gap: int, width: int) -> Iterator[list[_ColumnWidths]]:
     """Part the columns of numbers into as few blocks as fit, each with the first column, as even as they can be."""
     first, rest = columns[:1], columns[1:]
-    room = width - EDGES - sum(column.least for column in first)
+    room = width - EDGE_SPACE - sum(column.least for column in first)
     for count in range(1, max(len(rest), 1) + 1):
         size = -(-len(rest) // count)
         blocks = [rest[start : start + size] for start in range(0, len(rest), size)] or [[]]
@@ -102,9 +102,9 @@ def _blocks(columns: Sequence[_Shown], gap: int, width: int) -> Iterator[list[_S
     yield from ([*first, *block] for block in blocks)
 
 
-def _widths(columns: Sequence[_Shown], gap: int, width: int) -> list[int]:
+def _widths(columns: Sequence[_ColumnWidths], gap: int, width: int) -> list[int]:
     """Return the width of each column: its longest text, less in the widest texts where room is short."""
-    room = width - EDGES - gap * (len(columns) - 1)
+    room = width - EDGE_SPACE - gap * (len(columns) - 1)
     widths = [column.aligned for column in columns]
     if sum(widths) > room:
         widths = [column.most for column in columns]

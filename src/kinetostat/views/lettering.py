@@ -12,31 +12,30 @@ from matplotlib.ticker import FixedLocator
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 
-USUAL = "DejaVu Sans"
-WIDE = (
+USUAL_FONT = "DejaVu Sans"
+WIDE_FONTS = (
     "Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans CJK KR", "Noto Sans JP", "Noto Sans SC", "Source Han Sans",
     "WenQuanYi Zen Hei", "WenQuanYi Micro Hei", "IPAGothic", "Droid Sans Fallback", "Microsoft YaHei", "Yu Gothic",
     "Malgun Gothic", "Hiragino Sans", "PingFang SC", "Arial Unicode MS", "Unifont",
 )  # fmt: skip
 """Fonts that have Chinese, Japanese and Korean characters; those that are installed stand behind the usual font."""
 MATHEMATICS = re.compile(r"\$[^$]*\$")
-POINTS = 72
-"""Of an inch."""
-TICKS = 7.5
+POINTS_PER_INCH = 72
+TICK_LABEL_SIZE = 7.5
 """Size of the labels beside an axis, points."""
 POWER = r"\mathdefault"
-"""What Matplotlib writes for numbers on an axis."""
+"""The command that Matplotlib writes around numbers on an axis."""
 
 
 @cache
 def families() -> tuple[str, ...]:
     """Return the fonts of figures that are installed, the usual one first."""
     installed = {entry.name for entry in fontManager.ttflist}
-    return (USUAL, *(name for name in WIDE if name in installed))
+    return (USUAL_FONT, *(name for name in WIDE_FONTS if name in installed))
 
 
 @cache
-def _known() -> frozenset[int]:
+def _known_characters() -> frozenset[int]:
     """The characters that the fonts have."""
     paths = [fontManager.findfont(name) for name in families()]
     return frozenset(code for path in paths for code in get_font(path).get_charmap())
@@ -44,7 +43,7 @@ def _known() -> frozenset[int]:
 
 def drawable(text: str) -> str:
     """Return a text with the number of each character that no installed font has, such as U+6A5F, in its place."""
-    return "".join(c if c.isspace() or ord(c) in _known() else f"[U+{ord(c):04X}]" for c in text)
+    return "".join(c if c.isspace() or ord(c) in _known_characters() else f"[U+{ord(c):04X}]" for c in text)
 
 
 @cache
@@ -57,11 +56,11 @@ def is_mathematics(text: str) -> bool:
     return all(part in _symbols() or POWER in part for part in MATHEMATICS.findall(text))
 
 
-def width_of(labels: Iterable[str], size: float = TICKS) -> float:
+def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
     """Return the room that the longest of some labels beside an axis takes, inches."""
     font = FontProperties(family=[*families()], size=size)
     widths = (text_to_path.get_text_width_height_descent(drawable(label), font, False)[0] for label in labels)
-    return float(max(widths, default=0.0)) / POINTS
+    return float(max(widths, default=0.0)) / POINTS_PER_INCH
 
 
 def letter(figure: Figure) -> None:

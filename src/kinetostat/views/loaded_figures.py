@@ -20,7 +20,7 @@ from kinetostat.views.drawing import flat, loop, views_of
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, look_of, note_setting, set_title
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
-from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
+from kinetostat.views.scene.analysis_overlays import exaggerated_displacement, exaggeration_of, motions_of
 from kinetostat.views.scene.proportions import proportions_of
 
 UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
@@ -105,7 +105,7 @@ def moved_figure(
     configuration = response.configuration
     factor = exaggeration_of(response, moved, proportions_of(machine, configuration).diagonal)
     point = machine.tool_point(configuration.platform)
-    motion = exaggerated(moved.motion, point, factor)
+    motion = exaggerated_displacement(moved.motion, point, factor)
     heads = loop([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
 
     def draw(panel: Axes, across: str, up: str) -> None:

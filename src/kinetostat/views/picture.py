@@ -19,20 +19,20 @@ from kinetostat.arrays import Float32s
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, several, shorten
-from kinetostat.views.rendering.camera import VIEWS, Camera, camera_on
-from kinetostat.views.rendering.ground import SIDE, Ground, veil_over
-from kinetostat.views.rendering.light import Light, encoded, light_on, shaded
-from kinetostat.views.rendering.visibility import Body, Hits, hits_of
+from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, camera_on
+from kinetostat.views.rendering.ground import LARGEST_GROUND_MAP, Ground, veil_over
+from kinetostat.views.rendering.light import Light, light_on, shaded_colors, srgb_of
+from kinetostat.views.rendering.visibility import Hits, Triangles, hits_of
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
 
 Theme: TypeAlias = Literal["light", "dark"]
 
-FINER = 2
+SAMPLES_PER_SIDE = 2
 """Samples of a pixel across and down: their mean has smooth edges."""
 SMALLEST, LARGEST = 16, 4096
 """Smallest and largest side of a picture, pixels."""
-PLAIN = ("frames", "labels")
+HIDDEN_BY_DEFAULT = ("frames", "labels")
 """Layers that a picture leaves out by default."""
 UNSHADOWED = frozenset(("springs", "frames", "directions", "ellipsoids", "deflection"))
 """Layers of symbols, which cast no shadow."""
@@ -81,7 +81,7 @@ def machine_picture(
     *,
     theme: Theme = "light",
     transparent: bool = False,
-    hidden: Collection[str] = PLAIN,
+    hidden: Collection[str] = HIDDEN_BY_DEFAULT,
 ) -> Picture:
     """Draw a machine at its pose as a PNG.
 
@@ -106,7 +106,7 @@ def picture(
     *,
     theme: Theme = "light",
     transparent: bool = False,
-    hidden: Collection[str] = PLAIN,
+    hidden: Collection[str] = HIDDEN_BY_DEFAULT,
 ) -> Picture:
     """Draw a scene as a PNG.
 
@@ -131,16 +131,16 @@ def picture(
         raise InputError(f"hidden leaves nothing to draw; hide fewer of {', '.join(LAYERS)}.")
     opaque_solids = [solid for solid in solids if LOOKS[solid.material].opacity == 1.0]
     translucent = [[s for s in solids if s.material == m] for m, look in LOOKS.items() if look.opacity < 1.0]
-    bodies = [Body(opaque_solids), *(Body(group) for group in translucent if group)]
+    bodies = [Triangles(opaque_solids), *(Triangles(group) for group in translucent if group)]
     points = np.concatenate([body.points for body in bodies])
     camera = camera_on(points, _direction(view), *size)
-    layers = [hits_of(body, camera, FINER) for body in bodies]
+    layers = [hits_of(body, camera, SAMPLES_PER_SIDE) for body in bodies]
     foot = np.array([*scene.centre.components()[:2], scene.floor], dtype=float)
-    ground = Ground(foot, scene.size, min(SIDE, max(size) // 2))
-    casters = Body([solid for solid in opaque_solids if solid.layer not in UNSHADOWED])
+    ground = Ground(foot, scene.size, min(LARGEST_GROUND_MAP, max(size) // 2))
+    casters = Triangles([solid for solid in opaque_solids if solid.layer not in UNSHADOWED])
     *lights, on_ground = _lights(layers, ground, casters, max(size))
-    machine = _machine(layers, lights, camera, paper.brightness)
-    image = Image.fromarray(_composed(machine, *veil_over(ground, on_ground, camera), paper, transparent))
+    machine = _solids_seen(layers, lights, camera, paper.brightness)
+    image = Image.fromarray(_pixels(machine, *veil_over(ground, on_ground, camera), paper, transparent))
     _draw_labels(image, [label for label in scene.labels if label.layer not in hidden], camera)
     stream = io.BytesIO()
     (image if transparent else image.convert("RGB")).save(stream, "PNG")
@@ -154,13 +154,15 @@ def _check_size(size: tuple[int, int]) -> None:
 
 def _direction(view: str | Sequence[float]) -> Sequence[float]:
     if isinstance(view, str):
-        return VIEWS[choice(view, VIEWS, "view")]
+        return VIEWPOINTS[choice(view, VIEWPOINTS, "view")]
     if len(view) != 3 or not all(map(math.isfinite, view)) or not any(view):
-        raise InputError(f"view is {shorten(view)}; give {', '.join(VIEWS)}, or a direction: three numbers, not all 0.")
+        raise InputError(
+            f"view is {shorten(view)}; give {', '.join(VIEWPOINTS)}, or a direction: three numbers, not all 0."
+        )
     return view
 
 
-def _lights(layers: Sequence[Hits], ground: Ground, casters: Body, detail: int) -> list[Light]:
+def _lights(layers: Sequence[Hits], ground: Ground, casters: Triangles, detail: int) -> list[Light]:
     """The light on the samples of each layer, and on the ground; computed together, so that lamps are set up once."""
     ends = np.cumsum([len(layer.points) for layer in layers])
     points = np.concatenate([*(layer.points for layer in layers), ground.points])
@@ -170,26 +172,26 @@ def _lights(layers: Sequence[Hits], ground: Ground, casters: Body, detail: int) 
     return [Light(*part) for part in zip(*parts, strict=True)]
 
 
-def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
-    """What is seen of the solids [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
+def _solids_seen(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
+    """The solids as the camera sees them [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
 
     The opaque layer comes first; translucent ones are laid over it where nothing opaque hides them.
     """
     opacities = np.array([[look.opacity] for look in LOOKS.values()], dtype=np.float32)
-    canvas = np.zeros((camera.height * camera.width * FINER**2, 4), dtype=np.float32)
+    canvas = np.zeros((camera.height * camera.width * SAMPLES_PER_SIDE**2, 4), dtype=np.float32)
     for layer, light in zip(layers, lights, strict=True):
-        color = encoded(np.minimum(brightness * shaded(layer.look, layer.normals, layer.to_eye, light), 1.0))
+        color = srgb_of(np.minimum(brightness * shaded_colors(layer.look, layer.normals, layer.to_eye, light), 1.0))
         opacity = opacities[layer.look]
         ahead = layer.nearness[layer.pixel] >= layers[0].nearness[layer.pixel]
         at, sample = layer.pixel[ahead], layer.sample[ahead]
         canvas[at] *= 1.0 - opacity[sample]
         canvas[at] += np.concatenate([color, np.ones_like(opacity)], axis=1)[sample] * opacity[sample]
-    finer = canvas.reshape(camera.height, FINER, camera.width, FINER, 4)
-    summed = np.add.reduce([finer[:, y, :, x] for y in range(FINER) for x in range(FINER)])
-    return summed / np.float32(FINER**2)
+    finer = canvas.reshape(camera.height, SAMPLES_PER_SIDE, camera.width, SAMPLES_PER_SIDE, 4)
+    summed = np.add.reduce([finer[:, y, :, x] for y in range(SAMPLES_PER_SIDE) for x in range(SAMPLES_PER_SIDE)])
+    return summed / np.float32(SAMPLES_PER_SIDE**2)
 
 
-def _composed(machine: Float32s, shadow: Float32s, ink: Float32s, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
+def _pixels(machine: Float32s, shadow: Float32s, ink: Float32s, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
     """The machine over the grid, over the shadow, over the page [height x width x 4]."""
     shadow, ink = paper.shadow * shadow[..., None], paper.grid * ink[..., None]
     under = np.zeros(3, np.float32) if transparent else np.array(paper.color, np.float32)

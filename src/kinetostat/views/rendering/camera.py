@@ -11,13 +11,18 @@ import numpy as np
 
 from kinetostat.arrays import Array
 
-VIEWS = {"iso": (1.0, -1.35, 0.75), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02), "top": (0.0, -0.02, 1.0)}
+VIEWPOINTS = {
+    "iso": (1.0, -1.35, 0.75),
+    "front": (0.0, -1.0, 0.02),
+    "side": (1.0, 0.0, 0.02),
+    "top": (0.0, -0.02, 1.0),
+}
 """Direction from the machine to the camera, base axes."""
-FIELD = math.radians(32.0)
+FIELD_OF_VIEW = math.radians(32.0)
 """Angle of view across the picture's shorter side."""
-MARGIN = 0.07
+EMPTY_MARGIN = 0.07
 """Share of the picture that stays empty on each side."""
-FITS = 12
+FITTING_STEPS = 12
 """Number of times the camera is moved until the machine fills the picture."""
 
 
@@ -50,7 +55,7 @@ class Camera:
         right, down = (x - 0.5 * self.width) / self.focal, (y - 0.5 * self.height) / self.focal
         return np.stack([right, down, np.ones_like(right)], axis=-1) @ self.axes
 
-    def enlarged(self, factor: int) -> "Camera":
+    def with_finer_pixels(self, factor: int) -> "Camera":
         """The same view with more pixels."""
         return Camera(self.eye, self.axes, self.focal * factor, self.width * factor, self.height * factor)
 
@@ -75,13 +80,13 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
         width, height: size of the picture, pixels.
     """
     axes = axes_towards(-np.array(direction, dtype=float))
-    half = math.tan(0.5 * FIELD) * np.array([width, height]) / min(width, height)
+    half = math.tan(0.5 * FIELD_OF_VIEW) * np.array([width, height]) / min(width, height)
     target = 0.5 * (points.min(axis=0) + points.max(axis=0))
     distance = float(np.linalg.norm(np.ptp(points, axis=0))) / half.min()
-    for _ in range(FITS):
+    for _ in range(FITTING_STEPS):
         seen = (points - target) @ axes.T + (0.0, 0.0, distance)
         slopes = seen[:, :2] / seen[:, 2:]
         low, high = slopes.min(axis=0), slopes.max(axis=0)
         target = target + 0.5 * distance * (low + high) @ axes[:2]
-        distance *= float(np.max(0.5 * (high - low) / half)) / (1.0 - 2.0 * MARGIN)
+        distance *= float(np.max(0.5 * (high - low) / half)) / (1.0 - 2.0 * EMPTY_MARGIN)
     return Camera(target - distance * axes[2], axes, 0.5 * height / half[1], width, height)

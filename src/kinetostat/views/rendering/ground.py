@@ -10,17 +10,17 @@ from kinetostat.arrays import Array, Float32s
 from kinetostat.views.rendering.camera import Camera
 from kinetostat.views.rendering.light import Light, smooth_step
 
-REACH = 1.7
+GROUND_RADIUS = 1.7
 """Radius of the ground that is drawn, in diagonals of the machine."""
-SIDE = 448
+LARGEST_GROUND_MAP = 448
 """Largest side of the ground's own map of light, points."""
 SUN_SHARE = 0.6
 """Share of the main light in the light on open ground."""
-FAINT = 0.015
+FAINTEST_SHADOW = 0.015
 """Share of missing light below which the ground is simply bright."""
-EDGE = 0.12
+EDGE_FADE = 0.12
 """Share of the picture over which the ground fades towards each edge, so that pictures stand on a page unframed."""
-LINE = 1.1
+GRID_LINE_WIDTH = 1.1
 """Width of the grid's lines, pixels."""
 
 
@@ -59,7 +59,7 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (ground.centre[2] - camera.eye[2]) / rays[..., 2]
         at = camera.eye[:2] + distance[..., None] * rays[..., :2] - ground.centre[:2]
-    radius = np.linalg.norm(at, axis=-1) / (REACH * ground.size)
+    radius = np.linalg.norm(at, axis=-1) / (GROUND_RADIUS * ground.size)
     here = (distance > 0.0) & (radius < 1.0)
     at, fade = np.where(here[..., None], at, 0.0), np.where(here, 1.0 - np.minimum(radius, 1.0), 0.0)
     edge = _inside(x / camera.width) * _inside(y / camera.height)
@@ -74,12 +74,12 @@ def _missing(ground: Ground, light: Light) -> Float32s:
     """Share of the light that shadows take away, on the map; smoothed, because single points are grainy."""
     present = SUN_SHARE * light.sun / light.sun.max() + (1.0 - SUN_SHARE) * light.sky / light.sky.max()
     missing = gaussian_filter(1.0 - present.reshape(ground.side, ground.side), 1.0)
-    return np.maximum(missing - FAINT, 0.0) / (1.0 - FAINT)
+    return np.maximum(missing - FAINTEST_SHADOW, 0.0) / (1.0 - FAINTEST_SHADOW)
 
 
 def _inside(share: Array) -> Float32s:
     """Rise from 0 at either edge of the picture to 1 well inside."""
-    return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE)
+    return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE_FADE)
 
 
 def _grid(at: Array) -> Array:
@@ -89,5 +89,5 @@ def _grid(at: Array) -> Array:
         lines = at[..., axis]
         pixel = np.maximum(np.hypot(*np.gradient(lines)), 1e-9)
         away = np.abs(lines - np.round(lines)) / pixel
-        ink = np.maximum(ink, np.clip(0.5 * LINE + 0.5 - away, 0.0, 1.0) * np.clip(0.35 / pixel, 0.0, 1.0))
+        ink = np.maximum(ink, np.clip(0.5 * GRID_LINE_WIDTH + 0.5 - away, 0.0, 1.0) * np.clip(0.35 / pixel, 0.0, 1.0))
     return ink

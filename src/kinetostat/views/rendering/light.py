@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.arrays import Array, Float32s, Integers, Mask
 from kinetostat.engine.batch import available_cores
 from kinetostat.views.rendering.camera import axes_towards
-from kinetostat.views.rendering.visibility import Body, nearest_triangles
+from kinetostat.views.rendering.visibility import Triangles, nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear
 
 Lamp: TypeAlias = tuple[Float32s, Callable[[Float32s, Float32s], Mask]]
@@ -30,11 +30,11 @@ SUNS, SKIES = 12, 56
 """Lamps that make up the main light, and the sky."""
 SUN_SIDE, SKY_SIDE = 1024, 320
 """Largest side of a lamp's shadow map, pixels."""
-AWAY = 1.6
+LIFTED_PIXELS = 1.6
 """Height of a point above its surface when its light is looked up, in pixels of the map: no surface shades itself."""
-SOFT = 3.0
+LOOKUP_BLUR = 3.0
 """Width over which points look up a map at random, in its pixels: steps of a shadow's edge become fine grain."""
-BLOCK = 65536
+BLOCK_POINTS = 65536
 """Points whose light is summed together: they stay in the processor's cache."""
 SUN_POWER, SKY_POWER, BOUNCE_POWER = 1.55, 0.75, 0.3
 """Irradiance of the main light, of the sky, and of what the ground reflects upwards, over pi."""
@@ -68,7 +68,7 @@ class Light:
     openness: Float32s
 
 
-def light_on(points: Array, normals: Array, casters: Body, detail: int) -> Light:
+def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> Light:
     """Compute the light on points of surfaces from many distant lamps, each with a map of the solids in its way.
 
     Args:
@@ -81,21 +81,21 @@ def light_on(points: Array, normals: Array, casters: Body, detail: int) -> Light
     low, high = box.min(axis=0), box.max(axis=0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
     places, facing = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (points, normals))
-    aside = SOFT * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
-    parts = [slice(start, start + BLOCK) for start in range(0, len(points), BLOCK)]
+    aside = LOOKUP_BLUR * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
+    parts = [slice(start, start + BLOCK_POINTS) for start in range(0, len(points), BLOCK_POINTS)]
     sums = []
     with ThreadPoolExecutor(available_cores()) as threads:
         for directions, largest in ((_sun_directions(), SUN_SIDE), (_sky_directions(), SKY_SIDE)):
             side = min(largest, detail)
             lamps = list(threads.map(partial(_lamp, casters, centre, radius, side), directions))
-            received = partial(_received, lamps, 2.0 * AWAY * radius / side)
+            mean_light = partial(_mean_light, lamps, 2.0 * LIFTED_PIXELS * radius / side)
             pieces = zip(*((places[:, part], facing[:, part], aside[:, part]) for part in parts), strict=True)
-            sums.append(np.concatenate(list(threads.map(received, *pieces)), axis=1))
+            sums.append(np.concatenate(list(threads.map(mean_light, *pieces)), axis=1))
     (sun, _), (sky, unhidden) = sums
     return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, 1e-6), 1.0))
 
 
-def _lamp(casters: Body, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
+def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
     """A lamp with a shadow map [side x side] that covers the ball around all casters: the depth nearest to the lamp."""
     axes = axes_towards(-direction)
     axes[:2] *= 0.5 * (side - 4) / radius
@@ -114,7 +114,7 @@ def _lamp(casters: Body, centre: Array, radius: float, side: int, direction: Arr
     return direction.astype(np.float32), reaches
 
 
-def _received(lamps: Sequence[Lamp], away: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
+def _mean_light(lamps: Sequence[Lamp], away: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
     """Mean light of lamps on points [3 x n] lifted `away` (m) from their surface, with and without shadows [2 x n]."""
     lifted = points + normals * np.float32(away)
     light = np.zeros((2, points.shape[1]), np.float32)
@@ -144,7 +144,7 @@ def _sky_directions() -> Array:
     return np.column_stack([flat, np.sqrt(1.0 - np.sum(flat**2, axis=1))])
 
 
-def shaded(look: Integers, normals: Float32s, to_eye: Float32s, light: Light) -> Float32s:
+def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Light) -> Float32s:
     """Compute the colours [n x 3] (linear, 0 to 1) of points: paint and metal in a studio with soft boxes.
 
     Diffuse paint takes light from sun, sky and ground; shiny surfaces mirror the room and the main light. At the end
@@ -197,7 +197,7 @@ def smooth_step(value: Array | Float32s, low: Array | Float32s | float, high: Ar
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
-def encoded(light: Float32s) -> Float32s:
+def srgb_of(light: Float32s) -> Float32s:
     """Encode linear light, 0 to 1, as sRGB (IEC 61966-2-1)."""
     bright = 1.055 * np.maximum(light, 0.0031308) ** np.float32(1.0 / 2.4) - 0.055
     return np.where(light <= 0.0031308, 12.92 * light, bright)

@@ -10,18 +10,18 @@ import numpy as np
 
 from kinetostat.arrays import Array, Float32s, Integers
 from kinetostat.views.rendering.camera import Camera
-from kinetostat.views.scene.mesh import placed
+from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import LOOKS, Solid
 
-ALIKE = 0.97
+LIKE_NORMALS = 0.97
 """Cosine between normals above which samples of one pixel on one solid share their shading."""
-CHUNK = 1_000_000
+CHUNK_PIXELS = 1_000_000
 """Pixels that are worked on together: it limits the memory that a large picture takes."""
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 """The two corners of a triangle that lie opposite each corner."""
 
 
-class Body:
+class Triangles:
     """Triangles of several solids.
 
     Attributes:
@@ -32,7 +32,7 @@ class Body:
 
     def __init__(self, solids: Sequence[Solid]) -> None:
         """Put solids together."""
-        meshes = [placed(solid) for solid in solids]
+        meshes = [placed_mesh(solid) for solid in solids]
         starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
         shifted = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]
         counts, names = [len(mesh.triangles) for mesh in meshes], list(LOOKS)
@@ -45,7 +45,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Hits:
-    """Where the rays of a camera meet a body.
+    """Points at which the rays of a camera meet solids.
 
     Attributes:
         nearness: of all pixels [height * width]: the inverse of the depth, 0 where nothing is met.
@@ -64,19 +64,19 @@ class Hits:
     look: Integers
 
 
-def hits_of(body: Body, camera: Camera, finer: int) -> Hits:
+def hits_of(body: Triangles, camera: Camera, finer: int) -> Hits:
     """Find the points of a body that a camera sees, in `finer` times as many pixels across and down.
 
     The finer pixels smooth the edges. Light is costly, so those that lie within one pixel of the picture, on the same
     solid and with like normals, share one sample.
     """
-    fine = camera.enlarged(finer)
+    fine = camera.with_finer_pixels(finer)
     near, triangle = nearest_triangles(*fine.project(body.points), body.triangles, fine.width, fine.height)
     pixel = np.flatnonzero(triangle >= 0)
     met = triangle[pixel]
     normals = np.empty((len(pixel), 3), np.float32)
-    for start in range(0, len(pixel), CHUNK):
-        part = slice(start, start + CHUNK)
+    for start in range(0, len(pixel), CHUNK_PIXELS):
+        part = slice(start, start + CHUNK_PIXELS)
         normals[part] = normals_at(body, met[part], _points(fine, near, pixel[part])[0])
     owner = _owners(pixel, body.solid[met], normals, fine.width, finer)
     chosen, sample = np.unique(owner, return_inverse=True)
@@ -89,13 +89,13 @@ def hits_of(body: Body, camera: Camera, finer: int) -> Hits:
 
 
 def _points(camera: Camera, nearness: Float32s, pixel: Integers) -> tuple[Array, Array]:
-    """Where the rays through pixels end, base frame (m), and the rays."""
+    """End points of the rays through pixels, base frame (m), and the rays."""
     x, y = np.asarray(pixel % camera.width + 0.5), np.asarray(pixel // camera.width + 0.5)
     rays = camera.rays(x, y)
     return camera.eye + rays / nearness[pixel, None], rays
 
 
-def normals_at(body: Body, triangle: Integers, points: Array) -> Array:
+def normals_at(body: Triangles, triangle: Integers, points: Array) -> Array:
     """Interpolate the unit normals of the corners at points [n x 3] (base frame, m) of triangles [n].
 
     The weight of a corner is the area of the triangle between the point and the other two corners. In space that holds
@@ -115,7 +115,7 @@ def _owners(pixel: Integers, solid: Integers, normals: Float32s, width: int, fin
     corner = pixel - pixel // width % finer * width - pixel % width % finer
     first = np.minimum(np.searchsorted(pixel, corner), len(pixel) - 1)
     alike = (pixel[first] == corner) & (solid[first] == solid)
-    alike &= np.einsum("ij,ij->i", normals[first], normals) > ALIKE
+    alike &= np.einsum("ij,ij->i", normals[first], normals) > LIKE_NORMALS
     return np.where(alike, first, np.arange(len(pixel)))
 
 
@@ -156,16 +156,16 @@ def _fragments(
     lines = np.stack([y[LAST] - y[NEXT], x[NEXT] - x[LAST], x[LAST] * y[NEXT] - x[NEXT] * y[LAST]])
     plane = np.einsum("kim,im->km", lines, nearness[triangles[kept].T] / area)
     sizes = np.cumsum(rows + 0.5 * area)
-    for chosen in np.split(np.arange(len(kept)), np.flatnonzero(np.diff(sizes // CHUNK)) + 1):
-        triangle, row = _expanded(chosen, first[chosen], rows[chosen])
+    for chosen in np.split(np.arange(len(kept)), np.flatnonzero(np.diff(sizes // CHUNK_PIXELS)) + 1):
+        triangle, row = _runs(chosen, first[chosen], rows[chosen])
         left, right = _spans(lines[:, :, triangle], row, width)
-        at, column = _expanded(np.arange(len(triangle)), left, np.maximum(right - left + 1, 0))
+        at, column = _runs(np.arange(len(triangle)), left, np.maximum(right - left + 1, 0))
         triangle, row = triangle[at], row[at]
         across, down, rest = plane[:, triangle]
         yield row * width + column, across * (column + 0.5) + down * (row + 0.5) + rest, kept[triangle]
 
 
-def _expanded(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integers, Integers]:
+def _runs(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integers, Integers]:
     """Repeat each owner as often as it counts, with start, start + 1, ... beside it."""
     total = np.cumsum(counts)
     offsets = np.arange(total[-1] if len(total) else 0) - np.repeat(total - counts, counts)

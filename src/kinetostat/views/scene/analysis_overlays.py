@@ -165,7 +165,7 @@ def swing_data(
 
 @dataclass(frozen=True)
 class _Moving:
-    """What is drawn of a machine that moves a little.
+    """Solids and sizes of the parts that a machine moves when it deflects.
 
     Attributes:
         body: platform and tool.
@@ -223,12 +223,12 @@ def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
         path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * moving.radii[link.leg]
         wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
-    motion = exaggerated(moved.motion, moving.point, factor)
-    body = [s.moved(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
+    motion = exaggerated_displacement(moved.motion, moving.point, factor)
+    body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
     return [*wires, *body]
 
 
-def exaggerated(motion: Twist, point: Vector, factor: float) -> Displacement:
+def exaggerated_displacement(motion: Twist, point: Vector, factor: float) -> Displacement:
     """A small motion of a body at a point, times a factor, as a rigid displacement of the body."""
     angle = motion.rotational.norm() * factor
     axis = unit(motion.rotational)

@@ -104,12 +104,12 @@ class Anatomy:
 
     @property
     def second_point(self) -> Vector:
-        """Where its first link ends."""
+        """End of its first link."""
         return self.links[0].end if self.links else self.head
 
     @property
     def last_but_one(self) -> Vector:
-        """Where its last link begins."""
+        """Beginning of its last link."""
         return self.links[-1].start if self.links else self.foot
 
     @property
@@ -172,7 +172,9 @@ class _Reading:
                 self.reach(element.far, linked=True)
             case Arm() | Beam():
                 self.reach(element.start)
-                self.links.append(LinkPart(self._named(element.name), "bar", element.start, element.end, up=element.up))
+                self.links.append(
+                    LinkPart(self._name_of(element.name), "bar", element.start, element.end, up=element.up)
+                )
                 self.reach(element.end, linked=True)
 
     def reach(self, point: Vector, linked: bool = False) -> None:
@@ -184,7 +186,7 @@ class _Reading:
         elif slide is not None:
             self.rails.append(RailPart(slide[0], start or point, slide[1], slide[2]))
         if apart and (slide is None or not _along(slide[1], point - (start or point))):
-            self.links.append(LinkPart(self._named(""), "bar", start or point, point))
+            self.links.append(LinkPart(self._name_of(""), "bar", start or point, point))
         middle = (start or point) * 0.35 + point * 0.65
         self.springs += [_spring_part(spring, middle) for spring in self.waiting]
         self.waiting, self.slide, self.at = [], None, point
@@ -196,7 +198,7 @@ class _Reading:
             return self.rails
         return [*self.rails, RailPart(self.slide[0], self.at, self.slide[1], self.slide[2])]
 
-    def _named(self, name: str) -> str:
+    def _name_of(self, name: str) -> str:
         return name or f"{self.leg.name} link {len(self.links) + 1}"
 
     def _turning(self, joint: Joint) -> None:

@@ -55,7 +55,7 @@ def glb(scene: Scene, hidden: Collection[str] = ("frames",)) -> bytes:
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
-    return _packed(document, bytes(buffer.data))
+    return _container(document, bytes(buffer.data))
 
 
 class _Buffer:
@@ -115,7 +115,7 @@ def _material(name: str, look: Look) -> dict[str, Any]:
     }
 
 
-def _packed(document: dict[str, Any], data: bytes) -> bytes:
+def _container(document: dict[str, Any], data: bytes) -> bytes:
     """JSON and one buffer as a GLB container."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % ALIGNED)

@@ -13,19 +13,19 @@ from kinetostat.views.scene.plates import Plate
 from kinetostat.views.scene.proportions import Profile, Proportions
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit, upright
 
-RAIL = 0.55
+RAIL_LENGTH = 0.55
 """Length of a rail as a share of the machine's diagonal."""
 COIL_TURNS = 2.5
 """Turns of the spiral that stands for a torsional spring."""
 
 
-BARREL = 0.56
+BARREL_SHARE = 0.56
 """Length of a cylinder as a share of its leg's length where the machine was loaded."""
 LONGEST_BARREL = 0.88
 """Share of a leg that its cylinder takes at most, however short the leg becomes."""
-BAR = 0.72
+BAR_RADIUS = 0.72
 """Radius of a bar as a share of a leg's cylinder, where the file gives no cross-section."""
-SNUG = 0.42
+JOINT_PER_WIDTH = 0.42
 """Radius from which joints are drawn, in widths of the thickest link of the leg."""
 
 
@@ -49,7 +49,7 @@ def leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Proport
 def joint_radius(leg: Anatomy, sizes: Proportions) -> float:
     """Return the radius to which the joints of a leg are drawn, m: more than usual where a link is thick."""
     profiles = [sizes.cross_sections[link.name] for link in leg.links if link.name in sizes.cross_sections]
-    return max([sizes.leg, *(SNUG * profile.width for profile in profiles)])
+    return max([sizes.leg, *(JOINT_PER_WIDTH * profile.width for profile in profiles)])
 
 
 def _neighbours(joint: JointPart, leg: Anatomy, base: Plate | None, platform: Plate) -> tuple[Vector, Vector]:
@@ -155,7 +155,7 @@ def _at(joint: JointPart, name: str, shape: Turned | Swept, material: str, z: Ve
 
 def rail_ends(rail: RailPart, sizes: Proportions) -> tuple[Vector, Vector]:
     """Return the ends of a rail, base frame, m. It does not move with its carriage, and is long enough for it."""
-    home, half = sizes.carriages.get(rail.name, rail.point), 0.5 * RAIL * sizes.diagonal
+    home, half = sizes.carriages.get(rail.name, rail.point), 0.5 * RAIL_LENGTH * sizes.diagonal
     moved = (rail.point - home).dot(rail.axis)
     middle = rail.point - rail.axis * moved
     return middle + rail.axis * min(-half, moved), middle + rail.axis * max(half, moved)
@@ -236,7 +236,7 @@ def _telescope(link: LinkPart, radius: float, material: str, span: float) -> lis
     """A cylinder at the start, from which the rod comes."""
     length, along = link.span.norm(), unit(link.span)
     gap = min(2.0 * radius, 0.12 * length)
-    barrel = min(BARREL * span, LONGEST_BARREL * length) - gap
+    barrel = min(BARREL_SHARE * span, LONGEST_BARREL * length) - gap
     big = 1.25 * radius
 
     def part(name: str, shape: Turned, of: str, distance: float) -> Solid:
@@ -254,7 +254,7 @@ def _telescope(link: LinkPart, radius: float, material: str, span: float) -> lis
 def _bars(link: LinkPart, radius: float, material: str) -> list[Solid]:
     """Two bars, and the shafts or pins that hold them."""
     side = link.side if link.side is not None else link.span * 0.0
-    thick, width = BAR * radius, side.norm()
+    thick, width = BAR_RADIUS * radius, side.norm()
     solids = []
     for end, centre in (("near", link.start), ("far", link.end)):
         place = upright(centre, side)

@@ -16,11 +16,11 @@ from kinetostat.views.scene.plates import Plate, plate_behind
 from kinetostat.views.scene.proportions import Proportions, bounds, proportions_of
 from kinetostat.views.scene.solids import Label, Scene, Solid, unit, upright
 
-BED = 4.5
+BED_DEPTH = 4.5
 """Depth of a rail's bed below its carriage's joint, in radii of its leg."""
-FRAME = 0.11
+FRAME_LENGTH = 0.11
 """Length of a frame's axes as a share of the machine's diagonal."""
-DRAWN = (Status.OK, Status.JOINT_LIMIT, Status.SINGULAR, Status.UNDECIDED)
+DRAWABLE = (Status.OK, Status.JOINT_LIMIT, Status.SINGULAR, Status.UNDECIDED)
 """Status of poses at which every part has a place."""
 
 
@@ -34,7 +34,7 @@ def scene_of(machine: Machine) -> Scene:
     configuration = state.configuration
     points = [point for leg in configuration.legs for point in leg.path]
     placed = all(math.isfinite(c) for point in points for c in point.components())
-    if Status(int(state.free.status)) not in DRAWN or not placed:
+    if Status(int(state.free.status)) not in DRAWABLE or not placed:
         raise InputError(f"The machine cannot be drawn at this pose. {why_not(machine, state.free, ())}")
     return machine_scene(machine, configuration, proportions_of(machine, configuration))
 
@@ -57,7 +57,7 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     frames = [("O", BASE_FRAME), ("P", configuration.platform)]
     if not together(tool, configuration.platform.translation):
         frames.append(("T", Displacement(configuration.platform.rotation, tool)))
-    length = FRAME * sizes.diagonal
+    length = FRAME_LENGTH * sizes.diagonal
     labels = [Label(leg.label, _label_point(leg, sizes)) for leg in legs if leg.actuated]
     for name, place in frames:
         solids += overlays.frame_solids(name, place, length)
@@ -66,7 +66,7 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     points = [*(p for leg in configuration.legs for p in leg.path), configuration.platform.translation, tool, *rails]
     low, high = bounds(points)
     span = high - low
-    beds = BED * max(joint_radius(leg, sizes) for leg in legs) if rails else 0.0
+    beds = BED_DEPTH * max(joint_radius(leg, sizes) for leg in legs) if rails else 0.0
     floor = min(low.z - beds, *(_lowest(plate) for plate in (base, platform) if plate)) - 0.6 * sizes.leg
     return Scene(tuple(solids), tuple(labels), (low + high) * 0.5, math.hypot(*span.components()), floor)
 

@@ -14,18 +14,18 @@ import numpy as np
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers
 from kinetostat.tolerances import NO_CIRCLE
-from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, narrowed
+from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, inset_outline
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
 
-AROUND = 40
+REVOLVED_SIDES = 40
 """Sides of a solid of revolution."""
-WIRE = 12
+WIRE_SIDES = 12
 """Sides of a wire."""
-ROUNDING = 3
+CHAMFER_STEPS = 3
 """Steps of a chamfer, which make it look round."""
-SMOOTH = 0.8
+SMOOTH_EDGE = 0.8
 """Cosine between the normals of neighbouring faces above which the edge between them is shaded round."""
-KEPT = 1024
+MESHES_KEPT = 1024
 """Number of meshes that are kept: a machine has about a hundred, few of which change while it moves."""
 
 
@@ -50,22 +50,22 @@ class Mesh:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-@lru_cache(KEPT)
+@lru_cache(MESHES_KEPT)
 def mesh_of(shape: Shape) -> Mesh:
     """Cut the surface of a shape into triangles, in its own axes; equal shapes share one mesh, which is read-only."""
     match shape:
         case Turned():
-            mesh = _turned(shape)
+            mesh = _revolved_mesh(shape)
         case Extruded():
-            mesh = _extruded(shape)
+            mesh = _extruded_mesh(shape)
         case Swept():
-            mesh = _swept(shape)
+            mesh = _swept_mesh(shape)
     for array in (mesh.points, mesh.normals, mesh.triangles):
         array.setflags(write=False)
     return mesh
 
 
-def placed(solid: Solid) -> Mesh:
+def placed_mesh(solid: Solid) -> Mesh:
     """Return the triangles of a solid in the base frame."""
     mesh, scale = mesh_of(solid.shape), np.array(solid.scale)
     axes = solid.place.rotation
@@ -80,7 +80,7 @@ def _numbers(vector: Vector) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def _turned(shape: Turned) -> Mesh:
+def _revolved_mesh(shape: Turned) -> Mesh:
     profile = np.array(shape.profile)
     profile = profile[[True, *(np.linalg.norm(np.diff(profile, axis=0), axis=1) > 0.0)]]
     profile[profile[:, 0] < NO_CIRCLE * profile[:, 0].max(), 0] = 0.0
@@ -88,7 +88,7 @@ def _turned(shape: Turned) -> Mesh:
     outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / np.linalg.norm(ways, axis=1, keepdims=True)
     closed = bool(np.all(profile[0] == profile[-1]))
     starts, ends = _ends_of_faces(outward, closed)
-    angles = [math.tau * k / AROUND for k in range(AROUND)]
+    angles = [math.tau * k / REVOLVED_SIDES for k in range(REVOLVED_SIDES)]
     cosines, sines = np.cos(angles), np.sin(angles)
 
     def around(pairs: Array) -> Array:
@@ -105,11 +105,11 @@ def _ends_of_faces(normals: Array, closed: bool) -> tuple[Array, Array]:
     before, after = np.roll(normals, 1, axis=0), np.roll(normals, -1, axis=0)
     if not closed:
         before[0], after[-1] = normals[0], normals[-1]
-    return _shared(normals, before), _shared(normals, after)
+    return _shared_normals(normals, before), _shared_normals(normals, after)
 
 
-def _shared(normals: Array, others: Array) -> Array:
-    smooth = np.einsum("ij,ij->i", normals, others) >= SMOOTH
+def _shared_normals(normals: Array, others: Array) -> Array:
+    smooth = np.einsum("ij,ij->i", normals, others) >= SMOOTH_EDGE
     both = np.where(smooth[:, None], normals + others, normals)
     return both / np.linalg.norm(both, axis=1, keepdims=True)
 
@@ -127,10 +127,10 @@ def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
     ahead = (step + 1) % count
     quads = np.stack([step, ahead, ahead + count, step + count], axis=1)
     quads = (quads + 2 * count * np.arange(bands)[:, None, None]).reshape(-1, 4)
-    return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), _halved(quads))
+    return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), _halved_quads(quads))
 
 
-def _halved(quads: Integers) -> Integers:
+def _halved_quads(quads: Integers) -> Integers:
     return np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
 
 
@@ -142,7 +142,7 @@ def _without_slivers(points: Array, normals: Array, triangles: Integers) -> Mesh
     return Mesh(points[used], normals[used], numbers.reshape(-1, 3))
 
 
-def _joined(meshes: Sequence[Mesh]) -> Mesh:
+def _joined_meshes(meshes: Sequence[Mesh]) -> Mesh:
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
@@ -151,17 +151,17 @@ def _joined(meshes: Sequence[Mesh]) -> Mesh:
     )
 
 
-def _extruded(shape: Extruded) -> Mesh:
+def _extruded_mesh(shape: Extruded) -> Mesh:
     outline = np.array(shape.outline)
     outline = outline[np.any(outline != np.roll(outline, 1, axis=0), axis=1)]
     chamfer = min(shape.chamfer, 0.5 * shape.height)
-    steps = [0.5 * math.pi * k / ROUNDING for k in range(ROUNDING + 1)] if chamfer > 0.0 else [0.5 * math.pi]
+    steps = [0.5 * math.pi * k / CHAMFER_STEPS for k in range(CHAMFER_STEPS + 1)] if chamfer > 0.0 else [0.5 * math.pi]
     lower = [(chamfer * (1.0 - math.sin(a)), chamfer * (1.0 - math.cos(a)), a) for a in steps]
     rows = [*lower, *((inset, shape.height - up, math.pi - a) for inset, up, a in reversed(lower))]
-    rings = np.stack([_level(narrowed(outline, inset) if inset else outline, height) for inset, height, _ in rows])
+    rings = np.stack([_level(inset_outline(outline, inset) if inset else outline, height) for inset, height, _ in rows])
     tilts = np.array([tilt for *_, tilt in rows])
     caps = [_cap(rings[-1], 1.0), _cap(rings[0], -1.0)]
-    return _joined([_wall(rings, tilts, edge_normals(outline)), *caps])
+    return _joined_meshes([_wall(rings, tilts, edge_normals(outline)), *caps])
 
 
 def _level(flat: Array, height: float) -> Array:
@@ -191,11 +191,11 @@ def _cap(ring: Array, up: float) -> Mesh:
     return Mesh(ring, normals, triangles if up > 0.0 else triangles[:, ::-1].copy())
 
 
-def _swept(shape: Swept) -> Mesh:
+def _swept_mesh(shape: Swept) -> Mesh:
     path = np.array(shape.path)
     tangents = _tangents(path, shape.closed)
     first, second = _frames(tangents, shape.closed)
-    angles = math.tau * np.arange(WIRE) / WIRE
+    angles = math.tau * np.arange(WIRE_SIDES) / WIRE_SIDES
     spokes = first[:, None] * np.cos(angles)[:, None] + second[:, None] * np.sin(angles)[:, None]
     rings = path[:, None] + shape.radius * spokes
     following = (np.arange(len(path) if shape.closed else len(path) - 1) + 1) % len(path)
@@ -204,7 +204,7 @@ def _swept(shape: Swept) -> Mesh:
     tube = _bands(points, np.stack([spokes[before], spokes[following]], axis=1), closed=True)
     if shape.closed:
         return tube
-    return _joined([tube, _disc(rings[0], -tangents[0]), _disc(rings[-1], tangents[-1])])
+    return _joined_meshes([tube, _disc(rings[0], -tangents[0]), _disc(rings[-1], tangents[-1])])
 
 
 def _tangents(path: Array, closed: bool) -> Array:
@@ -225,16 +225,16 @@ def _frames(tangents: Array, closed: bool) -> tuple[Array, Array]:
     start = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
     first[0] = start / np.linalg.norm(start)
     for i in range(1, len(tangents)):
-        first[i] = _carried(first[i - 1], tangents[i])
+        first[i] = _carried_normal(first[i - 1], tangents[i])
     if closed:
-        back, side = _carried(first[-1], tangents[0]), np.cross(tangents[0], first[0])
+        back, side = _carried_normal(first[-1], tangents[0]), np.cross(tangents[0], first[0])
         twist = math.atan2(back @ side, back @ first[0])
         angles = -twist * np.arange(len(tangents))[:, None] / len(tangents)
         first = first * np.cos(angles) + np.cross(tangents, first) * np.sin(angles)
     return first, np.cross(tangents, first)
 
 
-def _carried(normal: Array, tangent: Array) -> Array:
+def _carried_normal(normal: Array, tangent: Array) -> Array:
     flat = normal - tangent * (normal @ tangent)
     carried: Array = flat / np.linalg.norm(flat)
     return carried

@@ -73,9 +73,9 @@ def _three(directions: Sequence[Sequence[float]]) -> Rotation:
 
 def _ellipse(i: int, j: int, lengths: Sequence[float], wire: float) -> Swept:
     path = []
-    for n in range(2 * shapes.ROUND):
+    for n in range(2 * shapes.HALF_CIRCLE_POINTS):
         point = [0.0, 0.0, 0.0]
-        angle = math.pi * n / shapes.ROUND
+        angle = math.pi * n / shapes.HALF_CIRCLE_POINTS
         point[i], point[j] = lengths[i] * math.cos(angle), lengths[j] * math.sin(angle)
         path.append((point[0], point[1], point[2]))
     return Swept(tuple(path), wire, closed=True)

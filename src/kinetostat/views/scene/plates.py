@@ -10,13 +10,13 @@ from kinetostat.views.scene import shapes
 from kinetostat.views.scene.polygon import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
 
-CLEARANCE = 2.3
+PLATE_CLEARANCE = 2.3
 """Distance of a plate from the joint centres, in radii of a leg: enough room for the fork of a joint."""
-COINCIDENT = 1.0
+HUB_SPREAD = 1.0
 """If the joints spread less than this, in radii of a leg, a hub takes the place of the plate."""
-MARGIN = {"base": 3.6, "platform": 2.9}
-"""How far a plate extends beyond its joints, in radii of a leg."""
-THICKNESS = {"base": 1.7, "platform": 1.3}
+PLATE_MARGIN = {"base": 3.6, "platform": 2.9}
+"""Width of the rim of a plate beyond its joints, in radii of a leg."""
+PLATE_THICKNESS = {"base": 1.7, "platform": 1.3}
 """Thickness of a plate, in radii of a leg."""
 
 
@@ -47,14 +47,14 @@ class Plate:
     def surface(self) -> float:
         """Coordinate of the plate's face along its z, m; it lies below every joint."""
         lowest = min((joint - self.place.translation).dot(self.normal) for joint in self.joints)
-        return lowest - CLEARANCE * self.radius
+        return lowest - PLATE_CLEARANCE * self.radius
 
     def solids(self) -> list[Solid]:
         """Make the plate and its pedestals."""
         if self.hub:
             return [self._hub()]
-        thick = THICKNESS[self.name] * self.radius
-        outline = rounded_hull(self._flat(), MARGIN[self.name] * self.radius)
+        thick = PLATE_THICKNESS[self.name] * self.radius
+        outline = rounded_hull(self._flat(), PLATE_MARGIN[self.name] * self.radius)
         origin = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
         plate = Solid(
             f"{self.name}/plate",
@@ -102,11 +102,11 @@ def plate_behind(
     centre = Vector(*points.mean(axis=0).tolist())
     spread = points - points.mean(axis=0)
     sizes, axes = np.linalg.svd(spread)[1:]
-    flat = len(points) > 2 and sizes[1] > COINCIDENT * radius
+    flat = len(points) > 2 and sizes[1] > HUB_SPREAD * radius
     normal = Vector(*axes[2].tolist()) if flat else frame.rotation.z
     inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
     lean = inward.dot(normal)
     # Links in the plane of the joints do not say on which side the plate has room; then `side` decides.
     normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
-    hub = float(sizes[0]) < COINCIDENT * radius and len(points) > 1
+    hub = float(sizes[0]) < HUB_SPREAD * radius and len(points) > 1
     return Plate(name, upright(centre, normal, frame.rotation.x), tuple(joints), radius, hub)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinetostat.arrays import Array
-from kinetostat.views.scene.shapes import CORNER, ROUND
+from kinetostat.views.scene.shapes import CORNER_POINTS, HALF_CIRCLE_POINTS
 from kinetostat.views.scene.solids import Point2
 
 SHARPEST = 0.1
@@ -20,7 +20,7 @@ def edge_normals(outline: Array) -> Array:
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def narrowed(outline: Array, margin: float) -> Array:
+def inset_outline(outline: Array, margin: float) -> Array:
     """Move all edges of an outline inwards by `margin` (the outline's unit), and return the corners [n x 2]."""
     after = edge_normals(outline)
     both = after + np.roll(after, 1, axis=0)
@@ -68,14 +68,14 @@ def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
     """Return the convex hull of points, widened by `margin` with round corners, counter-clockwise."""
     hull = convex_hull(points)
     if len(hull) == 1:
-        angles = [math.tau * i / (4 * ROUND) for i in range(4 * ROUND)]
+        angles = [math.tau * i / (4 * HALF_CIRCLE_POINTS) for i in range(4 * HALF_CIRCLE_POINTS)]
         return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
     corners: list[Point2] = []
     for i, (x, y) in enumerate(hull):
         (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
         first = math.atan2(y - py, x - px) - 0.5 * math.pi
         turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
-        count = max(2, math.ceil(2 * CORNER * turn / math.pi))
+        count = max(2, math.ceil(2 * CORNER_POINTS * turn / math.pi))
         angles = [first + turn * k / count for k in range(count + 1)]
         corners += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]
     return tuple(corners)

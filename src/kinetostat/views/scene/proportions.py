@@ -13,7 +13,7 @@ from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.views.scene.anatomy import anatomy
 
-SLENDER = 0.0125
+LEG_RADIUS = 0.0125
 """Radius of a leg as a share of the machine's diagonal, where the file does not say how thick it is."""
 
 
@@ -55,7 +55,7 @@ def diagonal(configuration: Configuration) -> float:
 def leg_radius(machine: Machine, size: float) -> float:
     """Return the radius of the legs, m: half their diameter in [limits], if it is there."""
     given = machine.tables["limits"].leg_diameter
-    return 0.5 * given if is_set(given) else SLENDER * size
+    return 0.5 * given if is_set(given) else LEG_RADIUS * size
 
 
 def cross_sections_of(machine: Machine) -> dict[str, Profile]:

@@ -8,11 +8,11 @@ from functools import lru_cache
 
 from kinetostat.views.scene.solids import Extruded, Point2, Swept, Turned
 
-ROUND = 24
+HALF_CIRCLE_POINTS = 24
 """Points of a half circle."""
-TURN = 18
+COIL_TURN_POINTS = 18
 """Points of a turn of a coil."""
-CORNER = 8
+CORNER_POINTS = 8
 """Points of a rounded corner."""
 
 shared = lru_cache(512)
@@ -38,7 +38,7 @@ def pin(radius: float, length: float) -> Turned:
 @shared
 def ball(radius: float) -> Turned:
     """A ball about the origin."""
-    angles = [math.pi * (i / ROUND - 0.5) for i in range(ROUND + 1)]
+    angles = [math.pi * (i / HALF_CIRCLE_POINTS - 0.5) for i in range(HALF_CIRCLE_POINTS + 1)]
     return Turned(tuple((abs(radius * math.cos(a)), radius * math.sin(a)) for a in angles))
 
 
@@ -52,7 +52,7 @@ def cone(bottom: float, top: float, length: float) -> Turned:
 def waist(radius: float, neck: float, length: float) -> Turned:
     """A shaft with a thin neck in its middle, centred at the origin: a flexure."""
     half = 0.5 * length
-    heights = [half * (i / CORNER - 1.0) for i in range(2 * CORNER + 1)]
+    heights = [half * (i / CORNER_POINTS - 1.0) for i in range(2 * CORNER_POINTS + 1)]
     sides = [(neck + (radius - neck) * (h / half) ** 2, h) for h in heights]
     return Turned(((0.0, -half), *sides, (0.0, half)))
 
@@ -83,7 +83,7 @@ def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...
     bridge = -reach + foot
 
     def tip(middle: float) -> list[Point2]:
-        angles = [math.pi * i / CORNER for i in range(CORNER + 1)]
+        angles = [math.pi * i / CORNER_POINTS for i in range(CORNER_POINTS + 1)]
         return [(middle + 0.5 * arm * math.cos(a), arm * 0.9 + 0.5 * arm * math.sin(a)) for a in angles]
 
     right, left = tip(inner + 0.5 * arm), tip(-inner - 0.5 * arm)
@@ -96,7 +96,7 @@ def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...
 @shared
 def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
     """A flat spiral in the x-y plane with a straight end: the symbol of a torsional spring about z."""
-    count = round(TURN * turns)
+    count = round(COIL_TURN_POINTS * turns)
     steps = [i / count for i in range(count + 1)]
     curve = [((inner + (outer - inner) * t), math.tau * turns * t) for t in steps]
     path = [(r * math.cos(a), r * math.sin(a), 0.0) for r, a in curve]
@@ -107,7 +107,7 @@ def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
 @shared
 def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
     """A coil about z, centred at the origin: the symbol of a linear spring."""
-    count = round(TURN * turns)
+    count = round(COIL_TURN_POINTS * turns)
     angles = [math.tau * turns * i / count for i in range(count + 1)]
     path = [(radius * math.cos(a), radius * math.sin(a), length * (i / count - 0.5)) for i, a in enumerate(angles)]
     return Swept(tuple(path), wire)
@@ -116,7 +116,7 @@ def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
 @shared
 def arc(radius: float, turn: float, wire: float) -> Swept:
     """A wire arc in the x-y plane, from x over the angle `turn` (rad)."""
-    angles = [turn * i / (2 * ROUND) for i in range(2 * ROUND + 1)]
+    angles = [turn * i / (2 * HALF_CIRCLE_POINTS) for i in range(2 * HALF_CIRCLE_POINTS + 1)]
     return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire)
 
 

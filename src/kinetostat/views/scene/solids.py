@@ -14,9 +14,9 @@ from kinetostat.tolerances import NO_DIRECTION
 Point2: TypeAlias = tuple[float, float]
 Point3: TypeAlias = tuple[float, float, float]
 
-DIGITS = 7
+SCENE_DIGITS = 7
 """Significant digits of a number in a scene: a renderer has float32."""
-KEPT = 1024
+SHAPES_KEPT = 1024
 """Number of shapes whose data is kept: a machine has about a hundred, few of which change while it moves."""
 DECIMALS = 8
 """Decimals of a place: 10 nm."""
@@ -149,7 +149,7 @@ class Solid:
     layer: str = "machine"
     leg: str = ""
 
-    def moved(self, motion: Displacement, **changes: Any) -> "Solid":
+    def moved_by(self, motion: Displacement, **changes: Any) -> "Solid":
         """The solid after a displacement, with some attributes replaced."""
         return replace(self, place=motion @ self.place, **changes)
 
@@ -213,29 +213,33 @@ def columns_of(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
 
 def label_data(label: Label) -> dict[str, Any]:
     """Convert a label to plain data."""
-    return {"text": label.text, "layer": label.layer, "point": [round(c, DECIMALS) for c in label.point.components()]}
+    return {
+        "text": label.text,
+        "layer": label.layer,
+        "point": [round(c, DECIMALS) for c in label.point.components()],
+    }
 
 
-@lru_cache(KEPT)
+@lru_cache(SHAPES_KEPT)
 def _shape_data(shape: Shape) -> dict[str, Any]:
     match shape:
         case Turned(profile):
-            return {"kind": "turned", "profile": [_rounded(point) for point in profile]}
+            return {"kind": "turned", "profile": [_numbers(point) for point in profile]}
         case Extruded(outline, height, chamfer):
-            corners = [_rounded(point) for point in outline]
+            corners = [_numbers(point) for point in outline]
             return {"kind": "extruded", "outline": corners, "height": _round(height), "chamfer": _round(chamfer)}
         case Swept(path, radius, closed):
             return {
-                "kind": "swept", "path": [_rounded(point) for point in path], "radius": _round(radius), "closed": closed
+                "kind": "swept", "path": [_numbers(point) for point in path], "radius": _round(radius), "closed": closed
             }  # fmt: skip
 
 
-def _rounded(numbers: Iterable[float]) -> list[float]:
+def _numbers(numbers: Iterable[float]) -> list[float]:
     return [_round(number) for number in numbers]
 
 
 def _round(number: float) -> float:
-    return float(f"{number:.{DIGITS}g}")
+    return float(f"{number:.{SCENE_DIGITS}g}")
 
 
 def upright(origin: Vector, z: Vector, x: Vector | None = None) -> Displacement:
