@@ -20,7 +20,7 @@ PLACED = re.compile(r"\b(Vector|Displacement|Twist|Wrench|AnyScrew|Screw|Symmetr
 FRAME = re.compile(r"\b(frame|axes|reference point)\b")
 ROOMS = {"algebra", "machine", "kinematics", "kinetostatics"}
 """Where points, screws and matrices are computed."""
-VOCABULARY = {"kinetostat.algebra.column", "kinetostat.algebra.scalar", "kinetostat.kinematics.status"}
+VOCABULARY = {"kinetostat.algebra.scalar", "kinetostat.kinematics.status"}
 """Names for what others compute: they have no source."""
 
 EQUATION = re.compile(r"theory (\(\d+\)(?:(?:, | and |-)\(\d+\))*)")

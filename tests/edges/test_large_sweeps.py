@@ -26,7 +26,7 @@ RANGES = ["x=-40 cm:40 cm:50", "z=40 cm:140 cm:50", "theta5=-70 deg:-50 deg:50"]
 NAMES = ["compliance_x", "compliance_z"]
 WORDS = ["map", MACHINE, *(word for text in RANGES for word in ("--over", text)), "--quantity", "compliance_x"]
 CHUNKS = 4
-HERE = chunks.here
+IN_THIS_PROCESS = chunks.in_this_process
 """In 125 000 points, where a chunk is one slab."""
 
 
@@ -59,7 +59,7 @@ class Counted:
         self.numbers = []
 
     def __call__(self, work, numbers):
-        for number, found in chunks.here(work, numbers):
+        for number, found in chunks.in_this_process(work, numbers):
             self.numbers.append(number)
             yield number, found
 
@@ -165,14 +165,14 @@ def test_a_study_killed_while_its_file_is_made_begins_again(question, undisturbe
 
 def interrupted(work, numbers):
     """Ctrl-C while the third chunk is computed."""
-    yield from HERE(work, numbers[:2])
+    yield from IN_THIS_PROCESS(work, numbers[:2])
     raise KeyboardInterrupt
 
 
 def test_ctrl_c_keeps_what_was_computed_and_the_same_command_goes_on(tmp_path, monkeypatch, capsys):
     command = [*WORDS, "-o", str(tmp_path / "study")]
     with monkeypatch.context() as patch:
-        patch.setattr(chunks, "here", interrupted)
+        patch.setattr(chunks, "in_this_process", interrupted)
         assert main(command) == STOPPED
     assert "same command continues" in capsys.readouterr().err
     assert history(tmp_path / "study") == [0, 1]

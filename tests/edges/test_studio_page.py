@@ -10,8 +10,8 @@ from studio_page import on_page
 
 from kinetostat.cli import main
 from kinetostat.kinematics.nearest import nearest_pose
+from kinetostat.kinetostatics import refusal
 from kinetostat.machine.loading import bundled, load
-from kinetostat.studies import refusal
 from kinetostat.studies.analysis import analyze
 from kinetostat.studio import answers, lanes
 from kinetostat.studio import page as page_of_a_tab

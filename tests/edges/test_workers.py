@@ -62,7 +62,7 @@ def test_a_cluster_gives_the_same_bits(name, dask):
     with compute_with(Crew(address=dask)) as compute:
         found = list(compute(work, range(work.count)))
     assert len(found) == work.count > 2
-    assert_same(dict(found), dict(chunks.here(work, range(work.count))))
+    assert_same(dict(found), dict(chunks.in_this_process(work, range(work.count))))
 
 
 @pytest.mark.parametrize("name", bundled())
@@ -93,7 +93,7 @@ def test_a_worker_that_dies_is_survived():
                 os.kill(min(distributed.default_client().run(os.getpid).values()), signal.SIGKILL)
             assert number not in found
             found[number] = part
-    assert_same(found, dict(chunks.here(work, range(work.count))))
+    assert_same(found, dict(chunks.in_this_process(work, range(work.count))))
 
 
 INTERRUPTED = """
@@ -151,7 +151,7 @@ def test_a_cluster_that_fails_is_said(error, arguments, message):
     distributed = pytest.importorskip("distributed")
     client = Failing(attrgetter(error)(distributed)(*arguments))
     with refused(message):
-        next(chunks._computed(distributed, client, work_of(MACHINE), [0]))
+        next(chunks._on_cluster(distributed, client, work_of(MACHINE), [0]))
 
 
 def test_another_version_on_a_worker_is_refused():
@@ -172,7 +172,7 @@ def test_without_dask_the_fix_is_named(how, monkeypatch, capsys):
 
 def test_no_scheduler_at_an_address_is_said(monkeypatch, capsys):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(chunks, "PATIENCE", "100 ms")
+    monkeypatch.setattr(chunks, "CLUSTER_PATIENCE", "100 ms")
     assert main([*WORDS, "--cluster", "tcp://127.0.0.1:1"]) == BAD_INPUT
     assert 'no Dask scheduler answers at "tcp://127.0.0.1:1"' in capsys.readouterr().err
 
