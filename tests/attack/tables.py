@@ -16,7 +16,9 @@ from random import Random
 from hostile import LOADS, NUMBERS, UNITS, WORDS, entries_of, toml
 
 from kinetostat.machine.loading import bundled, load
-from kinetostat.studies.identification.identification import as_json, identify
+from kinetostat.studies.identification.identification import identify
+from kinetostat.views.data_forms import json_of
+from kinetostat.views.identification import IDENTIFICATION
 
 MACHINE = "planar-3rpr"
 """Small, so that a fit takes no time."""
@@ -146,7 +148,7 @@ def good_record() -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "measured.csv")
         path.write_text(good_table())
-        return json.dumps(as_json(identify(load(MACHINE), path, ["zeros", "gains"])))
+        return json.dumps(json_of(IDENTIFICATION, identify(load(MACHINE), path, ["zeros", "gains"])))
 
 
 def record(rng: Random) -> str:
