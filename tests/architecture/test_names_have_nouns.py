@@ -1,0 +1,165 @@
+"""Names and first lines: functions have nouns, class names one meaning, first lines say the thing, files are no slips.
+
+Where a rule is not kept everywhere, a limit for each room says how many places are left. Limits only fall.
+"""
+
+import ast
+import re
+from collections import Counter, defaultdict
+
+from source import ROOT, imports, module_name, modules
+
+ENDING = r"[a-z]+(ed|en|wn|lt|nt)"
+ADVERB = r"held|told|found|said|kept|made|left|together|apart|away|there|here"
+PARTICIPLE = re.compile(rf"_?({ENDING}|{ADVERB})")
+"""Names of functions that are a lone participle or adverb, by their endings."""
+NOUNS = """
+    agent alignment argument attachment bolt component content count default different displacement document element
+    extent fault font front gradient hidden indent instant joint moment mount open point present print result salt
+    screen segment statement tangent then tilt unseen variant when
+"""
+"""Nouns, verbs and conjunctions with such an ending."""
+ASKING = re.compile(r"(What|Which|How|Where|When)\b")
+"""Beginnings of first lines that describe a thing by a question."""
+SHORTEST = 60
+"""Lines of a file that is read with only one other; a shorter one belongs there."""
+CATALOGUE = "kinetostat.machine.catalogue"
+"""Families: each has the same classes for its tables, and is imported by a list."""
+REGISTERED = {"kinetostat.exchange.solids"}
+"""Modules that a registry names in words of its own."""
+PARTICIPLES_LEFT: dict[str, int] = {
+    "accuracy": 11,
+    "algebra": 7,
+    "commands": 6,
+    "display": 3,
+    "engine": 6,
+    "equilibrium": 3,
+    "exchange": 11,
+    "kinematics": 3,
+    "kinetostatics": 10,
+    "machine": 30,
+    "numerics": 1,
+    "spec": 15,
+    "studies": 23,
+    "studio": 36,
+    "units": 3,
+    "validation": 4,
+    "vibration": 4,
+    "views": 20,
+}
+ASKING_LEFT: dict[str, int] = {
+    "accuracy": 1,
+    "algebra": 1,
+    "cli": 1,
+    "commands": 1,
+    "display": 2,
+    "exchange": 8,
+    "kinetostatics": 13,
+    "machine": 6,
+    "spec": 16,
+    "studies": 19,
+    "studio": 22,
+    "tolerances": 1,
+    "units": 3,
+    "validation": 5,
+    "views": 16,
+}
+CLASSES_LEFT: frozenset[str] = frozenset(
+    {
+        "Axis",
+        "Body",
+        "Drawing",
+        "Drive",
+        "Element",
+        "Field",
+        "Form",
+        "Kind",
+        "Modes",
+        "Pace",
+        "Picture",
+        "Points",
+        "Question",
+        "Report",
+        "Softest",
+        "Step",
+        "Table",
+        "_Chain",
+        "_Reader",
+    }
+)
+SLIPS_LEFT: frozenset[str] = frozenset({"kinetostat.commands.loaded", "kinetostat.views.path_tables"})
+"""Places that are left, by room or by name."""
+
+
+def room(module):
+    return module.split(".")[1] if "." in module else ""
+
+
+def participles(tree):
+    """Functions that are named by a lone participle and do not return a flag."""
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    named = [f for f in functions if PARTICIPLE.fullmatch(f.name) and f.name.lstrip("_") not in NOUNS.split()]
+    return [f.name for f in named if not (isinstance(f.returns, ast.Name) and f.returns.id == "bool")]
+
+
+def first_lines(tree):
+    """First lines of all docstrings, those below constants and fields too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            yield node.value.value.strip().split("\n")[0]
+
+
+def left_in_rooms(places_of):
+    """Number of places by room in which a rule is not kept."""
+    counts = Counter({room(module): 0 for module in modules()})
+    for module, tree in modules().items():
+        counts[room(module)] += len(places_of(tree))
+    return {name: count for name, count in counts.items() if count}
+
+
+def beyond(counts, limits):
+    return {name: count for name, count in counts.items() if count > limits.get(name, 0)}
+
+
+def test_the_readers_see_names_and_lines():
+    tree = ast.parse('"""What it is."""\ndef moved(): pass\ndef held() -> bool: pass\nX = 1\n"""How many."""')
+    assert participles(tree) == ["moved"]
+    assert [line for line in first_lines(tree) if ASKING.match(line)] == ["What it is.", "How many."]
+
+
+def test_a_function_that_is_no_flag_is_named_by_a_noun_or_a_verb():
+    assert not beyond(left_in_rooms(participles), PARTICIPLES_LEFT)
+
+
+def test_first_lines_say_the_thing():
+    asking = left_in_rooms(lambda tree: [line for line in first_lines(tree) if ASKING.match(line)])
+    assert not beyond(asking, ASKING_LEFT)
+
+
+def test_a_class_name_has_one_meaning():
+    homes = defaultdict(list)
+    for module, tree in modules().items():
+        if not module.startswith(CATALOGUE):
+            for node in tree.body:
+                if isinstance(node, ast.ClassDef):
+                    homes[node.name].append(module)
+    assert not {name: found for name, found in homes.items() if len(found) > 1 and name not in CLASSES_LEFT}
+
+
+def test_a_file_that_is_read_with_one_other_is_not_short():
+    readers = defaultdict(set)
+    for module, tree in modules().items():
+        for name in imports(module):
+            readers[name].add(module)
+        for node in ast.walk(tree):  # registries name modules in texts, such as "views.answers.KINDS"
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                words = node.value.split(":")[0]
+                for name in (words, words.rpartition(".")[0]):
+                    readers[f"kinetostat.{name}"].add(module)
+    short = {
+        module_name(path): len(path.read_text("utf-8").splitlines())
+        for path in ROOT.rglob("*.py")
+        if not path.stem.startswith("__") and not module_name(path).startswith(CATALOGUE)
+    }
+    slips = {m for m, count in short.items() if count < SHORTEST and len(readers[m] - {m}) <= 1}
+    assert not slips - REGISTERED - SLIPS_LEFT
