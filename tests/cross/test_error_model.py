@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from kinetostat.accuracy.errors import Insertion, effects, errors_of
+from kinetostat.accuracy.errors import Insertion, effects, leg_error_sources
 from kinetostat.accuracy.model import error_model
-from kinetostat.accuracy.rows import places_of, rows_of
+from kinetostat.accuracy.rows import home_rows, random_coordinates
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.forward import assembly_modes, system_of
 from kinetostat.kinematics.status import Status
@@ -80,8 +80,8 @@ def test_rates_at_errors_are_the_derivative_there(case):
 
 @one_of_each
 def test_no_error_of_a_leg_is_missing_and_none_is_there_twice(case):
-    rows = rows_of(case.machine)
-    listed = [s for s in errors_of(rows) if s[0].group != "clearances"]
+    rows = home_rows(case.machine)
+    listed = [s for s in leg_error_sources(rows) if s[0].group != "clearances"]
     for number, row in enumerate(rows.legs):
         mine = [source for source in listed if source[1][0].leg == number]
         if any(unit.kind == "ball" for unit in row.units) or not mine:
@@ -95,7 +95,7 @@ def test_no_error_of_a_leg_is_missing_and_none_is_there_twice(case):
         everywhere += [s for s in mine if s[0].path.endswith(("difference", "gain"))]
         unit = []
         for sources in (everywhere, mine):
-            columns = effects(row, rows, sources, places_of(row, rows.length))
+            columns = effects(row, rows, sources, random_coordinates(row, rows.length))
             sizes = np.linalg.norm(columns, axis=0)
             unit.append((columns / sizes)[:, sizes > 1e-9])
         basis, triangle = np.linalg.qr(unit[1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinetostat.accuracy.screws import SEEN, Screws, independent
+from kinetostat.accuracy.closing import LEAST_SEEN_RATIO, Screws, independent_columns
 from kinetostat.numerics.motions import each_about, exponential
 
 
@@ -17,8 +17,8 @@ def leg_screws(count=30, seed=4):
 
 
 def test_freedoms_that_follow_from_others_are_left_out():
-    assert independent(leg_screws()) == (0, 1, 3, 4)
-    assert independent(np.zeros((5, 6, 0))) == ()
+    assert independent_columns(leg_screws()) == (0, 1, 3, 4)
+    assert independent_columns(np.zeros((5, 6, 0))) == ()
 
 
 def test_steps_are_those_of_singular_values_and_wrenches_do_no_work():
@@ -26,14 +26,14 @@ def test_steps_are_those_of_singular_values_and_wrenches_do_no_work():
     screws[7, :, 4] = screws[7, :, 3] + 1e-6 * screws[7, :, 4]  # places at which a regular leg is nearly singular,
     screws[8, :, 4] = screws[8, :, 3]  # and singular
     screws[9] = np.nan
-    free = Screws(screws, independent(leg_screws()))
+    free = Screws(screws, independent_columns(leg_screws()))
     twists = np.random.default_rng(5).normal(size=(len(screws), 6))
     steps = free.steps(twists)
     regular = np.array([n for n in range(len(screws)) if n not in (8, 9)])
     assert np.einsum("nim,nik->nmk", free.wrenches, free.screws)[regular] == pytest.approx(0.0, abs=1e-11)
     assert np.swapaxes(free.wrenches, 1, 2)[:9] @ free.wrenches[:9] == pytest.approx(np.tile(np.eye(2), (9, 1, 1)))
     for number in (n for n in range(len(screws)) if n != 9):
-        least = np.linalg.pinv(screws[number], rcond=SEEN) @ twists[number]
+        least = np.linalg.pinv(screws[number], rcond=LEAST_SEEN_RATIO) @ twists[number]
         assert steps[number] == pytest.approx(least, rel=1e-9, abs=1e-9 * np.abs(least).max())
     assert np.isnan(free.wrenches[9]).all()
     assert not np.isnan(np.delete(steps, 9, axis=0)).any()

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.accuracy.closing import Errors, followed
+from kinetostat.accuracy.closing import Errors, coordinates_toward, in_lengths, independent_columns
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.accuracy.rows import Row
-from kinetostat.accuracy.screws import independent, scaled
+from kinetostat.accuracy.rows import LegRow
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
@@ -104,7 +103,7 @@ def _configuration_near(
     links = model.leg_errors(np.where(actuators, 0.0, values))
     rows = model.rows
     coordinates = [
-        drawn[number] if drawn and not links[number] else followed(row, target, rows.length, links[number])
+        drawn[number] if drawn and not links[number] else coordinates_toward(row, target, rows.length, links[number])
         for number, row in enumerate(rows.legs)
     ]
     every = zip(rows.legs, coordinates, links, strict=True)
@@ -139,14 +138,14 @@ def _home_pose(machine: Machine) -> dict[str, Array]:
 
 def _gap(target: Motions, end: Motions, length: float) -> float:
     """Distance of the end of a leg from its target, rad or in units of the length."""
-    return float(np.abs(scaled(closing_gap(target, end), length)).max())
+    return float(np.abs(in_lengths(closing_gap(target, end), length)).max())
 
 
 def _driven_legs(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
     """Place the platform with actuators as drawn, and all joints with it, actuators with their errors."""
     state = model.closed_state(values)
     coordinates = [
-        followed(row, state.platform, model.rows.length, errors)
+        coordinates_toward(row, state.platform, model.rows.length, errors)
         for row, errors in zip(model.rows.legs, links, strict=True)
     ]
     return state.platform, coordinates
@@ -161,7 +160,7 @@ def _displacement(motion: Motions) -> Displacement:
     return Displacement(Rotation(*columns), Vector(*motion.translation.T))
 
 
-def _leg(leg: Leg, row: Row, place: PlacedChain, errors: dict[int, Array]) -> Leg:
+def _leg(leg: Leg, row: LegRow, place: PlacedChain, errors: dict[int, Array]) -> Leg:
     """A leg with every element displaced by what carries it."""
     chain: list[Element] = []
     for element, behind in zip(leg.chain, row.carried, strict=True):
@@ -184,7 +183,7 @@ def _idle(chain: list[Element]) -> tuple[int, ...]:
     about = points[0] if points else ZERO
     length = max([_first((point - about).norm()) for point in points], default=0.0) or 1.0
     twists = np.array([[_first(c) for c in joint.twist(about).components()] for joint in joints]).reshape(-1, 6)
-    chosen = independent(scaled(twists, length).T[None])
+    chosen = independent_columns(in_lengths(twists, length).T[None])
     return tuple(number for number in range(len(joints)) if number not in chosen)
 
 
@@ -199,7 +198,7 @@ def _same_centre(drawn: Element, before: Element, element: Joint, moved: Joint) 
     return replace(moved, point=before.point) if drawn.point == element.point else moved
 
 
-def _moving(element: Element, behind: int, row: Row) -> bool:
+def _moving(element: Element, behind: int, row: LegRow) -> bool:
     """Whether a spring is a motion of the row."""
     return isinstance(element, Spring) and element.actuated and behind < len(row.twists)
 

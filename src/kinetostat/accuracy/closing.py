@@ -1,34 +1,39 @@
-"""Legs with small errors closed on the platform, at many poses: places, wrenches, and Newton's method.
+"""Legs with small errors closed on the platform, at many poses: free screws, wrenches, places, and Newton's method.
 
 An error displaces what follows it in its leg by a small screw motion. Actuators are held; passive joints take up what
-they can, and the wrenches that each leg can carry decide what the platform makes of the rest. Arrays have the poses
-first [n]; screws are at the base origin in base axes, SI, unless said otherwise.
+they can, and the wrenches that each leg can carry decide what the platform makes of the rest. Which freedoms are
+independent is a matter of the leg's form. Where it is known, an orthogonal basis of these gives the wrenches, and with
+them the least steps follow from linear equations; places at which freedoms are nearly dependent are decomposed by their
+singular values. Arrays have the poses first [n]; screws are at the base origin in base axes, SI, unless said otherwise.
 
 Source: theory (45) to (48).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from kinetostat.accuracy.rows import Row, Rows, places_of
-from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
+from kinetostat.accuracy.rows import HomeRows, LegRow, random_coordinates
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import Steps, largest, newton, with_rows
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
+from kinetostat.tolerances import NEARLY_DEPENDENT, SEEN_BY_LEG
 
-SETTLED = 1e-8
+LEAST_SEEN_RATIO = 1e-7
+"""Least ratio of a singular value of joint screws to the largest one, with lengths in units of the machine's."""
+CLOSED_STEP = 1e-8
 """Motion of the last step of Newton's method, rad or in units of the machine's length: the next one would be about its
 square, or a thousandth of it where legs share a misfit."""
-STAGE = 0.2
+LONGEST_STAGE = 0.2
 """Farthest way of a stage, rad or in units of the machine's length, where fewer than all stages do."""
-NEAR = 1e-2
+NEARLY_CLOSED_STEP = 1e-2
 """The same on the way there, where the next stage starts from."""
-MOST_STEPS = 40
+MOST_CLOSING_STEPS = 40
 """Of Newton's method: errors are small, so that a few steps suffice where there is a solution."""
-STAGES = 8
+MOST_STAGES = 8
 """Steps on the way from the home place to a pose."""
 SOFTEST_SHARE = 1e-9
 """Share of the mean compliance of the legs that a leg without any is given where legs must share a misfit."""
@@ -38,24 +43,104 @@ Errors = list[dict[int, Array]]
 where it is the same at all poses."""
 
 
-def followed(row: Row, target: Motions, length: float, errors: Mapping[int, Array] | None = None) -> Array:
+def in_lengths(twists: Array, length: float, axis: int = -1) -> Array:
+    """Twists with their translations in units of a length; `axis` has their six components."""
+    units = np.array([1.0, 1.0, 1.0] + [1.0 / length] * 3)
+    shape = [1] * twists.ndim
+    shape[axis] = 6
+    return twists * units.reshape(shape)
+
+
+def at_points(twists: Array, point: Array) -> Array:
+    """Twists given at the base origin [n x ... x 6], at points [n x 3]."""
+    turning, moving = twists[..., :3], twists[..., 3:]
+    at = point.reshape(len(point), *([1] * (twists.ndim - 2)), 3)
+    return np.concatenate([turning, moving + cross(turning, np.broadcast_to(at, moving.shape))], axis=-1)
+
+
+def independent_columns(screws: Array) -> tuple[int, ...]:
+    """Choose the screws of a leg that do not follow from those before them.
+
+    Args:
+        screws: at random places, where nothing is dependent but by form [n x 6 x k].
+    """
+    basis, chosen = np.zeros((*screws.shape[:2], 0)), []
+    for place in range(screws.shape[2]):
+        column = screws[:, :, place, None]
+        rest = column
+        for _ in range(2):
+            rest = rest - basis @ (np.swapaxes(basis, 1, 2) @ rest)
+        left, size = (np.linalg.norm(part, axis=1, keepdims=True) for part in (rest, column))
+        if (left > SEEN_BY_LEG * size).any():
+            basis = np.concatenate([basis, rest / np.maximum(left, 1e-300)], axis=2)
+            chosen.append(place)
+    return tuple(chosen)
+
+
+@dataclass(frozen=True)
+class Screws:
+    """Screws of the free motions of a leg at n places.
+
+    Attributes:
+        screws: in units of the length [n x 6 x k]; results are NaN where they are not finite.
+        chosen: which of them are independent by form, r of them.
+    """
+
+    screws: Array
+    chosen: tuple[int, ...]
+
+    @cached_property
+    def wrenches(self) -> Array:
+        """An orthonormal basis of what the leg carries: what does no work on any of them [n x 6 x (6 - r)]."""
+        return self._wrenches_and_thin[0]
+
+    def steps(self, twists: Array) -> Array:
+        """The least steps that come nearest to twists [n x 6] in units of the length [n x coordinates].
+
+        A^T (A A^T + W W^T)^-1 is the pseudo-inverse of A if the columns of W are a basis of what A does not reach.
+        """
+        wrenches, thin = self._wrenches_and_thin
+        every, rest = np.swapaxes(self.screws, 1, 2), np.swapaxes(wrenches, 1, 2)
+        whole = self.screws @ every + wrenches @ rest
+        whole[thin | ~np.isfinite(whole).all(axis=(1, 2))] = np.eye(6)
+        result = (every @ np.linalg.solve(whole, twists[:, :, None]))[:, :, 0]
+        if thin.any():
+            backward = np.linalg.pinv(self.screws[thin], rcond=LEAST_SEEN_RATIO)
+            result[thin] = (backward @ twists[thin, :, None])[:, :, 0]
+        return np.asarray(result)
+
+    @cached_property
+    def _wrenches_and_thin(self) -> tuple[Array, Mask]:
+        """The wrenches, and where the independent screws are nearly dependent."""
+        rank, finite = len(self.chosen), np.isfinite(self.screws).all(axis=(1, 2))
+        orthogonal, triangle = np.linalg.qr(self.screws[:, :, list(self.chosen)], mode="complete")
+        wrenches = np.array(orthogonal[:, :, rank:])
+        pivots = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        thin = finite & ~(pivots.min(axis=1, initial=np.inf) > NEARLY_DEPENDENT * pivots.max(axis=1, initial=0.0))
+        if thin.any():
+            wrenches[thin] = np.linalg.svd(self.screws[thin])[0][:, :, rank:]
+        wrenches[~finite] = np.nan
+        return wrenches, np.asarray(thin)
+
+
+def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapping[int, Array] | None = None) -> Array:
     """Coordinates with which a leg takes the platform to a displacement, or near it [n x coordinates], rad or m.
 
     All of its coordinates move, actuators too, by least-norm steps along a screw motion from the home place.
     """
     whole, chain, given = logarithm(target), row.chain, errors or {}
     units = np.where(row.slides, length, 1.0)
-    chosen = independent(scaled(chain.rates(chain.place(places_of(row, length))), length, axis=1))
-    far = float(np.abs(scaled(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
-    stages = min(max(int(np.ceil(far / STAGE)), 1), STAGES)
+    chosen = independent_columns(in_lengths(chain.rates(chain.place(random_coordinates(row, length))), length, axis=1))
+    far = float(np.abs(in_lengths(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
+    stages = min(max(int(np.ceil(far / LONGEST_STAGE)), 1), MOST_STAGES)
     coordinates = np.zeros((len(whole), row.size))
     for stage in range(1, stages + 1):
         goal, last = exponential(whole * (stage / stages)), stage == stages
 
         def equations(joints: Array, poses: Integers, goal: Motions = goal) -> tuple[Array, Steps]:
             at = chain.place(joints, errors=errors_at(given, poses))
-            gap = scaled(closing_gap(goal.at(poses), at.end), length)
-            rates = scaled(chain.rates(at), length, axis=1) * units
+            gap = in_lengths(closing_gap(goal.at(poses), at.end), length)
+            rates = in_lengths(chain.rates(at), length, axis=1) * units
             return largest(gap), lambda going: Screws(rates, chosen).steps(gap)[going]
 
         coordinates = newton(
@@ -63,8 +148,8 @@ def followed(row: Row, target: Motions, length: float, errors: Mapping[int, Arra
             coordinates,
             len(whole),
             move=lambda joints, step: joints + step * units,
-            most_steps=MOST_STEPS if last else 3,
-            settled=SETTLED if last else NEAR,
+            most_steps=MOST_CLOSING_STEPS if last else 3,
+            settled=CLOSED_STEP if last else NEARLY_CLOSED_STEP,
         ).value
     return coordinates
 
@@ -105,7 +190,7 @@ class Holding:
         return np.swapaxes(np.concatenate([basis[..., :3] + cross(tool[:, None], forces), forces], axis=2), 1, 2)
 
 
-def free_screws(row: Row, rows: Rows, at: PlacedChain, tool: Array) -> Array:
+def free_screws(row: LegRow, rows: HomeRows, at: PlacedChain, tool: Array) -> Array:
     """The screws of what moves freely in a leg, at points, in units of the length [n x 6 x freedoms].
 
     Args:
@@ -119,21 +204,23 @@ def free_screws(row: Row, rows: Rows, at: PlacedChain, tool: Array) -> Array:
     )
     absent = np.broadcast_to(rows.absent.T, (len(free), 6, len(rows.absent)))
     screws = np.concatenate([free, absent], axis=2)
-    return scaled(moved_to(np.swapaxes(screws, 1, 2), tool), rows.length).swapaxes(1, 2)
+    return in_lengths(at_points(np.swapaxes(screws, 1, 2), tool), rows.length).swapaxes(1, 2)
 
 
-def _units(row: Row, length: float) -> Array:
+def _units(row: LegRow, length: float) -> Array:
     """The units of its free coordinates, 1 rad or the machine's length, m."""
     return np.array([length if row.slides[place] else 1.0 for place in row.free])
 
 
-def freed(rows: Rows, places: Sequence[PlacedChain], tool: Array, chosen: Sequence[tuple[int, ...]]) -> list[Screws]:
+def screws_of_legs(
+    rows: HomeRows, places: Sequence[PlacedChain], tool: Array, chosen: Sequence[tuple[int, ...]]
+) -> list[Screws]:
     """Free screws of each leg at its place, at tool points [n x 3]; `chosen` as of `Screws`."""
     every = zip(rows.legs, places, chosen, strict=True)
     return [Screws(free_screws(row, rows, at, tool), which) for row, at, which in every]
 
 
-def holding(rows: Rows, free: Sequence[Screws], tool: Array, soft: Sequence[Array]) -> Holding:
+def holding(rows: HomeRows, free: Sequence[Screws], tool: Array, soft: Sequence[Array]) -> Holding:
     """Find what the legs carry and how they share a misfit, theory (46) and (47).
 
     Args:
@@ -150,12 +237,12 @@ def holding(rows: Rows, free: Sequence[Screws], tool: Array, soft: Sequence[Arra
     return Holding(tuple(wrenches), tuple(np.split(sharing, ends, axis=2)[:-1]))
 
 
-def _guide(rows: Rows, tool: Array) -> Array:
+def _guide(rows: HomeRows, tool: Array) -> Array:
     """Wrenches against the twists that a planar machine does not have [n x 6 x 3]; none of a spatial one."""
     absent = np.broadcast_to(rows.absent, (len(tool), *rows.absent.shape))
     if not len(rows.absent):
         return np.zeros((len(tool), 6, 0))
-    return np.swapaxes(scaled(moved_to(absent, tool), rows.length), 1, 2)
+    return np.swapaxes(in_lengths(at_points(absent, tool), rows.length), 1, 2)
 
 
 def _by_energy(every: Array, wrenches: Sequence[Array], soft: Sequence[Array]) -> Array:
@@ -170,15 +257,15 @@ def _by_energy(every: Array, wrenches: Sequence[Array], soft: Sequence[Array]) -
     mean = np.trace(weights, axis1=1, axis2=2) / max(start, 1)
     mean = np.where(np.isfinite(mean) & (mean > 0.0), mean, 1.0)
     weights = weights / mean[:, None, None] + SOFTEST_SHARE * np.eye(size)
-    resisted = np.swapaxes(_solved(weights, np.swapaxes(every, 1, 2)), 1, 2)
-    return _solved(resisted @ np.swapaxes(every, 1, 2), resisted)
+    resisted = np.swapaxes(_solution(weights, np.swapaxes(every, 1, 2)), 1, 2)
+    return _solution(resisted @ np.swapaxes(every, 1, 2), resisted)
 
 
 def _inverse(matrices: Array) -> Array:
-    return _solved(matrices, np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape))
+    return _solution(matrices, np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape))
 
 
-def _solved(matrices: Array, right: Array) -> Array:
+def _solution(matrices: Array, right: Array) -> Array:
     """Solutions of linear equations; NaN where these are singular or not finite."""
     result = np.full(np.broadcast_shapes(matrices.shape[:1], right.shape[:1]) + right.shape[1:], np.nan)
     sound: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
@@ -212,8 +299,8 @@ class ClosedLegs:
         return ClosedLegs(self.platform.with_part(poses, part.platform), coordinates, self.settled)
 
 
-def closed(
-    rows: Rows,
+def closed_legs(
+    rows: HomeRows,
     start: ClosedLegs,
     errors: Errors,
     tool_home: Array,
@@ -227,7 +314,7 @@ def closed(
         start: joint coordinates, with the actuators where they stand, and the platform nearby.
         errors: the errors of each leg.
         tool_home: the tool point at the home place, m [3].
-        chosen: see `freed`.
+        chosen: see `screws_of_legs`.
         soft: see `holding`.
     """
     length, legs = rows.length, rows.legs
@@ -236,9 +323,9 @@ def closed(
         given = [errors_at(error, poses) for error in errors]
         places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, there.coordinates, given, strict=True)]
         tool = _tool_at(there.platform, tool_home)
-        free = freed(rows, places, tool, chosen)
+        free = screws_of_legs(rows, places, tool, chosen)
         hold = holding(rows, free, tool, [compliance[poses] for compliance in soft])
-        gaps = [-scaled(moved_to(closing_gap(there.platform, at.end), tool), length) for at in places]
+        gaps = [-in_lengths(at_points(closing_gap(there.platform, at.end), tool), length) for at in places]
         twist = sum((hold.twist(i, gap[:, None])[:, 0] for i, gap in enumerate(gaps)), np.zeros((len(poses), 6)))
         every = zip(legs, free, gaps, strict=True)
         joints = [screws.steps(twist - gap)[:, : len(row.free)] for row, screws, gap in every]
@@ -248,14 +335,14 @@ def closed(
     def move(there: ClosedLegs, step: Array) -> ClosedLegs:
         twist, *joints = np.split(step, np.cumsum([6, *(len(row.free) for row in legs[:-1])]), axis=1)
         back = np.concatenate([twist[:, :3], twist[:, 3:] * length], axis=1)
-        platform = exponential(moved_to(back, -_tool_at(there.platform, tool_home))) @ there.platform
+        platform = exponential(at_points(back, -_tool_at(there.platform, tool_home))) @ there.platform
         coordinates = [q.copy() for q in there.coordinates]
         for row, values, change in zip(legs, coordinates, joints, strict=True):
             values[:, list(row.free)] += change * _units(row, length)
         return ClosedLegs(platform, tuple(coordinates), there.settled)
 
     count = len(start.settled)
-    end = newton(equations, start, count, move=move, most_steps=MOST_STEPS, settled=SETTLED)
+    end = newton(equations, start, count, move=move, most_steps=MOST_CLOSING_STEPS, settled=CLOSED_STEP)
     return replace(end.value, settled=end.converged)
 
 

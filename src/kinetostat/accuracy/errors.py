@@ -18,9 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.accuracy.closing import free_screws
-from kinetostat.accuracy.rows import Row, Rows, Unit, places_of, rows_of
-from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
+from kinetostat.accuracy.closing import Screws, at_points, free_screws, in_lengths, independent_columns
+from kinetostat.accuracy.rows import HomeRows, LegRow, Unit, home_rows, random_coordinates
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint
@@ -81,7 +80,7 @@ Source = tuple[MachineError, tuple[Insertion, ...]]
 """An error and what it puts into the legs."""
 
 
-def errors_of(rows: Rows) -> list[Source]:
+def leg_error_sources(rows: HomeRows) -> list[Source]:
     """List the errors of all legs that their own motions can tell apart, leg by leg.
 
     Args:
@@ -95,38 +94,38 @@ def errors_of(rows: Rows) -> list[Source]:
     return sources
 
 
-def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array) -> Array:
+def effects(row: LegRow, rows: HomeRows, sources: Sequence[Source], coordinates: Array) -> Array:
     """The work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
     at = row.chain.place(coordinates)
     tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
     screws = free_screws(row, rows, at, tool)
-    wrenches = Screws(screws, independent(screws)).wrenches
+    wrenches = Screws(screws, independent_columns(screws)).wrenches
     columns = []
     for _, insertions in sources:
         ends = sum(
             at.before[i.behind].twist(np.broadcast_to(i.twist, (len(tool), 6))) * i.amount(coordinates)[:, None]
             for i in insertions
         )
-        moved = scaled(moved_to(np.asarray(ends), tool), rows.length)
+        moved = in_lengths(at_points(np.asarray(ends), tool), rows.length)
         columns.append(np.einsum("nim,ni->nm", wrenches, moved).ravel())
     return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
-def _effective(row: Row, rows: Rows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
+def _effective(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
     """Those that move the platform somewhere, and their `effects`."""
-    columns = effects(row, rows, sources, places_of(row, rows.length))
+    columns = effects(row, rows, sources, random_coordinates(row, rows.length))
     moving = np.flatnonzero(np.linalg.norm(columns, axis=0) > SEEN_BY_LEG / rows.length)
     return [sources[int(number)] for number in moving], columns[:, moving]
 
 
-def _distinct(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
+def _distinct(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> list[Source]:
     """Those whose effects do not follow from the effects of those before them, in the order of the leg."""
     moving, columns = _effective(row, rows, sources)
-    distinct = [moving[number] for number in independent(columns[None])]
+    distinct = [moving[number] for number in independent_columns(columns[None])]
     return sorted(distinct, key=lambda source: source[1][0].behind)
 
 
-def _candidates(number: int, row: Row, rows: Rows) -> Iterator[tuple[int, Source]]:
+def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int, Source]]:
     """Every error that may count, each with its rank in the order of listing."""
     before: Vector | None = None
     for place, unit in enumerate(row.units):
@@ -158,7 +157,7 @@ def _candidates(number: int, row: Row, rows: Rows) -> Iterator[tuple[int, Source
         yield TILTS, named.tilt(f"platform.r{name}", axis, before or Vector(*rows.point.tolist()), end)
 
 
-def _clearances(number: int, row: Row) -> Iterator[Source]:
+def _clearances(number: int, row: LegRow) -> Iterator[Source]:
     """Free motions in the passive joints of a leg, along each direction in which they hold."""
     for unit in row.units:
         if unit.drive or unit.bars:
@@ -261,7 +260,7 @@ class _Named:
         twist = _turn(bars.normal, bars.far) / float(bars.width)
         yield self._source("difference", "length", words, twist, behind, spread)
 
-    def drive(self, row: Row) -> Iterator[tuple[int, Source]]:
+    def drive(self, row: LegRow) -> Iterator[tuple[int, Source]]:
         """Zero and gain of an actuator."""
         drive = self.unit.drive
         if drive is None:
@@ -296,7 +295,7 @@ class _Named:
         return error, (Insertion(self.number, self.unit.first if behind is None else behind, twist, factor),)
 
 
-def shared_errors(machine: Machine, rows: Rows) -> list[Source]:
+def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
     """List the lengths and angles of the table [geometry] of a family; none of a machine written leg by leg.
 
     Args:
@@ -312,14 +311,14 @@ def shared_errors(machine: Machine, rows: Rows) -> list[Source]:
         if kind not in ("length", "angle"):
             continue
         step = SHARED_STEP * (rows.length if kind == "length" else 1.0)
-        more, less = (rows_of(with_values(machine, {path: float(given[path]) + s * step})) for s in (1.0, -1.0))
+        more, less = (home_rows(with_values(machine, {path: float(given[path]) + s * step})) for s in (1.0, -1.0))
         insertions = tuple(_shared_insertions(rows, more, less, 2.0 * step))
         if insertions and all(np.isfinite(insertion.twist).all() for insertion in insertions):
             sources.append((MachineError(path, kind, "shared", field.quantity.meaning, ""), insertions))
     return sources
 
 
-def _shared_insertions(rows: Rows, more: Rows, less: Rows, step: float) -> Iterator[Insertion]:
+def _shared_insertions(rows: HomeRows, more: HomeRows, less: HomeRows, step: float) -> Iterator[Insertion]:
     """Change of the legs per unit of a number, from the machine with more and less of it."""
     home = Motions(more.rotation[None], more.point[None]) @ Motions(less.rotation[None], less.point[None]).inverse()
     platform = logarithm(home)[0] / step

@@ -13,10 +13,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.closing import ClosedLegs, Errors, closed, followed, free_screws, freed, holding
-from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_of, shared_errors
-from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
-from kinetostat.accuracy.screws import independent, scaled
+from kinetostat.accuracy.closing import (
+    ClosedLegs,
+    Errors,
+    closed_legs,
+    coordinates_toward,
+    free_screws,
+    holding,
+    in_lengths,
+    independent_columns,
+    screws_of_legs,
+)
+from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_error_sources, shared_error_sources
+from kinetostat.accuracy.rows import HomeRows, LegRow, home_rows, random_coordinates
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import stand
@@ -109,7 +118,7 @@ class ErrorModel:
     drawn: DrawnMachine
     errors: tuple[MachineError, ...]
     sources: tuple[Source, ...]
-    rows: Rows
+    rows: HomeRows
     tool_home: Array
     independent: tuple[tuple[int, ...], ...]
     _last_state: dict[bytes, ClosedLegs] = field(default_factory=dict)
@@ -158,7 +167,9 @@ class ErrorModel:
         if key not in self._last_state:
             drawn, errors = self.drawn, self.leg_errors(values)
             with np.errstate(all="ignore"):
-                state = closed(self.rows, drawn.state, errors, self.tool_home, self.independent, drawn.leg_compliances)
+                state = closed_legs(
+                    self.rows, drawn.state, errors, self.tool_home, self.independent, drawn.leg_compliances
+                )
             self._last_state.clear()
             self._last_state[key] = state
         return self._last_state[key]
@@ -226,7 +237,7 @@ class ErrorModel:
                 by_place.setdefault((i.leg, i.behind), []).append((number, i))
         with np.errstate(all="ignore"):
             places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
-            free = freed(self.rows, places, tool, self.independent)
+            free = screws_of_legs(self.rows, places, tool, self.independent)
             hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
             for (leg, behind), entries in by_place.items():
@@ -292,12 +303,12 @@ def error_model(
     with np.errstate(all="ignore"):  # poses without a place
         response, stands = respond(posed, joints), stand(posed, joints)
     status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
-    rows = rows_of(machine)
+    rows = home_rows(machine)
     if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):
         raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
     platform, axes = _displacement(rows, response, count)
     with np.errstate(all="ignore"):
-        coordinates = tuple(followed(row, platform, rows.length) for row in rows.legs)
+        coordinates = tuple(coordinates_toward(row, platform, rows.length) for row in rows.legs)
     actuators = stacked([a.coordinate for a in stands], count)
     _mark_other_placements(rows, coordinates, actuators, status)
     springs, compliance_errors = _flexible_springs(response, count)
@@ -310,13 +321,13 @@ def error_model(
     wrench = np.asarray(wrench, dtype=float)
     leg_compliances = _leg_compliances(response, rows, count)
     drawn = DrawnMachine(status, state, tool, axes, actuators, wrench, springs, leg_compliances)
-    sources = (*errors_of(rows), *shared_errors(machine, rows))
+    sources = (*leg_error_sources(rows), *shared_error_sources(machine, rows))
     errors = (*(error for error, _ in sources), *compliance_errors)
     independent_screws = tuple(_independent_screws(row, rows) for row in rows.legs)
     return ErrorModel(machine, drawn, errors, sources, rows, tool_home, independent_screws)
 
 
-def _displacement(rows: Rows, response: Response, count: int) -> tuple[Motions, Array]:
+def _displacement(rows: HomeRows, response: Response, count: int) -> tuple[Motions, Array]:
     """Displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
     axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
@@ -326,7 +337,7 @@ def _displacement(rows: Rows, response: Response, count: int) -> tuple[Motions, 
     return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), columns
 
 
-def _mark_other_placements(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
+def _mark_other_placements(rows: HomeRows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
     """Mark poses at which a leg that is followed from the home place has its actuator elsewhere than the machine."""
     for row, joints in zip(rows.legs, coordinates, strict=True):
         for drive in (unit.drive for unit in row.units if unit.drive):
@@ -336,20 +347,20 @@ def _mark_other_placements(rows: Rows, coordinates: Sequence[Array], actuators: 
             status[elsewhere] = int(Status.NOT_CONVERGED)
 
 
-def _independent_screws(row: Row, rows: Rows) -> tuple[int, ...]:
+def _independent_screws(row: LegRow, rows: HomeRows) -> tuple[int, ...]:
     """Choose the free screws of a leg that are independent wherever it is; it carries six wrenches less these."""
-    coordinates = places_of(row, rows.length)
-    return independent(free_screws(row, rows, row.chain.place(coordinates), np.zeros((len(coordinates), 3))))
+    coordinates = random_coordinates(row, rows.length)
+    return independent_columns(free_screws(row, rows, row.chain.place(coordinates), np.zeros((len(coordinates), 3))))
 
 
-def _leg_compliances(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:
+def _leg_compliances(response: Response, rows: HomeRows, count: int) -> tuple[Array, ...]:
     """The compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
     result = []
     for leg in response.legs:
         soft = np.zeros((count, 6, 6))
         for twist, compliance in zip(leg.elastic, leg.compliance, strict=True):
             size = stacked([compliance], count)
-            screw = scaled(stacked(twist.components(), count), rows.length)
+            screw = in_lengths(stacked(twist.components(), count), rows.length)
             soft += np.where(np.isfinite(size), size, 0.0)[:, :, None] * screw[:, :, None] * screw[:, None]
         result.append(soft)
     return tuple(result)

@@ -73,7 +73,7 @@ class Unit:
 
 
 @dataclass
-class Row:
+class LegRow:
     """A leg at its home place as a row of screw motions.
 
     Attributes:
@@ -139,7 +139,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Rows:
+class HomeRows:
     """A machine at its home place.
 
     Attributes:
@@ -150,7 +150,7 @@ class Rows:
         absent: twists that a planar machine does not have, at the base origin [k x 6].
     """
 
-    legs: tuple[Row, ...]
+    legs: tuple[LegRow, ...]
     configuration: Configuration
     rotation: Array
     point: Array
@@ -158,7 +158,7 @@ class Rows:
     absent: Array
 
 
-def places_of(row: Row, length: float) -> Array:
+def random_coordinates(row: LegRow, length: float) -> Array:
     """Random coordinates of a leg around its home place [samples x coordinates], the same ones each time.
 
     Args:
@@ -169,7 +169,7 @@ def places_of(row: Row, length: float) -> Array:
     return np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, row.size)) * units
 
 
-def rows_of(machine: Machine) -> Rows:
+def home_rows(machine: Machine) -> HomeRows:
     """Read a machine at its home place.
 
     Args:
@@ -185,22 +185,28 @@ def rows_of(machine: Machine) -> Rows:
         driven = joint_actuators(chains, [leg.name for leg in configuration.legs])
         drives = [(n, a.leg, a.offset, a.sign, a.slides) for n, a in enumerate(driven)]
     legs = tuple(_row(leg, iter([d for d in drives if d[1] == leg.name])) for leg in configuration.legs)
-    return Rows(legs, configuration, *_placement(configuration), float(configuration.length), _absent(configuration))
+    return HomeRows(
+        legs,
+        configuration,
+        *_platform_placement(configuration),
+        float(configuration.length),
+        _absent_twists(configuration),
+    )
 
 
-def _placement(configuration: Configuration) -> tuple[Array, Array]:
+def _platform_placement(configuration: Configuration) -> tuple[Array, Array]:
     turn = configuration.platform.rotation
     columns = np.array([axis.components() for axis in (turn.x, turn.y, turn.z)], dtype=float)
     return columns.T, np.array(configuration.platform.translation.components(), dtype=float)
 
 
-def _absent(configuration: Configuration) -> Array:
+def _absent_twists(configuration: Configuration) -> Array:
     joints = () if configuration.plane is None else configuration.plane.absent
     return np.array([joint.twist(ZERO).components() for joint in joints], dtype=float).reshape(-1, 6)
 
 
-def _row(leg: Leg, drives: Iterator[tuple[int, str, float, float, bool]]) -> Row:
-    row, names, elements = Row(leg.name), _Names(leg.name), list(leg.chain)
+def _row(leg: Leg, drives: Iterator[tuple[int, str, float, float, bool]]) -> LegRow:
+    row, names, elements = LegRow(leg.name), _Names(leg.name), list(leg.chain)
     place = 0
     while place < len(elements):
         element, before = elements[place], len(row.twists)
@@ -213,7 +219,7 @@ def _row(leg: Leg, drives: Iterator[tuple[int, str, float, float, bool]]) -> Row
             row.add(CENTRES.get(together, _kind(element)), names.of(element.name), joints)
             place += together - 1
             row.carried += range(before + 1, before + together)
-        elif isinstance(element, Spring) and _moves(element, elements[:place]):
+        elif isinstance(element, Spring) and _is_motion(element, elements[:place]):
             drive, given = None, next(drives) if element.actuated else None
             if given is not None and not is_zero(element.stiffness):
                 number, _, home, sense, slides = given
@@ -223,7 +229,7 @@ def _row(leg: Leg, drives: Iterator[tuple[int, str, float, float, bool]]) -> Row
     return row
 
 
-def _moves(spring: Spring, before: Sequence[Element]) -> bool:
+def _is_motion(spring: Spring, before: Sequence[Element]) -> bool:
     """Whether a spring is a motion: an actuator, a hinge or a free one, and the first of a row of springs."""
     if not (spring.actuated or spring.hinge or is_zero(spring.stiffness)):
         return False

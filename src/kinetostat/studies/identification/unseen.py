@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from kinetostat.accuracy.errors import Insertion, MachineError, effects
-from kinetostat.accuracy.rows import places_of
+from kinetostat.accuracy.rows import random_coordinates
 from kinetostat.arrays import Array
 from kinetostat.numerics.motions import cross
 from kinetostat.studies.identification.fit import Fit
@@ -164,7 +164,7 @@ def _of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Arra
     """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
     rows, sources = observed.model.rows, observed.model.sources
     row, result = rows.legs[leg], np.zeros(len(observed.chosen))
-    places = places_of(row, rows.length)
+    places = random_coordinates(row, rows.length)
     motion = (NO_ERROR, (Insertion(leg, len(row.twists) if at_end else 0, twist),))
     goal = effects(row, rows, [motion], places)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
