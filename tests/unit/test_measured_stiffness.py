@@ -11,7 +11,7 @@ from kinetostat.cli import main
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.measured.comparison import validate_measured
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.measured import MEASURED
+from kinetostat.views.measured import MEASURED_STIFFNESS
 from machines import load_without_limits
 
 SOFT = "tolerances.compliances=sigma 10 %"
@@ -157,7 +157,7 @@ def test_a_model_that_is_too_stiff_is_told_by_how_much(tmp_path, capsys):
     record = json.loads((folder / "measured.json").read_text())
     assert record["entries"][0]["model_error_between"] == pytest.approx([5.64e6, 9.64e6], rel=1e-3)
     answer = validate_measured(load("hexapod"), path)
-    assert json_of(MEASURED, answer)["agrees"] is False
+    assert json_of(MEASURED_STIFFNESS, answer)["agrees"] is False
     assert len(plot(answer).axes) == 2
 
 

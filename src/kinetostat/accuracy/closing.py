@@ -276,7 +276,7 @@ def _solution(matrices: Array, right: Array) -> Array:
 
 @dataclass(frozen=True)
 class ClosedLegs:
-    """Where the legs of a machine with errors close on its platform, at n poses.
+    """Places of the legs of a machine with errors that close on its platform, at n poses.
 
     Attributes:
         platform: displacement of the platform from its home place.

@@ -30,7 +30,7 @@ CENTRES = {2: "universal", 3: "ball"}
 
 
 @dataclass(frozen=True)
-class Drive:
+class ActuatorReading:
     """Coordinate of an actuator as a function of the joint's.
 
     Attributes:
@@ -68,7 +68,7 @@ class Unit:
     last: int
     point: Vector | None
     axes: tuple[Vector, ...]
-    drive: Drive | None = None
+    drive: ActuatorReading | None = None
     bars: Parallelogram | None = None
 
 
@@ -113,7 +113,7 @@ class LegRow:
         twists = np.array(self.twists, dtype=float).reshape(1, -1, 6)
         return Chain(twists, tuple(self.coordinate), (-1,) * len(self.twists), self.size)
 
-    def add(self, kind: str, name: str, joints: Sequence[Joint], drive: Drive | None = None) -> None:
+    def add(self, kind: str, name: str, joints: Sequence[Joint], drive: ActuatorReading | None = None) -> None:
         """Add a joint of one motion, or of several about one point, from its freedoms."""
         first = len(self.twists)
         for joint in joints:
@@ -223,7 +223,7 @@ def _row(leg: Leg, drives: Iterator[tuple[int, str, float, float, bool]]) -> Leg
             drive, given = None, next(drives) if element.actuated else None
             if given is not None and not is_zero(element.stiffness):
                 number, _, home, sense, slides = given
-                drive = Drive(number, row.size, home, sense, slides)
+                drive = ActuatorReading(number, row.size, home, sense, slides)
             row.add(_kind(element.joint), names.of(element.joint.name or element.of), [element.joint], drive)
         place += 1
     return row

@@ -34,7 +34,7 @@ from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
-POSES_AT_ONCE = Way.ANY_MACHINE.slab
+COMMANDED_AT_ONCE = Way.ANY_MACHINE.slab
 """Poses that are solved together."""
 
 
@@ -101,8 +101,8 @@ def actuator_targets(
         InputError: as for `MachineState.mechanism`; or no pose is reached, or the machine has no actuator.
     """
     slabs = []
-    for start in range(0, count, POSES_AT_ONCE):
-        rows = slice(start, min(start + POSES_AT_ONCE, count))
+    for start in range(0, count, COMMANDED_AT_ONCE):
+        rows = slice(start, min(start + COMMANDED_AT_ONCE, count))
         with np.errstate(all="ignore"):  # poses without a place
             slabs.append(
                 _targets_of_slab(machine, {path: column[rows] for path, column in columns.items()}, rows.stop - start)
@@ -114,7 +114,7 @@ def actuator_targets(
             f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or "
             "no actuator could be commanded; change the pose."
         )
-    sizes = [min(POSES_AT_ONCE, count - start) for start in range(0, count, POSES_AT_ONCE)]
+    sizes = [min(COMMANDED_AT_ONCE, count - start) for start in range(0, count, COMMANDED_AT_ONCE)]
     return _concatenation([slab or _empty_targets(names, size) for slab, size in zip(slabs, sizes, strict=True)])
 
 

@@ -139,7 +139,7 @@ KINDS = (
         "views.comparison_figure.comparison_figures",
         "studies.comparison.as_json",
     ),
-    Kind("studies.measured.comparison.MeasuredComparison", description="views.measured.MEASURED"),
+    Kind("studies.measured.comparison.MeasuredComparison", description="views.measured.MEASURED_STIFFNESS"),
     Kind(
         "studies.optimisation.result.Result",
         "views.optimisation_tables.print_result",

@@ -18,12 +18,13 @@ from kinetostat.studies.budget.budget import (
     ALLOCATION_RULES,
     DRAWN_DIGITS,
     ROUND_OFF_SHARE,
+    STATISTICS,
     Budget,
     PossibleErrors,
     budget,
     possible_errors,
 )
-from kinetostat.studies.budget.data import STATISTICS, budget_dataset, contributions_csv, poses_csv, varied_fields
+from kinetostat.studies.budget.data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.studies.budget.tolerances import is_about
 from kinetostat.units import KINDS
 from kinetostat.views.fitted_table import FittedTable
@@ -336,7 +337,7 @@ def _ask(
     return budget(machine, poses, ranges, None, progress=progress, **options)
 
 
-QUESTION = Question(
+BUDGET_QUESTION = Question(
     example='kinetostat budget hexapod --tolerance "joints=0.05 mm" --tolerance "zeros=0.02 mm" -o out',
     answer=_ask,
     options=(

@@ -17,9 +17,9 @@ from kinetostat.views.question import Drawing
 
 MOST_BARS = 15
 """Single tolerances that have bars."""
-NAMES = 4.0
+LEAST_LABEL_WIDTH = 4.0
 """Inches for what bars are about, at least."""
-BAR = 0.8
+BAR_HEIGHT = 0.8
 """Height of all bars of a row together."""
 
 
@@ -62,7 +62,7 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
     }
     heights = [len(bars) + 0.6 for bars in panels.values()]
     with mpl.rc_context(STYLE):
-        beside = max(NAMES, width_of(label for bars in panels.values() for label in bars))
+        beside = max(LEAST_LABEL_WIDTH, width_of(label for bars in panels.values() for label in bars))
         figure = Figure(figsize=(beside + 2.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
         for panel, (name, bars) in zip(axes, panels.items(), strict=True):
@@ -83,7 +83,7 @@ def _sums(budget: Budget, key: str, names: list[str]) -> dict[str, list[float]]:
 
 
 def _bars(panel: Axes, title: str, bars: dict[str, list[float]], names: list[str]) -> None:
-    places, height = np.arange(len(bars)), BAR / len(names)
+    places, height = np.arange(len(bars)), BAR_HEIGHT / len(names)
     for number, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
         widths = [100.0 * shares[number] for shares in bars.values()]
         panel.barh(places + (number - 0.5 * (len(names) - 1)) * height, widths, 0.92 * height, color=colour, label=name)

@@ -1,4 +1,4 @@
-"""Where the actuators of a loaded machine must stand: the question, and the descriptions of both of its answers.
+"""Commands of the actuators of a loaded machine: the question, and the descriptions of both of its answers.
 
 At poses the answer is a command, over a grid a table of corrections with its law. Nothing is computed here.
 """
@@ -221,7 +221,7 @@ def _ask(
     return correction_table(machine, ranges, tolerance, progress)
 
 
-QUESTION = Question(
+COMMAND_QUESTION = Question(
     example='kinetostat command hexapod --set \'load.gravity=[0, 0, "-9.81 m/s**2"]\' --set tool.mass="20 kg" '
     '--over "gravity_angle=0 deg:90 deg:7" -o corrections.csv',
     answer=_ask,

@@ -258,7 +258,7 @@ def _sizes(texts: Sequence[str], option: str) -> Mapping[str, str]:
     return sizes
 
 
-QUESTION = Question(
+IDENTIFY_QUESTION = Question(
     example="kinetostat identify hexapod measured.csv --fit geometry --fit zeros --frame -o identified",
     answer=_ask,
     options=(

@@ -16,11 +16,11 @@ FEW_NAMES = 60
 """Unknowns whose paths still fit beside a matrix."""
 NAME_SIZE = 6.0
 """Of the letters of these paths, in points."""
-NAMES = 1.4
+LEAST_PATH_WIDTH = 1.4
 """Inches for them, at least."""
 
 
-CAPTIONS = {
+FIT_CAPTIONS = {
     "residuals": "What is left of every measured value, as drawn and as identified.",
     "correlations": "Correlations of the numbers: which ones were found together.",
     "poses": "The tool points at which was measured, from above and from the front.",
@@ -30,7 +30,7 @@ CAPTIONS = {
 def identification_figures(answer: Identification) -> dict[str, Drawing]:
     """Drawings of an identification, by name."""
     draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
-    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in CAPTIONS.items()}
+    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in FIT_CAPTIONS.items()}
 
 
 def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
@@ -78,7 +78,7 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
     few = answer.unknowns if len(matrix) <= FEW_NAMES else ()
     names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in few]
-    beside = max(NAMES, width_of(names, NAME_SIZE))
+    beside = max(LEAST_PATH_WIDTH, width_of(names, NAME_SIZE))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(size + beside + 0.8, size + beside + 0.2), layout="constrained")
         panel = figure.subplots()

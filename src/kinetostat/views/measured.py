@@ -8,8 +8,8 @@ from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Description, Field, Lines, Records
 from kinetostat.views.tables import text_table
 
-WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
-EXACT = 1e-9
+SOURCE_WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
+EXACT_SHARE = 1e-9
 """Share of a number below which its uncertainty is round-off."""
 
 
@@ -38,7 +38,7 @@ def measured_table(answer: MeasuredComparison) -> FittedTable:
 def _with_sure(row: MeasuredRow, display: Display, value: float, sure: float) -> str:
     """A value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
     factor = _scale(row, display).factor
-    if sure <= EXACT * abs(value):
+    if sure <= EXACT_SHARE * abs(value):
         return number(value * factor)
     return " ± ".join(number_and_uncertainty(value * factor, sure * factor))
 
@@ -50,7 +50,7 @@ def _scale(row: MeasuredRow, display: Display) -> Scale:
 
 
 def verdict_of(row: MeasuredRow, display: Display) -> str:
-    """What a row says of the model, in words: theory (70); "explained" by the uncertainties, or how far it is off."""
+    """The verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off."""
     if row.explained:
         return "explained"
     low, high = row.bounds
@@ -68,7 +68,9 @@ def verdict_of(row: MeasuredRow, display: Display) -> str:
 def _lines(answer: MeasuredComparison) -> Lines:
     yield "Verdict", answer.message
     parts = sorted(answer.shares.items(), key=lambda part: -part[1])
-    text = ", ".join(f"{number(100.0 * share, digits=2)} % {WORDS[name]}" for name, share in parts if share > 5e-4)
+    text = ", ".join(
+        f"{number(100.0 * share, digits=2)} % {SOURCE_WORDS[name]}" for name, share in parts if share > 5e-4
+    )
     yield "Variance", f"The variance of the differences is made of: {text}."
     if answer.source:
         yield "Numbers", f"How sure the machine's numbers are is from {answer.source}."
@@ -105,7 +107,7 @@ ENTRY = (
     Field("model_error_between", "bounds"),
 )
 
-MEASURED = Description(
+MEASURED_STIFFNESS = Description(
     type="studies.measured.comparison.MeasuredComparison",
     title="Measured stiffness",
     fields=(

@@ -12,17 +12,17 @@ from matplotlib.figure import Figure
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
-from kinetostat.views.measured import WORDS
+from kinetostat.views.measured import SOURCE_WORDS
 from kinetostat.views.question import Drawing
 
-MOST_ROWS = 60
+MOST_BARS_OF_ENTRIES = 60
 """Measured numbers that have bars; of more, those with the largest differences."""
 
 
 def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and computed stiffness") -> Figure:
     """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
     size = np.array([row.error / row.u_val for row in answer.rows])
-    order = np.sort(np.argsort(-np.abs(size), kind="stable")[:MOST_ROWS])
+    order = np.sort(np.argsort(-np.abs(size), kind="stable")[:MOST_BARS_OF_ENTRIES])
     rows = [answer.rows[n] for n in order]
     places = np.arange(len(rows))
     with mpl.rc_context(STYLE):
@@ -41,7 +41,7 @@ def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and c
         start = np.zeros(len(rows))
         parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
         shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
-        for share, colour, words in zip(shares.T, COLOURS[2:], WORDS.values(), strict=False):
+        for share, colour, words in zip(shares.T, COLOURS[2:], SOURCE_WORDS.values(), strict=False):
             right.barh(places, share, 0.6, start, color=colour, label=words)
             start = start + share
         right.set(xlabel="share of the variance (%)", xlim=(0, 100))

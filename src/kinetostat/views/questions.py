@@ -17,15 +17,15 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
     "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
     "budget": (
         "compute the error of the tool that tolerances allow, and what it is made of",
-        "views.budget.QUESTION",
+        "views.budget.BUDGET_QUESTION",
     ),
     "command": (
         "compute where actuators must stand to bring a loaded tool to its pose",
-        "views.command.QUESTION",
+        "views.command.COMMAND_QUESTION",
     ),
     "identify": (
         "find the errors of a machine as built that explain what was measured of it",
-        "views.identification.QUESTION",
+        "views.identification.IDENTIFY_QUESTION",
     ),
 }
 """Word, which is the command and the Python function; phrase; and the place of the `Question` in kinetostat."""

@@ -47,15 +47,22 @@ from kinetostat.tolerances import NO_EFFECT
 
 SAMPLES, FEW_SAMPLES = 1 << 17, 1 << 12
 """Machines that are drawn if nobody says how many: at a single pose, and at each of many."""
-MOST_SAMPLES = 1 << 21
+MOST_DRAWN_MACHINES = 1 << 21
 MOST_EXACT = 1 << 17
-POSES_AT_ONCE = 128
+DRAWN_POSES_AT_ONCE = 128
 """Poses whose machines are drawn together."""
 MOST_AT_ONCE = 1 << 20
 """Products of poses and machines that are kept at once: each has a dozen numbers."""
-MOST_POSES = 200_000
+MOST_BUDGET_POSES = 200_000
 ALLOCATION_RULES = ("rss", "worst")
-STATISTICS = ("mean", "rms", "rss", "usual", "worst")
+STATISTICS = {
+    "mean": "of the average machine",
+    "rms": "root mean square",
+    "rss": "root sum square",
+    "usual": "95 %",
+    "worst": "worst case",
+}
+"""The statistics of a measure, and what people call them."""
 SHARE_KEYS = ("line", "leg", "group", "path")
 ROUND_OFF_SHARE = 1e-9
 """Share of an error below which a part of it is round-off."""
@@ -230,14 +237,14 @@ def budget(
     question = grid_question(machine, ranges, ["singularity_margin"]) if ranges else None
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = _points(question, columns)
-    if count > MOST_POSES:
-        raise InputError(f"there are {count:,} poses; at most {MOST_POSES:,} are computed: lower their number.")
+    if count > MOST_BUDGET_POSES:
+        raise InputError(f"there are {count:,} poses; at most {MOST_BUDGET_POSES:,} are computed: lower their number.")
     direction = np.array(unit_direction(along, "along")) if len(along) else None
     work = _Work(
         machine, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1
     )
     status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
-    step = max(1, min(POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
+    step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
     for start in range(0, count, step):
         rows = slice(start, min(start + step, count))
         status[rows] = work.add({path: column[rows] for path, column in leaves.items()}, rows.stop - start)
@@ -250,7 +257,7 @@ def _check(poses: Any, ranges: Sequence[str], samples: int, exact: int, by: str,
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
     if (poses is not None or ranges) and exact:
         raise InputError("exact machines are solved at the pose of the machine; leave the poses out, or exact.")
-    for name, value, most in (("samples", samples, MOST_SAMPLES), ("exact", exact, MOST_EXACT)):
+    for name, value, most in (("samples", samples, MOST_DRAWN_MACHINES), ("exact", exact, MOST_EXACT)):
         if not 0 <= value <= most:
             raise InputError(f"{name} is {shorten(value)}; give a whole number of machines from 1 to {most:,}.")
     if seed < 0:

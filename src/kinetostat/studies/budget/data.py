@@ -6,19 +6,10 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.budget.budget import Budget
+from kinetostat.studies.budget.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_STATUS, origin_of
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.units import KINDS
-
-STATISTICS = {
-    "mean": "of the average machine",
-    "rms": "root mean square",
-    "rss": "root sum square",
-    "usual": "95 %",
-    "worst": "worst case",
-}
-"""The statistics of a measure, and what people call them."""
 
 
 def varied_fields(answer: Budget) -> dict[str, tuple[Any, str]]:

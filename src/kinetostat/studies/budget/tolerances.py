@@ -47,7 +47,7 @@ WRITE = (
 )
 MACHINES_AT_ONCE = 1 << 14
 """Machines that are made at once: their numbers stay in the cache."""
-LEAST_PROBABILITY = 1e-16
+LEAST_NORMAL_PROBABILITY = 1e-16
 """Probability below which no normal number is drawn: eight standard deviations."""
 
 
@@ -250,7 +250,9 @@ class RandomInputs:
         values = 2.0 * np.ascontiguousarray(points.T) - 1.0
         bent = [part.normal and not part.free for part in self.parts]
         for place in np.flatnonzero(np.array(bent)[self.owner]):
-            values[place] = ndtri(np.clip(points[:, place], LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)) / SIGMAS
+            values[place] = (
+                ndtri(np.clip(points[:, place], LEAST_NORMAL_PROBABILITY, 1.0 - LEAST_NORMAL_PROBABILITY)) / SIGMAS
+            )
         for size in (2, 3):
             of_size = [places for places in self.blocks if len(places) == size]
             if of_size:

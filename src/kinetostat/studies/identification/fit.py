@@ -40,7 +40,7 @@ MOST_FIT_STEPS = 500
 """Steps of a fit at most: along a curved valley they are short."""
 
 
-class Question(Protocol):
+class ResidualEquations(Protocol):
     """Residuals in standard deviations and how they fall with the unknowns."""
 
     def residuals(self, values: Array) -> Array:
@@ -122,7 +122,7 @@ class Fit:
         return self.ways[:, self.rank :]
 
 
-def best_fit(question: Question, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
+def best_fit(question: ResidualEquations, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
     """Find the most likely values of unknowns, theory (64).
 
     Each fit is one of least squares by trust regions: a step is taken only where the residuals fall by about as much as
@@ -155,7 +155,7 @@ def best_fit(question: Question, groups: Integers, wishes: Wishes, tell: Tell = 
     return _fit_result(before, after, rates, kept, values, groups, wishes)
 
 
-def _rates_at(question: Question, values: Array, wishes: Wishes) -> tuple[Array, Array]:
+def _rates_at(question: ResidualEquations, values: Array, wishes: Wishes) -> tuple[Array, Array]:
     """The residuals [rows], and how they fall per plausible size of each unknown [rows x unknowns]."""
     after, rates = question.linearisation(values)
     return after, rates * wishes.sizes
@@ -222,7 +222,7 @@ def _combinations(rates: Array, wishes: Wishes, spread: float) -> _Combinations:
 
 
 def _least_squares(
-    question: Question, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float
+    question: ResidualEquations, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float
 ) -> Array:
     """Fit values by least squares from a start; `scale` is that of Cauchy's loss, infinite for squares."""
     from scipy.optimize import least_squares  # half a second to import

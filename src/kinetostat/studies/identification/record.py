@@ -18,7 +18,7 @@ from kinetostat.spec.errors import InputError
 RECORD = "fit.json"
 FIT_PICTURES = ("residuals", "correlations", "poses")
 PNG = b"\x89PNG\r\n\x1a\n"
-LARGEST_FILE = 1 << 28
+LARGEST_RECORD = 1 << 28
 """Bytes of a record or a picture."""
 FIT_ADVICE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
 
@@ -157,7 +157,7 @@ def read_fit(path: str | Path) -> FitRecord:
 
 def _bytes(path: Path) -> bytes:
     with path.open("rb") as stream:
-        return stream.read(LARGEST_FILE)
+        return stream.read(LARGEST_RECORD)
 
 
 def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:

@@ -32,7 +32,7 @@ ROUND_OFF_OF_MOTION = 1e-7
 """Share of a motion of the tool below which what is left of it is round-off."""
 SAME_SHARE = 1e-6
 """Relative difference below which two unknowns take part in combinations alike."""
-LEAST_NAMED_SHARE = 0.05
+LEAST_NAMED_PART = 0.05
 """Share of the largest part of a combination below which a part is not named."""
 WAYS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
 
@@ -196,7 +196,7 @@ def _place_motions(observed: Observation, sizes: Array, paths: tuple[str, ...]) 
 
 def _sentence(way: Array, observed: Observation) -> str:
     """Name the largest parts of a combination."""
-    order = [int(i) for i in np.argsort(-np.abs(way)) if abs(way[i]) > LEAST_NAMED_SHARE * np.abs(way).max()]
+    order = [int(i) for i in np.argsort(-np.abs(way)) if abs(way[i]) > LEAST_NAMED_PART * np.abs(way).max()]
     parts = [f"{way[i] / np.abs(way).max():+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
     more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
     if len(order) == 1:

@@ -107,31 +107,31 @@ def _entries(machine: Machine, columns: Sequence[GivenColumn], lines: Sequence[i
 
 
 def _entry(machine: Machine, name: str, value: str, sure: str, line: int) -> MeasuredEntry:
-    def refused(what: str) -> InputError:
+    def refusal(what: str) -> InputError:
         return InputError(f", line {line}: {what}")
 
-    known = _known(machine)
+    known = _entry_names(machine)
     if name not in known:
-        raise refused(
+        raise refusal(
             f"{shorten(name)} is not an entry of K or C of {machine.name}; write for example {known[-1]}, and choose "
             f"its components from {', '.join(machine.family.component_names)}."
         )
-    name = name if name in QUANTITIES else _turned(name)
+    name = name if name in QUANTITIES else _transposed_name(name)
     unit = QUANTITIES[name].unit
-    size = _number(value, KIND_OF[unit], lambda text: refused(f"the value of {name} is {text}"))
+    size = _number(value, KIND_OF[unit], lambda text: refusal(f"the value of {name} is {text}"))
     if not sure:
-        raise refused(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
+        raise refusal(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
     share = sure.endswith("%")
-    sigma = _number(sure, "ratio" if share else KIND_OF[unit], lambda text: refused(f"the sigma of {name} is {text}"))
+    sigma = _number(sure, "ratio" if share else KIND_OF[unit], lambda text: refusal(f"the sigma of {name} is {text}"))
     sigma = sigma * abs(size) if share else sigma
     if not sigma > 0.0:
-        raise refused(f"the sigma of {name} is {sure}; it must be more than 0.")
+        raise refusal(f"the sigma of {name} is {sure}; it must be more than 0.")
     if len(QUANTITIES[name].components) == 1 and not size > 0.0:
-        raise refused(f"the value of {name} is {value}; what stands on the diagonal of K and C is more than 0.")
+        raise refusal(f"the value of {name} is {value}; what stands on the diagonal of K and C is more than 0.")
     return MeasuredEntry(name, unit, size, sigma, line)
 
 
-def _known(machine: Machine) -> list[str]:
+def _entry_names(machine: Machine) -> list[str]:
     """The names of all entries, in either order of their components."""
     names, components = [], machine.family.component_names
     for matrix in MEASURED_MATRICES:
@@ -140,18 +140,18 @@ def _known(machine: Machine) -> list[str]:
     return names
 
 
-def _turned(name: str) -> str:
+def _transposed_name(name: str) -> str:
     matrix, first, second = name.rsplit("_", 2)
     return f"{matrix}_{second}_{first}"
 
 
-def _number(text: str, kind: str, refused: Callable[[str], InputError]) -> float:
+def _number(text: str, kind: str, refusal: Callable[[str], InputError]) -> float:
     try:
         value = parse(text, kind)
     except UnitError as error:
-        raise InputError(f"{refused(shorten(text))}: {error}.") from None
+        raise InputError(f"{refusal(shorten(text))}: {error}.") from None
     if not np.isfinite(value):
-        raise InputError(f"{refused(shorten(text))}; give a finite number.")
+        raise InputError(f"{refusal(shorten(text))}; give a finite number.")
     return value
 
 

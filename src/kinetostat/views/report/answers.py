@@ -21,7 +21,7 @@ from kinetostat.views.answers import described, kind_of
 from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
-from kinetostat.views.identification_figures import CAPTIONS
+from kinetostat.views.identification_figures import FIT_CAPTIONS
 from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
 from kinetostat.views.loaded_tables import displacement_table, spring_table, stability_of, strut_table, tangent_table
 from kinetostat.views.optimisation_figures import pictures
@@ -157,7 +157,9 @@ WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": 
 def _fit_section(machine: Machine, record: FitRecord) -> Section:
     """The machine as built, by the record of a fit and the pictures beside it."""
     pictures = (
-        Figure(caption, record.pictures[name], 0.85) for name, caption in CAPTIONS.items() if name in record.pictures
+        Figure(caption, record.pictures[name], 0.85)
+        for name, caption in FIT_CAPTIONS.items()
+        if name in record.pictures
     )
     return described_section(RECORDED_FIT, RecordedFit(machine, record), pictures)
 
