@@ -15,28 +15,20 @@ from kinetostat.commands.asking import add_question
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
-    NO_ANSWER,
     Help,
     Parser,
     add_command,
-    direction,
-    give,
     judged,
     load_machine,
     no_answer,
     print_json,
     said_when_slow,
     stopped,
-    takes_figures,
-    takes_json,
-    takes_loaded,
     takes_machine,
-    verdicts_of,
 )
 from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.loaded import analyze_loaded
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
@@ -177,27 +169,7 @@ def _parser() -> Parser:
         "a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a long grid or "
         "search, whose checksums are then compared",
     )
-    analyze = add_command(
-        commands, "analyze", _analyze, "compute stiffness, compliance, attribution and indices at a pose",
-        'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
-    )  # fmt: skip
-    takes_machine(analyze)
-    analyze.add_argument(
-        "--axes",
-        choices=["base", "platform"],
-        default="base",
-        help="axes of the results (default: base)",
-    )
-    analyze.add_argument(
-        "--along", metavar="X,Y,Z", action="append", default=[], type=direction,
-        help="also give the stiffness along (force) and about (moment) this direction; repeatable",
-    )  # fmt: skip
-    analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
-    takes_loaded(
-        analyze, "at rest under gravity, preload and [load], with exact geometry: displacement, springs, stiffness"
-    )
-    takes_figures(analyze, "figures of the loaded machine: its shape, and the curve while the load grows")
-    takes_json(analyze)
+    add_question(commands, "analyze")
     add_question(commands, "forward")
     add_question(commands, "identify")
     for word in ("command", "path"):
@@ -299,28 +271,3 @@ def _check_study(options: argparse.Namespace) -> int:
 
     print_study(terminal(), load_problem(options.machine, options.settings))
     return DONE
-
-
-def _analyze(options: argparse.Namespace) -> int:
-    from kinetostat.kinematics.status import Status
-    from kinetostat.studies.analysis import analyze, as_json
-    from kinetostat.views.analysis_tables import print_analysis
-
-    machine = load_machine(options)
-    if machine.loaded:
-        return analyze_loaded(options, machine)
-    if options.output:
-        raise InputError("analyze draws figures of the machine under load only; add --loaded, or leave -o out.")
-    verdicts = verdicts_of(machine)
-    with said_when_slow(LOOKING):
-        analysis = analyze(machine, options.axes)
-    answered = analysis.status is Status.OK
-    along = [analysis.along(direction) for direction in options.along] if answered else []
-    code = give(
-        options,
-        answered,
-        lambda: as_json(analysis, along, verdicts),
-        lambda console: print_analysis(console, analysis, along, options.full, verdicts),
-        message=analysis.message,
-    )
-    return code if all(verdict.met for verdict in verdicts) else NO_ANSWER

@@ -9,8 +9,8 @@ from kinetostat import Status, analyze, bundled, forward
 from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
-from kinetostat.studies.analysis import as_json
 from kinetostat.studies.assembly import actuators_at
+from kinetostat.views.answers import plain_of
 from machines import load_without_limits
 from refusals import refused
 
@@ -190,7 +190,7 @@ def test_an_analysis_shows_where_the_actuators_stand():
     machine = load_without_limits("hexapod")
     analysis = analyze(machine)
     assert {actuator.name: actuator.coordinate for actuator in analysis.actuators} == stand(machine)
-    assert as_json(analysis)["actuators"][0]["meaning"] == "length of the leg"
+    assert plain_of(analysis)["actuators"][0]["meaning"] == "length of the leg"
 
 
 def test_a_slide_at_the_end_of_its_leg_has_the_position_of_the_platform():

@@ -14,7 +14,8 @@ from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.machine.limits import LIMITS
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
-from kinetostat.studies.analysis import analyze, as_json
+from kinetostat.studies.analysis import analyze
+from kinetostat.views.answers import plain_of
 from machines import CASES, CONTRASTING, every_machine, machines
 from refusals import refused
 
@@ -78,7 +79,7 @@ def test_status_and_message(settings, status, words):
 
 @every_state
 def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, words):
-    data = as_json(at(*settings))
+    data = plain_of(at(*settings))
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     assert data["name"] == "Zhang & Gosselin 4-dof"
     assert data["components"] == list(COMPONENTS)
@@ -91,7 +92,7 @@ def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, word
 
 @pytest.mark.parametrize("state", [state for state, row in STATES.items() if row[1] != "ok"])
 def test_a_pose_without_answer_has_no_numbers(state):
-    data = as_json(at(*STATES[state][0]))
+    data = plain_of(at(*STATES[state][0]))
     answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank")
     if data["stiffness"] is None:
         assert [data[key] for key in answers] == [None] * 5
@@ -105,7 +106,7 @@ def test_a_pose_without_answer_has_no_numbers(state):
 
 
 def test_the_reference_pose():
-    data = as_json(at())
+    data = plain_of(at())
     assert data["rank"] == 6
     assert (data["rigid"], data["free"]) == ([], [])
     assert data["stiffness"][0][0] == pytest.approx(8.50551299487, rel=1e-9)
@@ -117,7 +118,7 @@ def test_the_reference_pose():
 
 
 def test_a_rigid_passive_leg_has_no_stiffness_matrix_and_exact_zeros_in_c():
-    data = as_json(at(RIGID_LINKS))
+    data = plain_of(at(RIGID_LINKS))
     assert data["stiffness"] is None
     assert data["rank"] == 4
     assert data["rigid"] == ["passive link 1", "passive link 2"]
@@ -130,7 +131,7 @@ def test_a_rigid_passive_leg_has_no_stiffness_matrix_and_exact_zeros_in_c():
 
 
 def test_a_free_leg_has_no_compliance_matrix():
-    data = as_json(at(FREE_LEG))
+    data = plain_of(at(FREE_LEG))
     assert data["compliance"] is None
     assert data["principal_compliances"] is None
     assert data["rank"] == 5
@@ -141,7 +142,7 @@ def test_a_free_leg_has_no_compliance_matrix():
 
 def test_rounding_is_no_compliance_even_where_another_direction_is_free():
     """The passive leg is rigid: about z and along y nothing moves, whether or not an actuator is free."""
-    data = as_json(at(RIGID_LINKS, FREE_LEG))
+    data = plain_of(at(RIGID_LINKS, FREE_LEG))
     assert [data["compliance_diagonal"][COMPONENTS.index(name)] for name in ("rz", "y")] == [0.0, 0.0]
     assert all(share["compliance_share"][COMPONENTS.index("rz")] is None for share in data["attribution"])
 
@@ -157,7 +158,7 @@ There J5' of eq. 25 is singular: tan(theta5) = l52 / l51 sin(120 deg). The pose 
 @pytest.mark.parametrize("beside", [0.0, 1e-13, -1e-13])
 def test_a_load_that_no_spring_feels_is_held_rigidly(beside):
     found = at(f"pose.theta5={UNSEEN + beside!r} deg")
-    data = as_json(found)
+    data = plain_of(found)
     assert json.dumps(data, allow_nan=False)
     assert data["status"] == "ok"
     assert data["compliance_diagonal"] == pytest.approx(
@@ -200,7 +201,7 @@ def test_any_machine_has_an_answer_in_json(case, data):
     machine = data.draw(machines(case, CONTRASTING | ends))
     for path in data.draw(st.lists(st.sampled_from(sorted(case.ranges)), max_size=3)):
         machine = with_values(machine, {path: data.draw(st.floats(0.01, 2.0), label=path)})
-    json.dumps(as_json(analyze(machine)), allow_nan=False)
+    json.dumps(plain_of(analyze(machine)), allow_nan=False)
 
 
 def test_directions_of_equal_stiffness_are_told_together(capsys):
@@ -220,7 +221,7 @@ def test_words_of_the_version_before_still_work_with_a_warning():
         assert analysis.shares == analysis.attribution
     with pytest.warns(DeprecationWarning, match="compliance_share"):
         assert analysis.attribution[0].compliance == analysis.attribution[0].compliance_share
-    data = as_json(analysis)
+    data = plain_of(analysis)
     assert data["order"] == data["components"]
     assert data["deprecated_keys"]["order"] == "components"
     for old, new in (

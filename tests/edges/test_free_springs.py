@@ -8,7 +8,7 @@ import pytest
 from kinetostat import analyze, bundled, changed, evaluate_grid, guidelines, load
 from kinetostat.cli import main
 from kinetostat.machine.parameters import parameters
-from kinetostat.studies.analysis import as_json
+from kinetostat.views.answers import plain_of
 from machines import load_without_limits
 
 LOAD = {"load.force.0": 10.0, "load.force.1": 20.0, "load.force.2": -500.0}
@@ -27,7 +27,7 @@ def drives(name):
 @pytest.mark.parametrize("name", bundled())
 def test_a_load_on_free_actuators_says_what_it_moves(name):
     analysis = analyze(changed(load_without_limits(name), {**dict.fromkeys(drives(name), 0.0), **LOAD}))
-    json.dumps(as_json(analysis), allow_nan=False)
+    json.dumps(plain_of(analysis), allow_nan=False)
     if analysis.load is None:  # legs that impose constraints twice share loads by their springs: nothing is balanced
         assert analysis.status.word == "singular"
         assert "Actuators are missing" in analysis.message

@@ -15,7 +15,8 @@ from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
-from kinetostat.studies.analysis import analyze, as_json
+from kinetostat.studies.analysis import analyze
+from kinetostat.views.answers import plain_of
 from machines import every_machine
 
 CONDITION = 1e-8
@@ -128,7 +129,7 @@ def test_every_condition_has_a_name_of_its_own():
     """Of K by its eigenvalues and in the Frobenius norm, of W, of the actuators' Jacobian: four numbers, four names."""
     machine = load("hexapod", ["pose.x=20 mm"])
     found = analyze(machine)
-    told, written = as_json(found), as_dataset(found)
+    told, written = plain_of(found), as_dataset(found)
     names = ("stiffness_condition", "wrench_condition", "jacobian_condition")
     assert [told[name] for name in names] == [float(written[name]) for name in names]
     assert len({*(told[name] for name in names), value("frobenius_condition", respond(machine))}) == 4

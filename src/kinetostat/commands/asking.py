@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.commands.common import (
+    NO_ANSWER,
     Help,
     Parser,
     direction,
@@ -156,9 +157,11 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     description, output = description_of(answer), getattr(options, "output", None)
     answered, message = description.answered(answer), getattr(answer, "message", "")
     full, written = getattr(options, "full", False), []
+    if output and description.undrawn:
+        raise InputError(description.undrawn)
     if output and (answered or not message):
         written = (write_files if to_files else write_folder)(options, description, answer)
-    return give(
+    code = give(
         options,
         answered,
         lambda: json_of(description, answer),
@@ -166,6 +169,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
         written,
         message=message,
     )
+    return code if description.kept(answer) else NO_ANSWER
 
 
 def _advance(update: "Callable[[int, int, str], None]", done: int, total: int, words: str = "") -> None:

@@ -34,15 +34,13 @@ from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
 from kinetostat.machine.loads import Mass
 from kinetostat.machine.machine import Machine, springs
-from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
-from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
+from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
-from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.rounding import clean_matrix, clean_statics
 from kinetostat.studies.unanswered import known_fields, standing_fields
 from kinetostat.tolerances import CLOSING_ROUND_OFF
@@ -90,6 +88,8 @@ class Analysis(Immutable):
         jacobian_condition: condition number of the actuators' Jacobian, angles multiplied by the characteristic length;
             None where some actuators are rotary and others linear, or where there is no actuator.
         characteristic_length: in m; it makes rotations comparable with translations.
+        directions: stiffnesses along and about directions that were asked for.
+        requirements: verdicts on the requirements of the machine's file, where they were asked for.
     """
 
     state: MachineState
@@ -120,6 +120,8 @@ class Analysis(Immutable):
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
+    directions: tuple[Along, ...] = ()
+    requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
@@ -356,64 +358,3 @@ def _message(
     sentences = sentences or [Status.OK.sentence]
     more = (state.left_out, unlimited(state.machine.tables["limits"]))
     return " ".join([*sentences, *(sentence for sentence in more if sentence)])
-
-
-def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Sequence[object] = ()) -> dict[str, Any]:
-    """Return the analysis as plain data, with stiffnesses along chosen directions and verdicts on requirements."""
-    machine = analysis.machine
-    pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
-    position, rotation = analysis.platform or (None, None)
-    data: dict[str, Any] = {
-        "name": machine.name,
-        "family": machine.family.name,
-        "components": analysis.components,
-        "axes": analysis.axes,
-        "pose": pose,
-        "status": analysis.status.word,
-        "message": analysis.message,
-        "platform": {"position": position, "rotation": rotation},
-        "tool_offset": machine.tables["tool"].offset,
-        "stiffness": analysis.stiffness,
-        "compliance": analysis.compliance or analysis.finite_compliance,
-        "stiffness_diagonal": analysis.stiffness_diagonal or None,
-        "compliance_diagonal": analysis.compliance_diagonal or None,
-        "rank": analysis.rank,
-        "rigid": analysis.rigid,
-        "free": analysis.free,
-        "singularity_margin": analysis.singularity_margin,
-        "leg_singularity_margin": analysis.leg_singularity_margin,
-        "platform_singularity_margin": analysis.platform_singularity_margin,
-        "wrench_condition": analysis.wrench_condition,
-        "jacobian_condition": analysis.jacobian_condition,
-        "characteristic_length": analysis.characteristic_length,
-        **indices_json(analysis.indices),
-        "softest": analysis.softest,
-        "along": along,
-        **({"requirements": requirements} if requirements else {}),
-        "mobility": analysis.mobility and _mobility_json(analysis.mobility),
-        "internal_loads": analysis.internal_loads,
-        "load": analysis.load,
-        "actuators": analysis.actuators,
-        "moving_mass": analysis.moving_mass,
-        "masses": {part.name: part.mass for part in analysis.masses},
-        "attribution": [
-            {**vars(spring), "stiffness": stiffness_of_spring(spring.stiffness)} for spring in analysis.attribution
-        ],
-    }
-    return as_answer(data)
-
-
-def _mobility_json(mobility: Mobility) -> dict[str, Any]:
-    return {
-        "full_cycle": mobility.full_cycle,
-        "here": mobility.here.platform,
-        "legs": mobility.here.legs,
-        "idle": mobility.here.idle,
-        "redundant_constraints": mobility.here.redundant,
-        "actuators": mobility.actuators,
-        "kind": mobility.kind,
-        "locked_legs": mobility.lost,
-        "free_twists": mobility.twists,
-        "leg_least_singular_value": mobility.leg_least_singular_value,
-        "platform_least_singular_value": mobility.platform_least_singular_value,
-    }

@@ -5,7 +5,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,6 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.loaded_sentences import about_rest, moving_legs, why_no_rest, why_no_tensions
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix, clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
@@ -83,6 +82,7 @@ class LoadedState(Immutable):
         struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
         residual: what is left of the equations, as a share of what the load and the legs carry.
         links: of all legs, with the exact motions of their ends.
+        requirements: verdicts on the requirements of the machine's file, where they were asked for.
     """
 
     state: MachineState
@@ -102,6 +102,7 @@ class LoadedState(Immutable):
     struts: tuple[Strut, ...] = ()
     residual: float = 0.0
     links: tuple[DeflectedLink, ...] = ()
+    requirements: tuple[Any, ...] = ()
 
     @property
     def machine(self) -> Machine:
@@ -287,31 +288,4 @@ def _without_rest(state: MachineState) -> LoadedState:
     legs = moving_legs(limit.balance, limit.judged) if mode.any() else []
     return LoadedState(
         state, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
-    )
-
-
-def as_json(state: LoadedState, requirements: Sequence[object] = ()) -> dict[str, Any]:
-    """Return the state as plain data, SI, with verdicts on requirements."""
-    machine = state.machine
-    return as_answer(
-        {
-            "name": machine.name,
-            "family": machine.family.name,
-            "rest": state.rest.word,
-            "message": state.message,
-            "components": state.components,
-            "displacement": state.displacement,
-            "linear": state.linear,
-            "springs": state.springs,
-            "slack_legs": state.slack_legs,
-            "elastic_stiffness": state.elastic,
-            "tangent_stiffness": state.tangent,
-            "tangent_compliance": state.compliance,
-            "load_factor": state.factor,
-            "mode": state.mode,
-            "mode_legs": state.mode_legs,
-            "struts": [{**asdict(strut), "factor": strut.factor} for strut in state.struts],
-            "residual": state.residual,
-            "requirements": list(requirements),
-        }
     )

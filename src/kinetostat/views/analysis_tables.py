@@ -1,12 +1,7 @@
 """An analysis as tables on a terminal, with units. Nothing is computed but rounding, percent and sums of shares."""
 
 import math
-import textwrap
 from collections.abc import Sequence
-
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.display import ENGINEERING, Display, number
@@ -17,63 +12,15 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
-from kinetostat.studies.requirements import Verdict
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
-from kinetostat.views.first_lines import first_lines
-from kinetostat.views.forward import actuator_coordinates
-from kinetostat.views.requirement_lines import print_requirements
-from kinetostat.views.tables import numeric_table, print_doubts
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.tables import numeric_table
 
 MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
 """SI units of the blocks of K and C: rotation, coupling, translation."""
-LABELS = 11
-"""Columns for the labels of the first lines."""
 ROTATION_NAMES = COMPONENTS[:3]
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
-
-
-def print_analysis(
-    console: Console,
-    analysis: Analysis,
-    along: Sequence[Along] = (),
-    full: bool = False,
-    requirements: Sequence[Verdict] = (),
-) -> None:
-    """Print the answer in five lines, requirements, reasons in tables, K and C last; all springs if `full`."""
-    machine, names, display = analysis.machine, analysis.components, analysis.machine.display
-    console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
-    answer = Table.grid(padding=(0, 2, 0, 0))
-    for label, text in first_lines(analysis):
-        # Rich would also break a line between a number and its percent sign, at a space that is not for breaking.
-        answer.add_row(Text(label, "bold"), "\n".join(textwrap.wrap(text, console.width - LABELS)))
-    console.print(answer)
-    if requirements:
-        print_requirements(console, requirements, display)
-    print_doubts(console, machine)
-    if analysis.platform is None:
-        return
-    shown = [along_table(along, display), shares_table(analysis, full), principal_table(analysis)]
-    if analysis.load:
-        shown += [load_table(names, analysis.load, display), actuator_table(analysis.load, display)]
-        shown.append(reaction_table(analysis.load, analysis.axes, display))
-    _print_tables(console, shown)
-    for line in remarks(analysis):
-        console.print(line, highlight=False)
-    about = f"Components {' '.join(names)} at the {machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
-    console.print(about, style="dim", highlight=False)
-    shown = [stiffness_table(analysis), compliance_table(analysis)]
-    if full:
-        shown.append(actuator_coordinates(analysis.actuators, display))
-    if full and analysis.indices:
-        shown.append(eigenscrew_table(analysis.indices.eigenscrews, machine.reference, display))
-    _print_tables(console, shown)
-
-
-def _print_tables(console: Console, tables: Sequence[Table]) -> None:
-    for table in tables:
-        if table.row_count:
-            console.print(table)
 
 
 def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
@@ -81,14 +28,14 @@ def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
     return ", ".join(display.scale(unit).unit for unit in MATRIX_UNITS[kind])
 
 
-def stiffness_table(analysis: Analysis) -> Table:
+def stiffness_table(analysis: Analysis) -> FittedTable:
     """K, or its diagonal where a direction is rigid."""
     display = analysis.machine.display
     rows: Sequence[Sequence[float]] = analysis.stiffness or [analysis.stiffness_diagonal]
     return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
-def compliance_table(analysis: Analysis) -> Table:
+def compliance_table(analysis: Analysis) -> FittedTable:
     """C, or its diagonal where a direction is free."""
     display = analysis.machine.display
     rows: Sequence[Sequence[float]] = analysis.compliance or [analysis.compliance_diagonal]
@@ -102,7 +49,7 @@ def matrix_table(
     rows: Sequence[Sequence[float]],
     display: Display = ENGINEERING,
     endless: str = "∞",
-) -> Table:
+) -> FittedTable:
     """K ("stiffness") or C ("compliance"), each entry in the unit of its block; one row is the diagonal.
 
     Args:
@@ -127,7 +74,7 @@ def entry_unit(kind: str, row: str, column: str) -> str:
     return MATRIX_UNITS[kind][(row not in ROTATION_NAMES) + (column not in ROTATION_NAMES)]
 
 
-def shares_table(analysis: Analysis, full: bool = False) -> Table:
+def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
     """Attribution, by default of joints and links as a whole."""
     table = numeric_table("Attribution: share of each part in the diagonal of C", "part", analysis.components)
     springs = {share.spring: [share] for share in analysis.attribution}
@@ -138,7 +85,7 @@ def shares_table(analysis: Analysis, full: bool = False) -> Table:
     return table
 
 
-def principal_table(analysis: Analysis) -> Table:
+def principal_table(analysis: Analysis) -> FittedTable:
     """Least and largest stiffness of each block, free to follow and held; empty where there is none."""
     display = analysis.machine.display
     columns = ["least", "largest", "softest direction", "stiffest direction"]
@@ -156,7 +103,7 @@ def principal_table(analysis: Analysis) -> Table:
     return table
 
 
-def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> Table:
+def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> FittedTable:
     """Stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
     title = f"Stiffness along and about directions ({display.names(['N/m', 'N·m/rad'])})"
@@ -189,7 +136,7 @@ def _direction(vector: Sequence[float]) -> str:
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
-def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Display = ENGINEERING) -> Table:
+def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Display = ENGINEERING) -> FittedTable:
     """Eigenvalue, pitch, direction and point of each, the point from the reference point."""
     length = display.scale("m")
     heads = [
@@ -211,7 +158,7 @@ def _point(point: Sequence[float], display: Display) -> str:
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
 
-def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEERING) -> Table:
+def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
     """The load and the deflection of the reference point."""
     units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in names]
     motions = ", ".join(dict.fromkeys(display.deflection(motion).unit for _, motion in units))
@@ -225,7 +172,7 @@ def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEER
     return table
 
 
-def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> Table:
+def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
     """What each actuator bears, and how far it deforms."""
     table = numeric_table("Actuators under this load", "", ["load", "deformation"])
     for spring in load.springs:
@@ -237,7 +184,7 @@ def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> Table:
     return table
 
 
-def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) -> Table:
+def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) -> FittedTable:
     """The wrench in each joint, in base or platform axes."""
     units = display.names(["N·m", "N"])
     title = f"Joint reactions: load that each joint passes on towards the base ({units}; {axes} axes)"

@@ -89,14 +89,9 @@ KINDS = (
             ".glb": "views.scene.glb.machine_glb",
         },
     ),
-    Kind("studies.analysis.Analysis", "views.analysis_tables.print_analysis", plain="studies.analysis.as_json"),
+    Kind("studies.analysis.Analysis", description="views.analysis.ANALYSIS"),
     Kind("studies.assembly.Forward", description="views.forward.MODES"),
-    Kind(
-        "studies.under_load.LoadedState",
-        "views.loaded_tables.print_loaded",
-        "views.loaded_figures.loaded_figures",
-        "studies.under_load.as_json",
-    ),
+    Kind("studies.under_load.LoadedState", description="views.analysis.LOADED"),
     Kind("studies.vibration.Vibration", description="views.vibration.VIBRATION"),
     Kind(
         "studies.commanding.Command",

@@ -17,9 +17,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
+from kinetostat.views.question import Drawing
 from kinetostat.views.scene.analysis_overlays import exaggerated_displacement, exaggeration_of, motions_of
 from kinetostat.views.scene.proportions import proportions_of
 
@@ -187,7 +188,13 @@ def _first_order(panel: Axes, share: Array, values: Sequence[float], scale: Scal
         panel.plot(share, value * scale.factor * share / 100.0, color=colour, linewidth=0.6)
 
 
-def loaded_figures(state: LoadedState) -> Drawings:
+def loaded_figures(state: LoadedState) -> dict[str, Drawing]:
     """Return the curve over the growing load, and the shape; a machine without rest has neither."""
-    drawn: Drawings = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
-    return drawn if state.displacement else {}
+    if not state.displacement:
+        return {}
+    growing = "Displacement and loads while the loads grow, beside the linear answer."
+    shape = "The machine at rest under its loads over the machine without them."
+    return {
+        "growing load": Drawing(growing, partial(load_figure, state), file="growing-load"),
+        "shape": Drawing(shape, partial(shape_figure, state)),
+    }

@@ -4,47 +4,12 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
-from kinetostat.studies.requirements import Verdict
-from kinetostat.studies.setting import pose_of
 from kinetostat.studies.under_load import LoadedState, SpringState
-from kinetostat.views.analysis_tables import entry_unit, matrix_table
-from kinetostat.views.requirement_lines import print_requirements
-from kinetostat.views.tables import numeric_table, print_doubts
-
-
-def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Verdict] = ()) -> None:
-    """Print the state of rest under load: what is the case, requirements, displacement, springs, and stiffness."""
-    machine, display = state.machine, state.machine.display
-    console.print(Text.assemble((machine.name, "bold"), f"  under load: {state.rest.word}"))
-    answer = Table.grid(padding=(0, 2, 0, 0))
-    answer.add_row(Text("Pose", "bold"), f"{pose_of(machine)}. {state.message}")
-    if state.displacement:
-        answer.add_row(Text("Stability", "bold"), stability_of(state))
-    console.print(answer)
-    if requirements:
-        print_requirements(console, requirements, display)
-    print_doubts(console, machine)
-    if not state.displacement:
-        return
-    console.print(displacement_table(state, display))
-    console.print(spring_table(state, display))
-    if state.struts:
-        console.print(strut_table(state, display))
-    about = f"Components {' '.join(state.components)} at the loaded {machine.reference}, base axes."
-    console.print(about, style="dim", highlight=False)
-    for title, kind, rows in (
-        ("Tangent stiffness", "stiffness", state.tangent),
-        ("Elastic part of it", "stiffness", state.elastic),
-        ("Compliance to further loads", "compliance", state.compliance),
-    ):
-        if rows is not None:
-            console.print(matrix_table(title, kind, state.components, rows, display))
+from kinetostat.views.analysis_tables import entry_unit
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.tables import numeric_table
 
 
 def stability_of(state: LoadedState) -> str:
@@ -66,7 +31,7 @@ def _stability_of_springs(factor: float | None) -> str:
     return f"The load may grow to {number(factor)} times its size until the springs become unstable."
 
 
-def displacement_table(state: LoadedState, display: Display) -> Table:
+def displacement_table(state: LoadedState, display: Display) -> FittedTable:
     """How far the load moves the tool, and what linear equations say."""
     units = ["rad" if name.startswith("r") else "m" for name in state.components]
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
@@ -85,7 +50,7 @@ def leg_loads(state: LoadedState) -> list[tuple[str, SpringState]]:
     return [(spring.leg if count[spring.leg] == 1 else spring.name, spring) for spring in shown]
 
 
-def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequence[float] = ()) -> Table | None:
+def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequence[float] = ()) -> FittedTable | None:
     """The stiffness to further loads in each direction, beside that of the machine without loads.
 
     Args:
@@ -112,7 +77,7 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
     return table
 
 
-def spring_table(state: LoadedState, display: Display) -> Table:
+def spring_table(state: LoadedState, display: Display) -> FittedTable:
     """Load, deformation and state of every spring."""
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
@@ -122,7 +87,7 @@ def spring_table(state: LoadedState, display: Display) -> Table:
     return table
 
 
-def strut_table(state: LoadedState, display: Display) -> Table:
+def strut_table(state: LoadedState, display: Display) -> FittedTable:
     """What presses each strut, and at which load it would bend away."""
     table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
     for strut in state.struts:

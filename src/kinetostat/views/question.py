@@ -136,7 +136,7 @@ class Description:
         title: of a section or a panel that shows one.
         fields: values and records of the answer, in the order of JSON.
         lines: the sentences, the answer first. The line "Pose" is left out where a report has said it.
-        tables: the tables, each with a title; `full` wants every row.
+        tables: the tables, each with a title, and sentences between them; `full` wants every row.
         figures: drawings by name, the most telling first.
         makers: functions that make a form of their own, such as the dataset that an answer already holds.
         axes: of the arrays in NetCDF.
@@ -144,6 +144,8 @@ class Description:
         answered: whether there is an answer; where there is none, `message` of the answer says why.
         files: name of each file that a folder of results gets, with its form "json", "csv" or "nc", or a function
             that writes its text, dataset or plain data; where this gives None, there is no such file.
+        kept: whether the answer keeps what its file demands; a command says by its exit code where it does not.
+        undrawn: why a folder of results gets nothing, where that is so.
         figure_prefix: stands before the names of the figures in a folder.
     """
 
@@ -151,13 +153,15 @@ class Description:
     title: str
     fields: tuple[Field | Records, ...]
     lines: Callable[[Any], Lines] = NO_PARTS
-    tables: "Callable[..., Iterable[Table]]" = NO_PARTS
+    tables: "Callable[..., Iterable[Table | str]]" = NO_PARTS
     figures: Late | None = None
     makers: Mapping[str, Late] = field(default_factory=dict)
     axes: tuple[Axis, ...] = ()
     state: Callable[[Any], str] = lambda answer: answer.status.word
     answered: Callable[[Any], bool] = lambda _answer: True
     files: Mapping[str, Late] = field(default_factory=dict)
+    kept: Callable[[Any], bool] = lambda _answer: True
+    undrawn: str = ""
     figure_prefix: str = ""
 
     @property

@@ -3,6 +3,10 @@
 from collections.abc import Mapping
 
 QUESTIONS: Mapping[str, tuple[str, str]] = {
+    "analyze": (
+        "compute stiffness, compliance, attribution and indices at a pose",
+        "views.analysis.ANALYZE",
+    ),
     "forward": ("compute the poses that actuator coordinates give", "views.forward.FORWARD"),
     "path": ("compute quantities at the poses of a CSV file: table, CSV and picture", "views.path.POSES_OF_A_FILE"),
     "workspace": ("compute where the machine can work: volume, limits, pictures", "views.workspace.REACHED_POSES"),

@@ -1,5 +1,6 @@
 """Answers on a terminal, made of their description: machine and state, sentences, tables. Nothing is computed."""
 
+import textwrap
 from typing import Any
 
 from rich.console import Console
@@ -7,7 +8,11 @@ from rich.table import Table
 from rich.text import Text
 
 from kinetostat.views.question import Description
+from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import print_doubts
+
+HEADS = 11
+"""Columns of the words that stand before sentences."""
 
 
 def tell(console: Console, description: Description, answer: Any, full: bool = False) -> None:
@@ -22,8 +27,14 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
     console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
     lines = Table.grid(padding=(0, 2, 0, 0))
     for head, sentence in description.lines(answer):
-        lines.add_row(Text(head, "bold"), sentence)
+        # Rich would also break a line between a number and its percent sign, at a space that is not for breaking.
+        lines.add_row(Text(head, "bold"), "\n".join(textwrap.wrap(sentence, console.width - HEADS)))
     console.print(lines)
+    if verdicts := getattr(answer, "requirements", ()):
+        print_requirements(console, verdicts, answer.machine.display)
     print_doubts(console, answer.machine)
-    for table in description.tables(answer, full):
-        console.print(table)
+    for part in description.tables(answer, full):
+        if isinstance(part, str):
+            console.print(part, highlight=False)
+        else:
+            console.print(part)

@@ -101,6 +101,9 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
     ]
     parts += [paragraph(f"Note: {doubt}") for doubt in doubts(answer.machine)]
     for shown in description.tables(answer, full):
+        if isinstance(shown, str):
+            parts.append(paragraph(shown))
+            continue
         title = str(shown.title or description.title)
         rows = as_table(shown, title)
         parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer"))

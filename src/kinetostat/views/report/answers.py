@@ -95,8 +95,8 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
     for head, sentence in description.lines(answer):
         if head != SAID_BEFORE:
             yield Paragraph(typeset(sentence), f"{head}:")
-    for table in description.tables(answer, False):
-        yield as_table(table, f"{table.title}.")
+    for part in description.tables(answer, False):
+        yield Paragraph(typeset(part)) if isinstance(part, str) else as_table(part, f"{part.title}.")
     for drawing in description.drawings(answer).values():
         if not drawing.minor:
             yield figure_of(drawing(title=""), drawing.caption)

@@ -17,7 +17,6 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result, message
 from kinetostat.studies.report import STEPS, Answers, Texts, gather, texts_of
 from kinetostat.studies.setting import pose_of
@@ -183,7 +182,7 @@ def _validation(machine: Machine, options: ReportOptions) -> Validation | str:
 def results_of(answers: Answers) -> dict[str, Any]:
     """The analysis as plain data, with the other answers that have a section of their own under their names."""
     others = {name: answers.of(name) for name in ANSWERS_WITH_SECTIONS}
-    return as_json(answers.analysis) | {name: plain_of(answer) for name, answer in others.items() if answer}
+    return plain_of(answers.analysis) | {name: plain_of(answer) for name, answer in others.items() if answer}
 
 
 def report_of(

@@ -1,0 +1,250 @@
+"""Stiffness of a machine at its pose, free or at rest under its loads: one question, and a description for each state.
+
+Nothing is computed here.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from typing import Any
+
+from rich.table import Table
+
+from kinetostat.equilibrium.solving import Rest
+from kinetostat.kinematics.mobility import Mobility
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, shown, values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import AXES, Analysis, analyze
+from kinetostat.studies.indices import indices_json
+from kinetostat.studies.plain_data import stiffness_of_spring
+from kinetostat.studies.requirements import requirements
+from kinetostat.studies.setting import pose_of
+from kinetostat.studies.under_load import LoadedState, under_load
+from kinetostat.views import analysis_tables as free
+from kinetostat.views import loaded_tables as loaded
+from kinetostat.views.first_lines import first_lines
+from kinetostat.views.forward import actuator_coordinates
+from kinetostat.views.question import Description, Field, Lines, Option, Question, Records
+
+INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
+
+
+def analyze_in_state(
+    machine: Machine, axes: str = "base", along: Sequence[Sequence[float]] = ()
+) -> Analysis | LoadedState:
+    """Analyse a machine in the state that is meant, and judge the requirements of its file.
+
+    Args:
+        machine: with its pose.
+        axes: "base", or "platform" for results of the free machine in platform axes.
+        along: directions in which the stiffness of the free machine is given as well.
+
+    Raises:
+        InputError: axes or directions of a machine that is meant under its loads.
+    """
+    verdicts = requirements(machine) if machine.requirements else ()
+    if not machine.loaded:
+        analysis = analyze(machine, axes)
+        directions = tuple(map(analysis.along, along)) if analysis.status is Status.OK else ()
+        return replace(analysis, directions=directions, requirements=verdicts)
+    if along or axes != "base":
+        raise InputError(
+            '--loaded or state = "loaded" in [load] gives results in base axes only; leave '
+            "--along and --axes out, or add --set load.state=free."
+        )
+    return replace(under_load(machine), requirements=verdicts)
+
+
+def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
+    """Reasons in tables, remarks, K and C last; all springs if `full`."""
+    if analysis.platform is None:
+        return
+    display, names = analysis.machine.display, analysis.components
+    yield free.along_table(analysis.directions, display)
+    yield free.shares_table(analysis, full)
+    yield free.principal_table(analysis)
+    if analysis.load:
+        yield free.load_table(names, analysis.load, display)
+        yield free.actuator_table(analysis.load, display)
+        yield free.reaction_table(analysis.load, analysis.axes, display)
+    yield from free.remarks(analysis)
+    yield (
+        f"Components {' '.join(names)} at the {analysis.machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
+    )
+    yield free.stiffness_table(analysis)
+    yield free.compliance_table(analysis)
+    if full:
+        yield actuator_coordinates(analysis.actuators, display)
+    if full and analysis.indices:
+        yield free.eigenscrew_table(analysis.indices.eigenscrews, analysis.machine.reference, display)
+
+
+def _loaded_lines(state: LoadedState) -> Lines:
+    yield "Pose", f"{pose_of(state.machine)}. {state.message}"
+    if state.displacement:
+        yield "Stability", loaded.stability_of(state)
+
+
+def _loaded_parts(state: LoadedState, _full: bool) -> Iterator[Table | str]:
+    if not state.displacement:
+        return
+    display = state.machine.display
+    yield loaded.displacement_table(state, display)
+    yield loaded.spring_table(state, display)
+    yield loaded.strut_table(state, display)
+    yield f"Components {' '.join(state.components)} at the loaded {state.machine.reference}, base axes."
+    for title, kind, rows in (
+        ("Tangent stiffness", "stiffness", state.tangent),
+        ("Elastic part of it", "stiffness", state.elastic),
+        ("Compliance to further loads", "compliance", state.compliance),
+    ):
+        if rows is not None:
+            yield free.matrix_table(title, kind, state.components, rows, display)
+
+
+def _filled(parts: Iterator[Table | str]) -> list[Table | str]:
+    """Sentences, and the tables that have a row."""
+    return [part for part in parts if isinstance(part, str) or part.row_count]
+
+
+def _pose(analysis: Analysis) -> dict[str, Any]:
+    return {shown(path): value for path, value in values(analysis.machine).items() if path.startswith(POSE)}
+
+
+def _platform(analysis: Analysis) -> dict[str, Any]:
+    position, rotation = analysis.platform or (None, None)
+    return {"position": position, "rotation": rotation}
+
+
+def _index(key: str, analysis: Analysis) -> Any:
+    """One of the indices; None where there are none, and NaN, which JSON has as null, where this one has no value."""
+    value = indices_json(analysis.indices).get(key)
+    return math.nan if value is None and analysis.indices else value
+
+
+def _mobility(mobility: Mobility | None) -> dict[str, Any] | None:
+    if mobility is None:
+        return None
+    return {
+        "full_cycle": mobility.full_cycle,
+        "here": mobility.here.platform,
+        "legs": mobility.here.legs,
+        "idle": mobility.here.idle,
+        "redundant_constraints": mobility.here.redundant,
+        "actuators": mobility.actuators,
+        "kind": mobility.kind,
+        "locked_legs": mobility.lost,
+        "free_twists": mobility.twists,
+        "leg_least_singular_value": mobility.leg_least_singular_value,
+        "platform_least_singular_value": mobility.platform_least_singular_value,
+    }
+
+
+def _attribution(analysis: Analysis) -> list[dict[str, Any]]:
+    return [{**vars(spring), "stiffness": stiffness_of_spring(spring.stiffness)} for spring in analysis.attribution]
+
+
+ANALYSIS = Description(
+    type="studies.analysis.Analysis",
+    title="Stiffness",
+    fields=(
+        Field("name", "machine.name"),
+        Field("family", "machine.family.name"),
+        Field("components"),
+        Field("axes"),
+        Field("pose", _pose),
+        Field("status", "status.word"),
+        Field("message"),
+        Field("platform", _platform),
+        Field("tool_offset", lambda analysis: analysis.machine.tables["tool"].offset),
+        Field("stiffness"),
+        Field("compliance", lambda analysis: analysis.compliance or analysis.finite_compliance),
+        Field("stiffness_diagonal", lambda analysis: analysis.stiffness_diagonal or None),
+        Field("compliance_diagonal", lambda analysis: analysis.compliance_diagonal or None),
+        Field("rank"),
+        Field("rigid"),
+        Field("free"),
+        Field("singularity_margin"),
+        Field("leg_singularity_margin"),
+        Field("platform_singularity_margin"),
+        Field("wrench_condition"),
+        Field("jacobian_condition"),
+        Field("characteristic_length"),
+        Field(INDICES[0], partial(_index, INDICES[0])),
+        *(Field(key, partial(_index, key), optional=True) for key in INDICES[1:]),
+        Field("softest"),
+        Field("along", "directions"),
+        Field("requirements", lambda analysis: analysis.requirements or None, optional=True),
+        Field("mobility", lambda analysis: _mobility(analysis.mobility)),
+        Field("internal_loads"),
+        Field("load"),
+        Field("actuators"),
+        Field("moving_mass"),
+        Field("masses", lambda analysis: {part.name: part.mass for part in analysis.masses}),
+        Field("attribution", _attribution),
+    ),
+    lines=first_lines,
+    tables=lambda analysis, full: _filled(_free_parts(analysis, full)),
+    answered=lambda analysis: analysis.status is Status.OK,
+    kept=lambda analysis: all(verdict.met for verdict in analysis.requirements),
+    undrawn="analyze draws figures of the machine under load only; add --loaded, or leave -o out.",
+)
+SPRING = (
+    Field("name"),
+    Field("leg"),
+    Field("turning"),
+    Field("actuated"),
+    Field("load", long_name="load that it carries, positive where it pulls, N or N m"),
+    Field("deformation", long_name="deformation from the free state, m or rad"),
+    Field("slack"),
+)
+LOADED = Description(
+    type="studies.under_load.LoadedState",
+    title="Under load",
+    fields=(
+        Field("name", "machine.name"),
+        Field("family", "machine.family.name"),
+        Field("rest", "rest.word"),
+        Field("message"),
+        Field("components"),
+        Field("displacement"),
+        Field("linear"),
+        Records("springs", "spring", SPRING),
+        Field("slack_legs"),
+        Field("elastic_stiffness", "elastic"),
+        Field("tangent_stiffness", "tangent"),
+        Field("tangent_compliance", "compliance"),
+        Field("load_factor", "factor"),
+        Field("mode"),
+        Field("mode_legs"),
+        Field("struts", lambda state: [{**asdict(strut), "factor": strut.factor} for strut in state.struts]),
+        Field("residual"),
+        Field("requirements"),
+    ),
+    lines=_loaded_lines,
+    tables=lambda state, full: _filled(_loaded_parts(state, full)),
+    figures="views.loaded_figures.loaded_figures",
+    state=lambda state: f"under load: {state.rest.word}",
+    answered=lambda state: bool(state.displacement),
+    kept=lambda state: state.rest is not Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements),
+)
+ANALYZE = Question(
+    example='kinetostat analyze mine.toml --set pose.x="5 mm" --json',
+    answer=analyze_in_state,
+    options=(
+        Option("axes", "choice", "axes of the results (default: base)", default="base", choices=AXES),
+        Option(
+            "along",
+            "direction",
+            "also give the stiffness along (force) and about (moment) this direction; repeatable",
+            many=True,
+        ),
+    ),
+    loaded="at rest under gravity, preload and [load], with exact geometry: displacement, springs, stiffness",
+    output="figures of the loaded machine: its shape, and the curve while the load grows",
+    slow="computing; if the pose is out of reach, the nearest one is looked for",
+    full="also show eigenscrews and every single spring",
+)
