@@ -257,11 +257,11 @@ class _Chain:
 
     def _add(self, joint: dict[str, Any], title: str = "") -> None:
         """Add a joint, and before it what deflects since the last one: as its seat, or as the link that it ends."""
-        name = self._unused(joint.pop("name", "") or self._name(title) or joint["type"])
+        name = self._free_name(joint.pop("name", "") or self._name(title) or joint["type"])
         bodies = (self.joints[-1]["joins"][1] if self.joints else BASE), f"body {len(self.joints) + 1}"
         compliance = compliance_at(self.pending, Vector(*joint["point"])).tolist() if self.pending else []
         if compliance and self.joints:
-            body = self._unused(self._name(self.pending[0].of))
+            body = self._free_name(self._name(self.pending[0].of))
             self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], body]
             bodies = body, bodies[1]
             self.links[body] = {"model": "matrix", "compliance": compliance}
@@ -276,7 +276,7 @@ class _Chain:
         title = title.kind if isinstance(title, PartName) else title.removeprefix(f"{self.leg.name} ")
         return title.replace(".", " ").strip()[:30]
 
-    def _unused(self, name: str) -> str:
+    def _free_name(self, name: str) -> str:
         used = {joint["name"] for joint in self.joints} | self.links.keys()
         numbered = (f"{name} {i}" for i in range(2, 99))
         return name if name not in used else next(other for other in numbered if other not in used)

@@ -20,7 +20,7 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.validation.masses import Heavy
 
-THICKNESS = 0.008
+ROD_RADIUS = 0.008
 """Radius of a link in the picture, as a share of the machine's extent."""
 NOTES = (
     " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
@@ -65,7 +65,7 @@ def text_of(analysis: Analysis, vibrating: bool = False) -> str:
     model = build(analysis.state.configuration)
     pace = vibrating_pace(analysis, model) if vibrating else pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
-    radius = THICKNESS * extent
+    radius = ROD_RADIUS * extent
     root = Element("mujoco", model=one_line(analysis.machine.name))
     root.append(ElementTree.Comment(NOTES.format(VIBRATING if vibrating else SETTLING)))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")

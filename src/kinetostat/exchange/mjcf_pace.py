@@ -50,14 +50,14 @@ LEAST_STEPS = 2.0
 DAMPING = 0.7
 """Damping ratio of the machine's slowest motion: it comes to rest after one swing."""
 CALM = 2.0
-"""How much longer than the geometric mean of step and damping time the period of a spring's armature is."""
+"""Ratio of the period of a spring's armature to the geometric mean of step and damping time."""
 UNKNOWN_COMPLIANCE = 1e-7
 """m/N, assumed where the machine is free or rigid, so that its compliance says nothing."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast the model moves.
+    """The pace of a model: its time step, and the masses and dampings that go with it.
 
     Attributes:
         step: time step, s.
@@ -183,7 +183,7 @@ def _moving(model: Model) -> list[Body]:
 
 
 def _rotors(machine: Machine, model: Model) -> dict[str, float]:
-    """What rotors add to the joints of their actuators, by the names of these."""
+    """Inertia that rotors add to the joints of their actuators, by the names of these."""
     if not has_rotors(machine):
         return {}
     driven = [freedom for body in _moving(model) for freedom in body.freedoms if freedom.actuated]
@@ -193,7 +193,7 @@ def _rotors(machine: Machine, model: Model) -> dict[str, float]:
 def _on_bodies(
     model: Model, response: Response, parts: Iterable[HeavyLink], armatures: dict[str, float]
 ) -> dict[str, list[Heavy]]:
-    """What the links put on each body, by its name; what stretches evenly changes the armature of its slide."""
+    """Parts of links that each body carries, by its name; what stretches evenly changes the armature of its slide."""
     heavy: dict[str, list[Heavy]] = {}
     configuration = response.configuration
     chains = [pieces(leg, configuration.plane) for leg in configuration.legs]

@@ -50,7 +50,7 @@ class Assembly:
         XCAFDoc_DocumentTool.SetLengthUnit_s(self._document, 1.0, UnitsMethods_LengthUnit_Millimeter)
         self._shapes = XCAFDoc_DocumentTool.ShapeTool_s(self._document.Main())
         self._colors = XCAFDoc_DocumentTool.ColorTool_s(self._document.Main())
-        self._whole = self._named(self._shapes.NewShape(), name)
+        self._whole = self._with_name(self._shapes.NewShape(), name)
         self._groups: dict[str, TDF_Label] = {}
         self._parts: dict[Key, TDF_Label] = {}
         self._names: Counter[str] = Counter()
@@ -67,7 +67,7 @@ class Assembly:
 
     def _group(self, name: str) -> TDF_Label:
         if name not in self._groups:
-            self._groups[name] = self._named(self._shapes.NewShape(), name)
+            self._groups[name] = self._with_name(self._shapes.NewShape(), name)
             self._build_in(self._whole, self._groups[name], name, BASE)
         return self._groups[name]
 
@@ -78,15 +78,15 @@ class Assembly:
             kind = COUNTED.sub("", solid.name.rpartition("/")[2])
             self._names[kind] += 1
             name = kind if self._names[kind] == 1 else f"{kind} {self._names[kind]}"
-            part = self._named(self._shapes.AddShape(solid_of(solid.shape, solid.scale), False), name)
+            part = self._with_name(self._shapes.AddShape(solid_of(solid.shape, solid.scale), False), name)
             self._colors.SetColor(part, _color(solid.material), XCAFDoc_ColorSurf)
             self._parts[key] = part
         return self._parts[key]
 
     def _build_in(self, group: TDF_Label, part: TDF_Label, name: str, place: Displacement) -> None:
-        self._named(self._shapes.AddComponent(group, part, _location(place)), name)
+        self._with_name(self._shapes.AddComponent(group, part, _location(place)), name)
 
-    def _named(self, label: TDF_Label, name: str) -> TDF_Label:
+    def _with_name(self, label: TDF_Label, name: str) -> TDF_Label:
         TDataStd_Name.Set_s(label, _text(step_text(name)))
         return label
 
@@ -96,10 +96,10 @@ def step_text(text: str) -> str:
 
     Source: ISO 10303-21:2016, encoding of strings: \X2\ and \X4\.
     """
-    return "".join(c if c.isascii() else _numbered(ord(c)) for c in one_line(text))
+    return "".join(c if c.isascii() else _by_number(ord(c)) for c in one_line(text))
 
 
-def _numbered(code: int) -> str:
+def _by_number(code: int) -> str:
     return f"\\X2\\{code:04X}\\X0\\" if code < 0x10000 else f"\\X4\\{code:08X}\\X0\\"
 
 

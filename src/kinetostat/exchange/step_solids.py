@@ -48,13 +48,13 @@ def solid_of(shape: Shape, scale: Point3 = UNSCALED) -> TopoDS_Shape:
     """Return the exact solid of a shape in the axes of the shape, scaled along them."""
     match shape:
         case Turned():
-            solid_shape = _turned(shape)
+            solid_shape = _turned_solid(shape)
         case Extruded():
-            solid_shape = _extruded(shape)
+            solid_shape = _extruded_solid(shape)
         case Swept():
-            solid_shape = _swept(shape)
+            solid_shape = _swept_solid(shape)
     (solid,) = _within(solid_shape, TopAbs_SOLID)
-    return solid if scale == UNSCALED else _scaled(solid, scale)
+    return solid if scale == UNSCALED else _scaled_solid(solid, scale)
 
 
 def point_of(x: float, y: float, z: float) -> gp_Pnt:
@@ -62,21 +62,21 @@ def point_of(x: float, y: float, z: float) -> gp_Pnt:
     return gp_Pnt(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES)
 
 
-def _turned(shape: Turned) -> TopoDS_Shape:
+def _turned_solid(shape: Turned) -> TopoDS_Shape:
     # A radius that is only round-off is set to 0, so that the profile meets the axis and the solid has no hole in it.
     least = NO_CIRCLE * max(radius for radius, _ in shape.profile)
     profile = [(radius if radius > least else 0.0, height) for radius, height in shape.profile]
     return BRepPrimAPI_MakeRevol(_face(profile, lambda x, z: point_of(x, 0.0, z)), gp.OZ_s()).Shape()
 
 
-def _extruded(shape: Extruded) -> TopoDS_Shape:
+def _extruded_solid(shape: Extruded) -> TopoDS_Shape:
     outline = _face(shape.outline, lambda x, y: point_of(x, y, 0.0))
     prism = BRepPrimAPI_MakePrism(outline, gp_Vec(0.0, 0.0, shape.height * MILLIMETRES))
-    rounded = _rounded(prism, shape.chamfer * MILLIMETRES) if shape.chamfer > 0.0 else None
+    rounded = _rounded_prism(prism, shape.chamfer * MILLIMETRES) if shape.chamfer > 0.0 else None
     return rounded or prism.Shape()
 
 
-def _rounded(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None:
+def _rounded_prism(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None:
     """Return a prism with rounded edges at both ends (radius in mm), or None if the radius does not fit."""
     fillet = BRepFilletAPI_MakeFillet(prism.Shape())
     for end in (prism.FirstShape(), prism.LastShape()):
@@ -90,7 +90,7 @@ def _rounded(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None
     return shape if BRepCheck_Analyzer(shape).IsValid() else None
 
 
-def _swept(shape: Swept) -> TopoDS_Shape:
+def _swept_solid(shape: Swept) -> TopoDS_Shape:
     points = HArray1_gp_Pnt(1, len(shape.path))
     for number, corner in enumerate(shape.path, 1):
         points.SetValue(number, point_of(*corner))
@@ -102,14 +102,14 @@ def _swept(shape: Swept) -> TopoDS_Shape:
     curve.D1(curve.FirstParameter(), start, along)
     rim = gp_Circ(gp_Ax2(start, gp_Dir(along)), shape.radius * MILLIMETRES)
     path = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge()).Wire()
-    return BRepOffsetAPI_MakePipe(path, _bounded([BRepBuilderAPI_MakeEdge(rim).Edge()])).Shape()
+    return BRepOffsetAPI_MakePipe(path, _disc_within([BRepBuilderAPI_MakeEdge(rim).Edge()])).Shape()
 
 
 def _face(outline: Sequence[Point2], placed: Callable[[float, float], gp_Pnt]) -> TopoDS_Face:
     """Return the plane face within a closed outline; `placed` maps a corner of the outline to its point in space."""
     corners = [corner for corner, following in pairwise([*outline, outline[0]]) if corner != following]
     # Beginning with the last corner closes the outline.
-    return _bounded([_edge([placed(*corner) for corner in piece]) for piece in pieces([corners[-1], *corners])])
+    return _disc_within([_edge([placed(*corner) for corner in piece]) for piece in pieces([corners[-1], *corners])])
 
 
 def _edge(points: Sequence[gp_Pnt]) -> TopoDS_Edge:
@@ -118,7 +118,7 @@ def _edge(points: Sequence[gp_Pnt]) -> TopoDS_Edge:
     return BRepBuilderAPI_MakeEdge(*curve).Edge()
 
 
-def _bounded(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
+def _disc_within(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
     """Return the plane face that edges enclose."""
     rim = BRepBuilderAPI_MakeWire()
     for edge in edges:
@@ -134,7 +134,7 @@ def _within(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shap
         explorer.Next()
 
 
-def _scaled(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
+def _scaled_solid(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
     stretch = gp_GTrsf()
     for axis, factor in enumerate(scale, 1):
         stretch.SetValue(axis, axis, factor)

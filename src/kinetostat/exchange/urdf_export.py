@@ -41,10 +41,10 @@ from kinetostat.validation.pieces import array
 
 TIP = "_tip"
 """End of the name of the last link of a leg; what stands before it is the leg's."""
-OPPOSITE = -1.0
-"""How far the second joint of a parallelogram turns while the first one turns by one."""
+MIMIC_RATIO = -1.0
+"""Turn of the second joint of a parallelogram while the first one turns by one."""
 TOOL = "tool"
-THICKNESS = 0.02
+ROD_RADIUS = 0.02
 """Radius of a link in the picture, as a share of the machine's characteristic length."""
 STROKE = 10.0
 """Limit of a slide from the pose, in machine lengths: URDF requires one and the machine file has none."""
@@ -135,7 +135,7 @@ class _Tree:
         element = SubElement(self.robot, "link", name=name)
         self._links[name] = element, np.zeros(3) if at is None else at
         length = 0.0 if reach is None else float(np.linalg.norm(reach))
-        if reach is not None and length > THICKNESS * self._size:
+        if reach is not None and length > ROD_RADIUS * self._size:
             visual = SubElement(element, "visual")
             tilt = (
                 0.0,
@@ -144,7 +144,7 @@ class _Tree:
             )
             SubElement(visual, "origin", xyz=_n(*(reach / 2.0)), rpy=_n(*tilt))
             geometry = SubElement(visual, "geometry")
-            SubElement(geometry, "cylinder", radius=_n(THICKNESS * self._size), length=_n(length))
+            SubElement(geometry, "cylinder", radius=_n(ROD_RADIUS * self._size), length=_n(length))
 
     def _unique(self, name: str) -> str:
         word = _word(name)
@@ -187,7 +187,7 @@ class _Tree:
             limit = {"lower": _n(-stroke), "upper": _n(stroke), "effort": _n(EFFORT), "velocity": _n(VELOCITY)}
             SubElement(element, "limit", limit)
         if joint.mimics:
-            SubElement(element, "mimic", joint=before, multiplier=_n(OPPOSITE), offset="0")
+            SubElement(element, "mimic", joint=before, multiplier=_n(MIMIC_RATIO), offset="0")
         if joint.extension:
             SubElement(element, "kinetostat", joint.extension)
         if joint.extension.get("actuated"):
@@ -310,7 +310,7 @@ def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iter
         name = (element.part or element.name).replace("actuator", "drive")  # an actuator is named after its joint again
         yield _moving(name, element.joint, after, {"stiffness": stiffness, **role})
     else:
-        yield from _compliant(element.springs, before)
+        yield from _bearings(element.springs, before)
 
 
 def _moving(name: str, joint: Joint, after: Array, extension: dict[str, str]) -> UrdfJoint:
@@ -322,7 +322,7 @@ def _moving(name: str, joint: Joint, after: Array, extension: dict[str, str]) ->
     return UrdfJoint(name, "continuous", array(joint.point), array(joint.axis), extension)
 
 
-def _compliant(springs: Sequence[Spring], before: Array) -> Iterator[UrdfJoint]:
+def _bearings(springs: Sequence[Spring], before: Array) -> Iterator[UrdfJoint]:
     """The springs of one part as a fixed joint with a 6x6 compliance; a spring without stiffness as a free joint."""
     for (part, free), group in groupby(springs, lambda s: (s.part or s.name, s.stiffness == 0.0)):
         part_springs = list(group)

@@ -278,7 +278,7 @@ class _Reader:
         frame = np.eye(4)
         if element is not None:
             frame[:3, 3] = numbers(element.get("xyz", "0 0 0"), 3, f"{where}: xyz")
-            frame[:3, :3] = _turned(*numbers(element.get("rpy", "0 0 0"), 3, f"{where}: rpy"))
+            frame[:3, :3] = _rotation(*numbers(element.get("rpy", "0 0 0"), 3, f"{where}: rpy"))
         return frame
 
 
@@ -298,7 +298,7 @@ def numbers(text: str, count: int, where: str) -> list[float]:
     return result
 
 
-def _turned(roll: float, pitch: float, yaw: float) -> Array:
+def _rotation(roll: float, pitch: float, yaw: float) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll) [3 x 3]."""
     (ca, sa), (cb, sb), (cc, sc) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
     about_x = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
-from kinetostat.exchange.urdf_export import OPPOSITE, TIP
+from kinetostat.exchange.urdf_export import MIMIC_RATIO, TIP
 from kinetostat.exchange.urdf_file import FileJoint, FileLoop, UrdfFile, numbers, read
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.machine.loading import build
@@ -65,7 +65,7 @@ def machine_text(path: Path) -> str:
 
 
 class Bodies:
-    """What weighs something in a file: links that fixed joints hold together are one body.
+    """The heavy bodies of a file: links that fixed joints hold together are one body.
 
     Attributes:
         left: names of the links with a mass that nobody has asked for yet; those of the base do not count.
@@ -237,7 +237,7 @@ def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bod
     at = 0
     while at < len(row):
         where = f'"{origin}": joint {shorten(row[at].name)}'
-        count, table = _next(row[at:], bodies, where)
+        count, table = _first_joint(row[at:], bodies, where)
         tables.append({"name": _name(row[at].name, leg), "point": row[at].frame[:3, 3].tolist(), **table})
         at += count
         weight = bodies.table([row[at - 1].child]) if at < len(row) else {}
@@ -260,8 +260,8 @@ def _name(text: str, leg: str) -> str:
     return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_NAME]
 
 
-def _next(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Document]:
-    """How many of the first joints of a row make one joint of a leg, and the table of that joint."""
+def _first_joint(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Document]:
+    """Number of the first joints of a row that make one joint of a leg, and the table of that joint."""
     first = row[0]
     if len(row) > 1 and row[1].mimics is not None:
         return 2, _parallelogram(first, row[1], where)
@@ -283,7 +283,7 @@ def _next(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Do
 
 
 def _hinges(row: Sequence[FileJoint], bodies: Bodies) -> int:
-    """How many of the first joints are free hinges about one point with independent axes: 1, 2 or 3.
+    """Number of the first joints that are free hinges about one point with independent axes: 1, 2 or 3.
 
     Hinges with something heavy between them stay apart, since a joint of a leg has no bodies inside.
     """
@@ -317,7 +317,7 @@ def _single(joint: FileJoint) -> Document:
 
 def _parallelogram(near: FileJoint, far: FileJoint, where: str) -> Document:
     """Two revolutes of which the second turns back what the first turned."""
-    together = far.mimics == (near.name, OPPOSITE)
+    together = far.mimics == (near.name, MIMIC_RATIO)
     if not together or float(np.linalg.norm(np.cross(near.axis, far.axis))) > INDEPENDENT_AXES:
         raise InputError(
             f"{where} is followed by {shorten(far.name)}; a joint may only mimic the one before it, with the same axis "

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from kinetostat.machine.limits import Limits
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import LEAST, Quantity, table
+from kinetostat.spec.fields import LEAST_OF_KIND, Quantity, table
 
 
 @table
@@ -50,7 +50,7 @@ class Drives:
         float, Quantity("moment of inertia", "of the rotor of each actuator with all that turns with it")
     ] = 0.0
     lead: Annotated[
-        float, Quantity("length", "travel of a linear actuator per turn of its rotor", least=LEAST["length"])
+        float, Quantity("length", "travel of a linear actuator per turn of its rotor", least=LEAST_OF_KIND["length"])
     ] = 0.0
     ratio: Annotated[float, Quantity("ratio", "turns of the rotor per turn of a rotary actuator")] = 0.0
     rotor_damping: Annotated[float, Quantity("torsional damping", "viscous friction that each rotor meets")] = 0.0

@@ -1,1 +1,1 @@
-"""What people write: the vocabulary of machine files, reading, validation and messages. Knows no formula."""
+"""The language of files: the vocabulary of machine files, reading, validation and messages. Knows no formula."""

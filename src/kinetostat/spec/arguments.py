@@ -1,4 +1,4 @@
-"""What Python programs give to public functions: each argument is of the kind that its annotation says, or is refused.
+"""Arguments of public functions in Python: each is of the kind that its annotation says, or is refused.
 
 What an argument means, and whether its value is allowed, is the business of the function.
 """
@@ -25,7 +25,7 @@ CLASSES = {
     "Family": "a Family, as docs/extending.md shows",
     "bool": "True or False",
 }
-"""What to give, by the name of the class in the annotation."""
+"""Words for an argument, by the name of the class in the annotation."""
 WORDS = {
     "machine": "the name of a bundled machine, or the path of a file",
     "settings": 'overrides as texts, e.g. ["pose.x=5 mm"]',
@@ -88,7 +88,7 @@ WORDS = {
     "more": "a whole number from 0",
     "tell": "a function of the steps done, of all steps, and of words on them",
 }
-"""What to give, by the name of the argument, which means the same in every function."""
+"""Words for an argument, by its name, which means the same in every function."""
 ACCEPTED: Mapping[type, tuple[type, ...]] = {Path: (str, PathLike), int: (Integral,), float: (Real,)}
 """Classes that stand for the one that an annotation names."""
 FREE = (Any, object, inspect.Parameter.empty)
@@ -113,7 +113,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         for name, value in bound.arguments.items():
             parameter = signature.parameters[name]
             if parameter.kind is not parameter.VAR_KEYWORD:
-                bound.arguments[name] = _taken(value, parameter)
+                bound.arguments[name] = _read_argument(value, parameter)
         return function(*bound.args, **bound.kwargs)
 
     return call
@@ -129,7 +129,7 @@ def _unbound(name: str, signature: inspect.Signature, named: Mapping[str, Any], 
     return f"{name}: {reason}; {takes}"
 
 
-def _taken(value: Any, parameter: inspect.Parameter) -> Any:
+def _read_argument(value: Any, parameter: inspect.Parameter) -> Any:
     """Return an argument, from a generator or an array as a list, and a number as one of Python's.
 
     Raises:
@@ -137,7 +137,7 @@ def _taken(value: Any, parameter: inspect.Parameter) -> Any:
     """
     kind, name = parameter.annotation, parameter.name
     if any(_is_list(part) for part in _parts(kind)):
-        value = _listed(value)
+        value = _as_list(value)
     misfit = _misfit(value, kind, name)
     if misfit is not None:
         place, wrong = misfit
@@ -146,7 +146,7 @@ def _taken(value: Any, parameter: inspect.Parameter) -> Any:
     return _plain(value)
 
 
-def _listed(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     """Return a generator or an array as a list, lists with plain numbers, and all else as it is."""
     if isinstance(value, tuple):
         return tuple(map(_plain, value))
@@ -168,7 +168,7 @@ def words_of(parameter: inspect.Parameter) -> str:
 
 
 Misfit = tuple[str, object] | None
-"""Where something is not of its kind, and what is there."""
+"""Place of something that is not of its kind, and what stands there."""
 
 
 def _misfit(value: Any, kind: Any, name: str) -> Misfit:

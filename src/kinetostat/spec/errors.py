@@ -1,4 +1,4 @@
-"""What can be wrong with what people give us. Each message is one readable paragraph that says how to mend it."""
+"""Errors in what people give us. Each message is one readable paragraph that says how to mend it."""
 
 import difflib
 import re

@@ -17,17 +17,17 @@ from pydantic_core import PydanticCustomError, core_schema
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written
 
-LARGEST = {"length": 1e6, "angle": 1e3}
+LARGEST_OF_KIND = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
 LARGEST_OTHER = 1e20
 """The bound of every other kind."""
-LEAST = {"length": 1e-12, "angle": 1e-12, "area": 1e-24, "second moment of area": 1e-48, "elastic modulus": 1.0}
+LEAST_OF_KIND = {"length": 1e-12, "angle": 1e-12, "area": 1e-24, "second moment of area": 1e-48, "elastic modulus": 1.0}
 """Least values of what must be greater than 0, in SI: less than an atom, softer than a gel."""
-SOFTEST = 1e-12
+LEAST_STIFFNESS = 1e-12
 """Least stiffness and rigidity but 0, in SI: far below a strand of protein, where machines are not."""
 
 NO_LIMIT = "none"
-"""How people write that a limit is not set."""
+"""The word for a limit that is not set."""
 
 Table = TypeVar("Table")
 
@@ -42,7 +42,7 @@ def table(cls: type[Table]) -> type[Table]:
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a field holds: annotate `float` with it, or a tuple of floats where `count` is given.
+    """The content of a field: annotate `float` with it, or a tuple of floats where `count` is given.
 
     Attributes:
         kind: a key of `units.KINDS`.
@@ -73,7 +73,7 @@ class Quantity:
 
     @property
     def entries(self) -> str:
-        """How several values are written, for people."""
+        """A list of several values as people write it."""
         return f'a list of {self.count}, each such as "{KINDS[self.kind].example}"'
 
     def read(self, value: object) -> float | tuple[float, ...]:
@@ -139,11 +139,12 @@ class Quantity:
         if number > self.most:
             most = f"{math.degrees(self.most):g} deg" if self.kind == "angle" else f"{self.most:g} {kind.unit}"
             raise UnitError(f"it must not exceed {most}, {example}")
-        least = self.least or (SOFTEST if self.stiff else LEAST.get(self.kind, 0.0) if self.positive else 0.0)
+        of_kind = LEAST_OF_KIND.get(self.kind, 0.0) if self.positive else 0.0
+        least = self.least or (LEAST_STIFFNESS if self.stiff else of_kind)
         if 0.0 < abs(number) < least:
             softest = f"; write 0 for a free element, or {example}" if self.stiff else f", {example}"
             raise UnitError(f"it must be at least {least:g} {kind.unit}, and nothing is below that{softest}")
-        largest = LARGEST.get(self.kind, LARGEST_OTHER)
+        largest = LARGEST_OF_KIND.get(self.kind, LARGEST_OTHER)
         if abs(number) > largest and not math.isinf(number):
             advice = f'; write "{RIGID}"' if self.stiff else ""
             raise UnitError(f"it must not exceed {largest:g} {kind.unit}{advice}")

@@ -12,7 +12,7 @@ V = TypeVar("V")
 
 
 class _Fixed:
-    """What fixed lists and dictionaries share: they refuse every change, and can be pickled and hashed."""
+    """The common part of fixed lists and dictionaries: they refuse every change, and can be pickled and hashed."""
 
     _plain: type
 
@@ -26,7 +26,7 @@ class _Fixed:
     append = extend = insert = remove = reverse = sort = _refuse
 
     def __hash__(self) -> int:
-        return _hashed(self)
+        return _hash_of(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._plain(self),)
@@ -59,7 +59,7 @@ class Immutable:
         return same(self, other) if type(self) is type(other) else NotImplemented
 
     def __hash__(self) -> int:
-        return _hashed(self)
+        return _hash_of(self)
 
 
 def fixed(value: Any) -> Any:
@@ -90,7 +90,7 @@ def same(a: Any, b: Any) -> bool:
     if hasattr(a, "identical"):
         return bool(a.identical(b))
     if _by_fields(a) and type(a) is type(b):
-        return all(same(getattr(a, name), getattr(b, name)) for name in _compared(a))
+        return all(same(getattr(a, name), getattr(b, name)) for name in _fields_compared(a))
     return bool(a == b or (a != a and b != b))
 
 
@@ -99,18 +99,18 @@ def _by_fields(value: Any) -> bool:
     return isinstance(value, Immutable) or (is_dataclass(value) and value.__dataclass_params__.eq)  # type: ignore[union-attr]
 
 
-def _compared(value: Any) -> list[str]:
+def _fields_compared(value: Any) -> list[str]:
     return [field.name for field in fields(value) if field.compare]
 
 
-def _hashed(value: Any) -> int:
+def _hash_of(value: Any) -> int:
     """Return a hash that is equal where `same` says so; 0 of what cannot be hashed."""
     if isinstance(value, dict):
-        return hash(frozenset((key, _hashed(entry)) for key, entry in value.items()))
+        return hash(frozenset((key, _hash_of(entry)) for key, entry in value.items()))
     if isinstance(value, list | tuple):
-        return hash(tuple(_hashed(entry) for entry in value))
+        return hash(tuple(_hash_of(entry) for entry in value))
     if _by_fields(value):
-        return hash((type(value), *(_hashed(getattr(value, name)) for name in _compared(value))))
+        return hash((type(value), *(_hash_of(getattr(value, name)) for name in _fields_compared(value))))
     try:
         return hash(value) if value == value else 0  # NaN has a hash of its own
     except (TypeError, ValueError):  # arrays can be neither hashed nor asked as a whole

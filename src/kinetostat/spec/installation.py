@@ -25,7 +25,7 @@ def command() -> str:
     known = shutil.which(PACKAGE, path=_path_of_shell())
     if known and Path(known).resolve() == script.resolve():
         return PACKAGE
-    return _shown(script) if shutil.which(script) else f"{_python()} -m {PACKAGE}"
+    return _local(script) if shutil.which(script) else f"{_python()} -m {PACKAGE}"
 
 
 def as_typed(text: str) -> str:
@@ -37,17 +37,17 @@ def as_typed(text: str) -> str:
 def adding(extra: str) -> str:
     """Return the command that installs what an extra needs, for example "studio"."""
     clone = _clone_of_uv()
-    return f"{clone} --extra {extra}" if clone else installing(_needed(extra))
+    return f"{clone} --extra {extra}" if clone else installing(_requirements_of(extra))
 
 
 def starting(extra: str, words: str) -> str:
     """Return one command that starts `kinetostat` with these words, and installs an extra before if it must."""
-    if all(_is_installed(requirement) for requirement in _needed(extra)):
+    if all(_is_installed(requirement) for requirement in _requirements_of(extra)):
         return f"{command()} {words}"
     clone = _clone_of_uv()
     if clone:
         return f"{clone.replace('sync --inexact', 'run')} --extra {extra} {PACKAGE} {words}"
-    return f"{installing(_needed(extra))} && {command()} {words}"
+    return f"{installing(_requirements_of(extra))} && {command()} {words}"
 
 
 def installing(packages: Iterable[str], again: bool = False) -> str:
@@ -82,10 +82,10 @@ def _uv() -> str | None:
     root = source_tree()
     beside = [root / ".uv" / "bin" / "uv"] if root else []
     path = next((str(uv) for uv in beside if uv.exists()), None) or os.environ.get("UV") or shutil.which("uv")
-    return _shown(Path(path)) if path and shutil.which(path) else None
+    return _local(Path(path)) if path and shutil.which(path) else None
 
 
-def _needed(extra: str) -> list[str]:
+def _requirements_of(extra: str) -> list[str]:
     """Return the requirements of an extra, such as "nicegui>=3.18"; without metadata, kinetostat with its extra."""
     from importlib.metadata import PackageNotFoundError, requires
 
@@ -126,7 +126,7 @@ def _place() -> str:
 
 def _python() -> str:
     python = shutil.which("python", path=_path_of_shell())
-    return "python" if python and Path(python).parent == Path(sys.executable).parent else _shown(Path(sys.executable))
+    return "python" if python and Path(python).parent == Path(sys.executable).parent else _local(Path(sys.executable))
 
 
 def _path_of_shell() -> str:
@@ -138,7 +138,7 @@ def _path_of_shell() -> str:
     return os.pathsep.join(folders)
 
 
-def _shown(path: Path) -> str:
+def _local(path: Path) -> str:
     """Return a path from the present folder where it leads downwards, else the whole path."""
     here = Path.cwd()
     return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))

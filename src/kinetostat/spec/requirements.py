@@ -16,7 +16,7 @@ MOST_LISTED = 10_000
 
 
 class Requirement(BaseModel):
-    """What must hold, and where: at the pose of the file unless `over` or `poses` is given."""
+    """Conditions that must hold, and where: at the pose of the file unless `over` or `poses` is given."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 

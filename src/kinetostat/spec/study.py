@@ -188,11 +188,11 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
     if mistake["type"] == "missing":
         return f"{name} is missing ({_field(path)}); `kinetostat new study` prints a complete file."
     if mistake["type"] == "extra_forbidden":
-        known = _allowed(path[:-1])
+        known = _keys_at(path[:-1])
         near = difflib.get_close_matches(path[-1], known, 1)
         return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(known)}.")
     if mistake["type"] in ("model_type", "model_attributes_type"):
-        return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_allowed(path))}."
+        return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_keys_at(path))}."
     if mistake["type"] == "string_pattern_mismatch":
         return f"{name} is {shorten(value)}; it must be text that can be printed, without control characters."
     message = str(mistake["msg"]).removeprefix("Input ")
@@ -227,7 +227,7 @@ def _model(path: Sequence[str]) -> type[BaseModel] | None:
     return tables.get(path[0]) if len(path) == depth else None
 
 
-def _allowed(path: Sequence[str]) -> list[str]:
+def _keys_at(path: Sequence[str]) -> list[str]:
     model = _model(path)
     return [field.alias or name for name, field in model.model_fields.items()] if model else []
 

@@ -66,7 +66,7 @@ def within_grade(grade: int, size: float) -> float:
 
 
 def within_class(name: str, size: float, kind: str) -> float:
-    """How far a length (m) or an angle (rad) of a class of ISO 2768-1 may be from its nominal value either way.
+    """Limit of a class of ISO 2768-1: how far a length (m) or an angle (rad) may be from its nominal value either way.
 
     Args:
         name: "f", "m", "c" or "v".

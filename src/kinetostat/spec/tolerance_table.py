@@ -18,15 +18,15 @@ TABLE = "tolerances"
 MOST_LINES = 200
 MOST_VALUES = 3
 """Values of a line: one for each kind of number."""
-LONGEST = 120
+LINE_WIDTH = 120
 """Characters of a name or a value."""
 SIGMAS = 3.0
 """Standard deviations that a plus-minus stands for, where a number is normally distributed."""
 UNIFORM, NORMAL = "uniform", "normal"
-LARGEST = {"length": 1.0, "angle": 0.5, "ratio": 0.5}
+LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "ratio": 0.5}
 """The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
 COSTS = (1e-6, 1e6)
-KEYS = ("tolerance", "cost")
+LINE_KEYS = ("tolerance", "cost")
 HOW = (
     'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '
     '0.02 mm" (a standard deviation), "0.05 mm normal" (three of them), "IT7 at 300 mm" or "ISO 2768-m at 300 mm" '
@@ -40,7 +40,7 @@ _CLASS = re.compile(r"(?:ISO\s*)?2768\s*-?\s*([fmcv])[HKL]?", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a number may be from its nominal value.
+    """The greatest distance of a number from its nominal value.
 
     Attributes:
         text: the text as it was written.
@@ -106,7 +106,7 @@ class Tolerance:
         return ", ".join(deviation.text for deviation in self.deviations)
 
     def of(self, kind: str) -> Deviation | None:
-        """What it says about numbers of a kind; None if nothing."""
+        """The deviation of numbers of a kind; None if it says nothing about them."""
         return next((deviation for deviation in self.deviations if deviation.fits(kind)), None)
 
 
@@ -169,24 +169,24 @@ def _lines(table: Mapping[Any, Any], before: str = "") -> Iterator[tuple[str, An
     """The lines of a table, and of tables in it: `geometry.base_radius` need not stand in quotes."""
     for key, value in table.items():
         about = f"{before}{key}"
-        if isinstance(value, Mapping) and not {*KEYS} & value.keys():
+        if isinstance(value, Mapping) and not {*LINE_KEYS} & value.keys():
             yield from _lines(value, f"{about}.")
         else:
             yield about, value
 
 
 def _tolerance(about: str, value: object, place: str) -> Tolerance:
-    if not about.strip() or len(about) > LONGEST or not re.match(PRINTABLE, about):
-        raise InputError(f"{shorten(place)} cannot be looked up; give a group or a path, at most {LONGEST} letters.")
+    if not about.strip() or len(about) > LINE_WIDTH or not re.match(PRINTABLE, about):
+        raise InputError(f"{shorten(place)} cannot be looked up; give a group or a path, at most {LINE_WIDTH} letters.")
     table = value if isinstance(value, Mapping) else {"tolerance": value}
-    if unknown := [key for key in table if key not in KEYS]:
-        raise InputError(f"{place} has no field {shorten(unknown[0])}; it may have {' and '.join(KEYS)}.")
+    if unknown := [key for key in table if key not in LINE_KEYS]:
+        raise InputError(f"{place} has no field {shorten(unknown[0])}; it may have {' and '.join(LINE_KEYS)}.")
     entries = table.get("tolerance")
     texts = entries if isinstance(entries, list | tuple) else [entries]
     if not 0 < len(texts) <= MOST_VALUES:
         raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_VALUES}: {HOW}.")
     deviations = tuple(_deviation(text, place) for text in texts)
-    for kind in LARGEST:
+    for kind in LARGEST_TOLERANCE:
         if sum(deviation.fits(kind) for deviation in deviations) > 1:
             raise InputError(f"{place} has two tolerances of the kind {kind} ({shorten(entries)}); give one of them.")
     cost = table.get("cost", 1.0)
@@ -197,7 +197,7 @@ def _tolerance(about: str, value: object, place: str) -> Tolerance:
 
 def _deviation(written: object, place: str) -> Deviation:
     """Read one value: a plus-minus, a standard deviation, or a class of a standard."""
-    if not isinstance(written, str) or len(written) > LONGEST:
+    if not isinstance(written, str) or len(written) > LINE_WIDTH:
         raise InputError(f"{place} is {shorten(written)}; a tolerance is a text with a unit or a class: {HOW}.")
     text = " ".join(written.split())
     words, spread = text, UNIFORM
@@ -231,7 +231,7 @@ def _size(text: str, place: str) -> float:
 
 def _amount(text: str, written: object, place: str) -> tuple[str, float]:
     """The kind and the SI value of a number with its unit, whose unit alone says the kind."""
-    for kind, largest in LARGEST.items():
+    for kind, largest in LARGEST_TOLERANCE.items():
         try:
             value = parse(text, kind) if re.search(r"[^\d\s.eE+-]", text) else math.nan
         except UnitError:

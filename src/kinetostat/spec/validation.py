@@ -95,7 +95,7 @@ def tables_in(data: BaseModel, tables: Mapping[str, type]) -> dict[str, Any]:
 
 
 def _entries(model: BaseModel) -> dict[str, Any]:
-    """What a model holds, under the names that files have for it."""
+    """The content of a model, under the names that files have for it."""
     return {field.alias or name: getattr(model, name) for name, field in type(model).model_fields.items()}
 
 
@@ -140,7 +140,7 @@ def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, 
 
 
 def _tables_in(within: str, tables: Mapping[str, type]) -> list[str]:
-    """What a table of tables may hold."""
+    """Names of the tables that a table of tables may hold."""
     start = f"{within}." if within else ""
     names = [path.removeprefix(start).partition(".")[0] for path in tables if path.startswith(start)]
     return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *names]))

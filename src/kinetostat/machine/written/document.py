@@ -40,7 +40,7 @@ from kinetostat.machine.written.struts import AXIAL, check_strut
 from kinetostat.machine.written.tables import WEIGHT
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
-from kinetostat.spec.fields import LARGEST_OTHER, SOFTEST
+from kinetostat.spec.fields import LARGEST_OTHER, LEAST_STIFFNESS
 
 MOST_LEGS, MOST_JOINTS = 24, 24
 """Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
@@ -380,11 +380,11 @@ def _matrix(value: object, where: str) -> Matrix:
             "six rows of six."
         )
     matrix = np.array(value, dtype=float)
-    soft = [float(c) for c in np.diag(matrix) if c > 0.0 and not 1.0 / LARGEST_OTHER <= c <= 1.0 / SOFTEST]
+    soft = [float(c) for c in np.diag(matrix) if c > 0.0 and not 1.0 / LARGEST_OTHER <= c <= 1.0 / LEAST_STIFFNESS]
     if soft:
         raise InputError(
             f"{where}: compliance has {soft[0]:g} on its diagonal; give 0 where it is rigid, and elsewhere from "
-            f"{1.0 / LARGEST_OTHER:g} to {1.0 / SOFTEST:g} in SI units; what is free is a joint."
+            f"{1.0 / LARGEST_OTHER:g} to {1.0 / LEAST_STIFFNESS:g} in SI units; what is free is a joint."
         )
     size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
     scaled = matrix / np.where(size > 0.0, size, 1.0)
