@@ -8,9 +8,11 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison import as_json, compare, read_design
+from kinetostat.studies.comparison import compare, read_design
 from kinetostat.studies.grid import evaluate_grid
+from kinetostat.views.comparison import COMPARISON
 from kinetostat.views.comparison_figure import comparison_figure
+from kinetostat.views.data_forms import json_of
 
 PAPER = "zhang-gosselin-4dof"
 BEST = (
@@ -21,7 +23,7 @@ STIFF = ["stiffness.passive_links=1e10 N*m/rad"]
 
 
 def rows(*designs, settings=(), ranges=()):
-    found = as_json(compare([read_design(text, settings) for text in designs], ranges))
+    found = json_of(COMPARISON, compare([read_design(text, settings) for text in designs], ranges))
     return found, {row["name"]: row for row in found["rows"]}
 
 

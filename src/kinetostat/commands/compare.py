@@ -21,7 +21,6 @@ from kinetostat.commands.common import (
     takes_ranges,
     takes_settings,
     takes_units,
-    write_figures,
 )
 
 if TYPE_CHECKING:
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
     from kinetostat.commands.common import Commands
     from kinetostat.machine.machine import Machine
-    from kinetostat.studies.comparison import Comparison
 
 
 def add_compare_commands(commands: "Commands") -> None:
@@ -85,26 +83,13 @@ def add_compare_commands(commands: "Commands") -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from kinetostat.studies.comparison import as_json, compare, read_design
-    from kinetostat.views.comparison_tables import print_comparison
+    from kinetostat.studies.comparison import compare, read_design
 
     shown = [f"display.units={options.units}"] if options.units else []
     designs = [read_design(text, [*options.settings, *shown]) for text in options.designs]
     with progress_bar("computing") as progress:
         result = compare(designs, options.ranges, progress)
-    written = _write(options, result) if options.output else []
-    answered = all(design.answered for design in designs)
-    return give(options, answered, lambda: as_json(result), lambda console: print_comparison(console, result), written)
-
-
-def _write(options: argparse.Namespace, result: "Comparison") -> list[Path]:
-    from kinetostat.studies.comparison import as_json
-    from kinetostat.studies.storage import write_json
-    from kinetostat.views.comparison_figure import comparison_figure
-
-    written = [options.output / "compare.json"]
-    write_json(written[0], as_json(result))
-    return written + write_figures(options, {"compare": lambda: comparison_figure(result)})
+    return show_answer(options, result)
 
 
 def _validate(options: argparse.Namespace) -> int:

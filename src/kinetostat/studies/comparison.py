@@ -9,13 +9,12 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.display import Display
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
@@ -31,7 +30,6 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.grid import evaluate_grid
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import EQUAL_DESIGNS
 
 if TYPE_CHECKING:
@@ -169,9 +167,9 @@ class Comparison(Immutable):
         return pd.DataFrame(rows, columns=["group", "number", "unit", *names]).set_index(["group", "number"])
 
     @property
-    def display(self) -> Display:
-        """Units in which all designs are shown: those of the first."""
-        return self.designs[0].machine.display
+    def machine(self) -> Machine:
+        """The first design, with which the others are compared, and in whose units all are shown."""
+        return self.designs[0].machine
 
     def __repr__(self) -> str:
         return f"<Comparison of {', '.join(design.label for design in self.designs)}>"
@@ -368,50 +366,3 @@ def _spread(name: str, row: Array) -> tuple[float, ...]:
     if name == "singularity_margin":
         return float(row.min()), float(np.percentile(row, 100.0 - PERCENTILE)), float(row.mean())
     return float(row.max()), float(np.percentile(row, PERCENTILE)), float(row.mean())
-
-
-def as_json(comparison: Comparison) -> dict[str, Any]:
-    """The designs, the fields in which they differ, and every number of each, as plain data."""
-    grid = {
-        "over": comparison.ranges,
-        "designs": [{"answered": answered, "poses": poses} for answered, poses in comparison.poses],
-        "rows": [_row_json(row) for row in comparison.over],
-    }
-    return as_answer(
-        {
-            "designs": [
-                {
-                    "design": design.label,
-                    "name": design.machine.name,
-                    "family": design.machine.family.name,
-                    "components": design.analysis.components,
-                    "status": design.analysis.status.word,
-                    "message": design.analysis.message,
-                    "softest": [
-                        {"direction": direction.direction, "shares": dict(direction.shares)} for direction in softest
-                    ],
-                }
-                for design, softest in zip(comparison.designs, comparison.softest, strict=True)
-            ],
-            "differences": {
-                field.path: [
-                    row if parameter else None for parameter, row in zip(field.parameters, field.values, strict=True)
-                ]
-                for field in comparison.differences
-            },
-            "rows": [_row_json(row) for row in comparison.rows],
-            "grid": grid if comparison.ranges else None,
-        }
-    )
-
-
-def _row_json(row: DesignRow) -> dict[str, Any]:
-    return {
-        "group": row.group,
-        "name": row.name,
-        "units": row.unit,
-        "better": row.better,
-        "values": row.values,
-        "percent": row.percents,
-        "best": row.best,
-    }

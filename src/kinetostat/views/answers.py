@@ -128,12 +128,7 @@ KINDS = (
         description="views.budget.BUDGET",
     ),
     Kind("studies.budget.budget.PossibleErrors", description="views.budget.POSSIBLE_ERRORS"),
-    Kind(
-        "studies.comparison.Comparison",
-        "views.comparison_tables.print_comparison",
-        "views.comparison_figure.comparison_figures",
-        "studies.comparison.as_json",
-    ),
+    Kind("studies.comparison.Comparison", description="views.comparison.COMPARISON"),
     Kind("studies.measured.comparison.MeasuredComparison", description="views.measured.MEASURED_STIFFNESS"),
     Kind(
         "studies.optimisation.result.Result",

@@ -14,15 +14,16 @@ from matplotlib.patches import Patch
 from kinetostat.display import Display
 from kinetostat.studies.comparison import Comparison, DesignRow
 from kinetostat.studies.setting import frame_of
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.question import Drawing
 
 WIDE = 30.0
 """An axis is logarithmic if the largest bar exceeds the least by more than this factor."""
-LONGEST = 100
+LONGEST_DESIGN_NAME = 100
 """Greatest number of characters of a design's name in the legend."""
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
+def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}") -> Figure:
     """Draw the compliance, singularity margin and mass of each design; over a grid, bars are means and dots the worst.
 
     Bars start at 0. If the numbers of a panel differ too much for that, its axis is logarithmic, and marks take the
@@ -37,21 +38,21 @@ def comparison_figure(comparison: Comparison) -> Figure:
         figure = Figure(figsize=(sum(widths) + 0.6 * len(panels) + 0.6, height), layout="constrained")
         axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=widths).flat
         for panel, (title, bars) in zip(axes, panels, strict=True):
-            _bars(panel, title, bars, len(comparison.designs), comparison.display)
+            _bars(panel, title, bars, len(comparison.designs), comparison.machine.display)
         styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
         handles = [
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
             for i, (letter, design) in enumerate(styles)
         ]
         frames = dict.fromkeys(frame_of(design.machine) for design in comparison.designs)
-        title = f"compliance in {' or '.join(frames)}"
-        figure.legend(handles=handles, loc="outside lower left", title=title, title_fontsize=6.5, alignment="left")
+        legend = f"compliance in {' or '.join(frames)}"
+        figure.legend(handles=handles, loc="outside lower left", title=legend, title_fontsize=6.5, alignment="left")
         over = (
             f"mean (bars) and worst (dots) over {', '.join(comparison.ranges)}"
             if grid
             else "at the pose of each design"
         )
-        set_title(figure, f"Designs compared, {over}")
+        set_title(figure, title.format(over))
         fix_layout(figure)
     return figure
 
@@ -131,9 +132,10 @@ def _colour(i: int) -> str:
 
 
 def _short(label: str) -> str:
-    return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"
+    return label if len(label) <= LONGEST_DESIGN_NAME else f"{label[: LONGEST_DESIGN_NAME - 1]}…"
 
 
-def comparison_figures(comparison: Comparison) -> Drawings:
+def comparison_figures(comparison: Comparison) -> dict[str, Drawing]:
     """Return designs side by side as the one figure that they have."""
-    return {"comparison": partial(comparison_figure, comparison)}
+    caption = "Compliance, singularity margin and mass of each design."
+    return {"comparison": Drawing(caption, partial(comparison_figure, comparison), file="compare")}

@@ -65,7 +65,7 @@ def _gain(row: DesignRow, k: int) -> float | None:
 
 def _rows(comparison: Comparison, letters: str) -> str:
     head = "".join(f'<th scope="col">{letter}</th>' for letter in letters)
-    body = "".join(_row(row, comparison.display) for row in comparison.rows)
+    body = "".join(_row(row, comparison.machine.display) for row in comparison.rows)
     caption = "<caption>At the pose of each design</caption>"
     return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
 
@@ -94,7 +94,10 @@ def _differences(comparison: Comparison, letters: str) -> str:
     for difference in comparison.differences:
         pairs = zip(difference.values, difference.parameters, strict=True)
         rows.append(
-            [difference.path, *(readable(values, p.quantity, comparison.display) if p else DASH for values, p in pairs)]
+            [
+                difference.path,
+                *(readable(values, p.quantity, comparison.machine.display) if p else DASH for values, p in pairs),
+            ]
         )
     families = [design.machine.family.name for design in comparison.designs]
     if len(set(families)) > 1:

@@ -1,0 +1,182 @@
+"""Designs side by side: the description of the answer of `compare`. Nothing is computed here but rounding."""
+
+import string
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rich.text import Text
+
+from kinetostat.display import Display
+from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Description, Field, Lines
+from kinetostat.views.tables import numeric_table, readable, text_table
+
+MOST_SHARES = 3
+NO_FIELD = "–"
+"""Shown for a design that has no such field."""
+
+
+def letters_of(comparison: Comparison) -> str:
+    """The letters by which designs are called: A for the first."""
+    return string.ascii_uppercase[: len(comparison.designs)]
+
+
+def _lines(comparison: Comparison) -> Lines:
+    letters = letters_of(comparison)
+    for letter, design in zip(letters, comparison.designs, strict=True):
+        why = "" if design.answered else f": {design.analysis.message}"
+        yield letter, f"{design.label}  {design.machine.name}{why}"
+    yield "Percent", "Percentages are changes against A; the best value of each row is bold."
+    if not _differing(comparison):
+        yield "Files", "The files have equal values."
+    if len(_families(comparison)) > 1:
+        yield "Files", "Fields that only one design has are omitted."
+    if comparison.ranges:
+        counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, comparison.poses, strict=True))
+        yield "Poses", f"Poses with a result: {counts}."
+
+
+def _families(comparison: Comparison) -> set[str]:
+    return {design.machine.family.name for design in comparison.designs}
+
+
+def _differing(comparison: Comparison) -> dict[str, list[str]]:
+    """What the designs say of each field of which they do not say the same, by its path."""
+    families = [design.machine.family.name for design in comparison.designs]
+    rows = {"family": families} if len(set(families)) > 1 else {}
+    for difference in comparison.differences:
+        pairs = zip(difference.parameters, difference.values, strict=True)
+        rows[difference.path] = [
+            readable(row, parameter.quantity, comparison.machine.display) if parameter else NO_FIELD
+            for parameter, row in pairs
+        ]
+    return rows
+
+
+def _tables(comparison: Comparison, _full: bool) -> Iterator[FittedTable]:
+    letters, display = letters_of(comparison), comparison.machine.display
+    if rows := _differing(comparison):
+        table = text_table("Where the files differ", "field", *letters)
+        for path, cells in rows.items():
+            table.add_row(path, *cells)
+        yield table
+    yield _row_table("At the pose of each design", letters, comparison.rows, display)
+    if any(comparison.softest):
+        yield _softest_table(comparison)
+    if comparison.ranges:
+        yield _row_table(f"Over {', '.join(comparison.ranges)}", letters, comparison.over, display, by_group=True)
+
+
+def _row_table(
+    title: str, letters: str, rows: Sequence[DesignRow], display: Display, by_group: bool = False
+) -> FittedTable:
+    table = numeric_table(title, "", list(letters))
+    group = rows[0].group if rows else ""
+    for row in rows:
+        if row.group != group:
+            table.add_section()
+            group = row.group
+        unit = "" if row.unit == "1" else f" {display.scale(row.unit).unit}"
+        name = f"{row.group} {row.name}" if by_group else row.name
+        table.add_row(f"{name}{unit}", *(_cell(row, i, display) for i in range(len(letters))))
+    return table
+
+
+def _cell(row: DesignRow, i: int, display: Display) -> Text:
+    """Return a value and its change against the first design; green where it is better."""
+    endless = "rigid" if row.better is Better.MORE else "free"
+    value, percent = display.number(row.values[i], row.unit, endless), row.percents[i]
+    shown = Text(value, "bold" if i in row.best else "")
+    if i == 0 or percent is None:
+        return Text.assemble(shown, "" if i == 0 else " " * 9)
+    better = (percent < 0.0) == (row.better is Better.LESS)
+    colour = "default" if abs(percent) < 0.05 else "green" if better else "red"
+    return Text.assemble(shown, (f" {_percent(percent):>8}", colour))
+
+
+def _percent(percent: float) -> str:
+    if abs(percent) < 0.05:
+        return "="
+    return f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
+
+
+def _softest_table(comparison: Comparison) -> FittedTable:
+    table = text_table("Largest contributions in the softest directions", "", "rotation", "translation")
+    for letter, softest in zip(letters_of(comparison), comparison.softest, strict=True):
+        turning = next((contribution for contribution in softest if contribution.direction.startswith("r")), None)
+        sliding = next((contribution for contribution in softest if not contribution.direction.startswith("r")), None)
+        table.add_row(letter, _contributions(turning), _contributions(sliding))
+    return table
+
+
+def _contributions(attribution: SoftDirection | None) -> str:
+    if attribution is None:
+        return "–"
+    parts = [f"{name} {100 * share:.0f} %" for name, share in attribution.shares[:MOST_SHARES] if share >= 0.005]
+    return f"{attribution.direction}: {', '.join(parts)}"
+
+
+def _designs(comparison: Comparison) -> list[dict[str, Any]]:
+    return [
+        {
+            "design": design.label,
+            "name": design.machine.name,
+            "family": design.machine.family.name,
+            "components": design.analysis.components,
+            "status": design.analysis.status.word,
+            "message": design.analysis.message,
+            "softest": [{"direction": part.direction, "shares": dict(part.shares)} for part in softest],
+        }
+        for design, softest in zip(comparison.designs, comparison.softest, strict=True)
+    ]
+
+
+def _differences(comparison: Comparison) -> dict[str, list[Any]]:
+    return {
+        field.path: [row if parameter else None for parameter, row in zip(field.parameters, field.values, strict=True)]
+        for field in comparison.differences
+    }
+
+
+def _numbers(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
+    return [
+        {
+            "group": row.group,
+            "name": row.name,
+            "units": row.unit,
+            "better": row.better,
+            "values": row.values,
+            "percent": row.percents,
+            "best": row.best,
+        }
+        for row in rows
+    ]
+
+
+def _grid(comparison: Comparison) -> dict[str, Any] | None:
+    if not comparison.ranges:
+        return None
+    return {
+        "over": comparison.ranges,
+        "designs": [{"answered": answered, "poses": poses} for answered, poses in comparison.poses],
+        "rows": _numbers(comparison.over),
+    }
+
+
+COMPARISON = Description(
+    type="studies.comparison.Comparison",
+    title="Designs side by side",
+    fields=(
+        Field("designs", _designs),
+        Field("differences", _differences),
+        Field("rows", lambda comparison: _numbers(comparison.rows)),
+        Field("grid", _grid),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.comparison_figure.comparison_figures",
+    state=lambda _comparison: "and what it is compared with",
+    answered=lambda comparison: all(design.answered for design in comparison.designs),
+    files={"compare.json": "json"},
+)
