@@ -42,6 +42,14 @@ MARKERS = {
         "test_struts",
     ),
     "reports": ("test_report",),
+    "folders": (
+        "test_damaged_folders",
+        "test_earlier_folders",
+        "test_optimize_command",
+        "test_stopped_early",
+        "test_uploads",
+        "test_written_files",
+    ),
     "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
 """Files of tests that plain `pytest` leaves out, because they take long; `-m slow` runs them. A single test of
