@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
-from kinetostat.kinematics.chain import Chain
+from kinetostat.kinematics.chain import Chain, bar_turns
 from kinetostat.machine.actuators import actuators_of, joint_actuators, senses_of
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
@@ -124,9 +124,9 @@ class LegRow:
     def add_bars(self, name: str, bars: Parallelogram) -> None:
         """Add a parallelogram: a turn about its near side and a turn back about its far one, m of arc."""
         first, coordinate = len(self.twists), self._coordinate(True)
-        rate = 1.0 / float((bars.far - bars.near).norm())
-        self._move(Joint(bars.normal, bars.near), coordinate, rate)
-        self._move(Joint(bars.normal, bars.far), coordinate, -rate)
+        near, far, rate = bar_turns(bars)
+        self._move(near, coordinate, rate)
+        self._move(far, coordinate, -rate)
         self.units.append(Unit(name, "parallelogram", first, first + 2, bars.near, (bars.normal,), None, bars))
 
     def _coordinate(self, slides: bool) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.kinematics.chain import Chain
+from kinetostat.kinematics.chain import Chain, bar_turns
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
@@ -314,8 +314,8 @@ class _Row:
 
     def _parallelogram(self, bars: Parallelogram, number: int) -> None:
         """Turn about the near side and back about the far one; in between, the bars grow."""
-        rate = self.units.length * (1.0 / (bars.far - bars.near).norm())
-        near, far = (Joint(bars.normal, point) for point in (bars.near, bars.far))
+        near, far, turn = bar_turns(bars)
+        rate = self.units.length * turn
         coordinate = self._coordinate(None)
         self._move(self.units.twist(near, rate), coordinate)
         self.grow(number)

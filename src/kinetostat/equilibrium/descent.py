@@ -30,15 +30,15 @@ from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 
 MOST_DESCENT_STEPS = 200
-"""Of a descent: nine in ten end within 30, and a machine that falls has then fallen by 40 of its lengths."""
+"""Number of steps of a descent: nine in ten end within 30; a machine that falls has then fallen by 40 lengths."""
 LARGEST_RADIUS = 0.2
 """Radius of the trust region at most, rad and in units of the machine's length."""
 MOST_CLOSINGS = 6
 """Corrections that close the legs after a step: where they need more, the step is too long."""
 BISECTIONS = 50
-"""Of the shift of the stiffness with which a step is as long as the radius."""
+"""Number of halvings of the shift of the stiffness with which a step is as long as the radius."""
 MOST_SWITCHES = 8
-"""Of one-sided springs between carrying and slack within a step."""
+"""Number of switches of one-sided springs between carrying and slack within a step."""
 LEAST_SHARE, GOOD_SHARE = 0.1, 0.75
 """Share of the foreseen fall of the potential from which a step is taken, and from which the radius may grow."""
 

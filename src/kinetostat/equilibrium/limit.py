@@ -20,11 +20,12 @@ STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
 where the machine may stand under all."""
 MOST_LOAD_STEPS = 14
-"""Of the loads: a machine that moves very far before it is lost is not followed to the end, which takes seconds."""
+"""Number of steps of the loads: a machine that moves very far before it is lost is not followed to its end, which takes
+seconds."""
 ACCURACY_OF_SHARE = 1e-3
 """Relative accuracy of the load factor."""
 MOST_STEPS_BETWEEN_LOADS = 8
-"""Of Newton's method in a step: where it needs more, the step is too long."""
+"""Number of Newton's steps in a step of the loads: where it needs more, the step is too long."""
 MISSED_BY_TANGENTS = 0.5
 """Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
 has snapped over, or the step is too long."""

@@ -19,11 +19,11 @@ from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import AT_REST
 
 MOST_STEPS_OF_LOAD = 25
-"""Of Newton's method for one step of the load."""
+"""Number of Newton's steps for one step of the load."""
 LONGEST_STEP = 0.2
 """Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
 LOAD_STEPS = (1, 8, 64)
-"""In how many steps the load is applied: in one, and in more where that does not converge and no spring goes slack."""
+"""Numbers of steps of the load: one, and more where that does not converge and no spring goes slack."""
 
 
 class Rest(IntEnum):

@@ -13,7 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.arrays import Array, Integers
+from kinetostat.machine.leg import Joint
+from kinetostat.machine.link import Parallelogram
 from kinetostat.numerics.motions import Motions, each_about, each_along, each_twist, exponential, logarithm, still
 
 
@@ -96,6 +99,15 @@ class Chain:
     def rates(self, placed: PlacedChain) -> Array:
         """Return the twist of the end per unit of each coordinate [n x 6 x coordinates]."""
         return np.asarray(np.swapaxes(placed.screws, 1, 2) @ self.follows)
+
+
+def bar_turns(bars: Parallelogram) -> tuple[Joint, Joint, Scalar]:
+    """Return the turns that are the motion of a parallelogram, and how far they turn per metre of it, rad/m.
+
+    What it carries turns about the near side, and back by as much about the far one.
+    """
+    near, far = (Joint(bars.normal, point) for point in (bars.near, bars.far))
+    return near, far, 1.0 / (bars.far - bars.near).norm()
 
 
 def _matches(numbers: tuple[int, ...], count: int) -> Array:

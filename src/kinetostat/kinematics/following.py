@@ -20,7 +20,7 @@ from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
-"""Steps that are tried on one way, accepted or not."""
+"""Number of steps that are tried on one way, accepted or not."""
 SHORTEST_STRIDE = 1e-4
 """Share of the way below which a step is too short to go on: the way is blocked."""
 LONGEST_STRIDE = 1.5
@@ -35,7 +35,7 @@ so that no step beyond it is accepted."""
 ROUND_OFF_OF_STEP = 1e-7
 """Size of a correction below which its contraction says nothing."""
 MOST_STEPS_AT_GOAL = 60
-"""Of Newton's method at the goal, where each halves the gap at worst."""
+"""Number of Newton's steps at the goal, where each halves the gap at worst."""
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
 STIFFENING = 1e-2

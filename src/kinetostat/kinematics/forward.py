@@ -28,7 +28,7 @@ from kinetostat.numerics.iteration import least_squares
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
 
 MOST_DAMPED_STEPS = 60
-"""Of damped least squares: a start that has not arrived by then is in no solution's reach."""
+"""Number of steps of damped least squares: a start that has not arrived by then is in no solution's reach."""
 CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
 STRIDE, MOST_STRIDES = 0.05, 400

@@ -22,7 +22,7 @@ from kinetostat.machine.machine import Chains, Step
 from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
 
 Coordinates = dict[str, Scalar]
-"""Of the platform: x, y, z (m) and roll, pitch, yaw (rad), one entry per problem; a float where it is the same."""
+"""Coordinates of the platform: x, y, z (m) and roll, pitch, yaw (rad), one for each problem, or a float for all."""
 
 
 def some(coordinates: Coordinates, chosen: Integers) -> Coordinates:
