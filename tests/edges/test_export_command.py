@@ -8,7 +8,7 @@ import pytest
 from cad import needs_cad
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
-from kinetostat.commands.report import FORMATS
+from kinetostat.commands.report import EXPORT_FORMATS
 from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
@@ -30,7 +30,7 @@ def test_every_format_is_written(one, tmp_path, capsys):
 
 
 def test_help_names_every_format():
-    assert list(FORMATS) == [form.name for form in KNOWN]
+    assert list(EXPORT_FORMATS) == [form.name for form in KNOWN]
 
 
 def test_the_suffix_names_the_format_and_the_machine_the_file(tmp_path, monkeypatch):

@@ -46,10 +46,10 @@ from kinetostat import (
 )
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
-from kinetostat.studies.report import PARTS
+from kinetostat.studies.report import REPORT_PARTS
 from refusals import refused
 
-LEAST = [word for part in PARTS for word in ("--without", part)]
+LEAST = [word for part in REPORT_PARTS for word in ("--without", part)]
 SNAPSHOT = Path(__file__).with_name("python_names.txt")
 
 
@@ -277,7 +277,7 @@ def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_pa
     monkeypatch.chdir(tmp_path)
     no_pictures(monkeypatch)
     machine = load("tripteron", ["pose.x=45 cm"])
-    page = Page(report(machine, "our-own.html", without=PARTS, author="N. N.").read_text("utf-8"))
+    page = Page(report(machine, "our-own.html", without=REPORT_PARTS, author="N. N.").read_text("utf-8"))
     save(machine, "machine.toml")
     assert main(["report", "machine.toml", *LEAST, "--author", "N. N.", "-o", "second.html"]) == DONE
     assert Path("second.html").read_text("utf-8") == Path("our-own.html").read_text("utf-8").replace(
@@ -285,7 +285,7 @@ def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_pa
     )
     assert page.results["pose"]["x"] == 0.45
     better = optimize(load_problem("zhang-gosselin-2002", ["optimizer.generations=2", "optimizer.population=8"]))
-    study = Page(report(better, "study.html", without=PARTS).read_text("utf-8"))
+    study = Page(report(better, "study.html", without=REPORT_PARTS).read_text("utf-8"))
     assert study.results["compliance"] == analyze(better.machine).compliance
 
 

@@ -19,7 +19,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import adding
 from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.report import PARTS, usual_ranges
+from kinetostat.studies.report import REPORT_PARTS, usual_ranges
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.provenance import Origin
@@ -66,7 +66,7 @@ def told(*words):
 
 def quick(machine):
     """The page about a machine, without what takes time."""
-    found = report_study.gather(machine, without=PARTS)
+    found = report_study.gather(machine, without=REPORT_PARTS)
     return html_page(report_of(found, "Validation was left out.", ORIGIN, {}, True))
 
 
@@ -208,7 +208,7 @@ def test_every_bundled_machine_has_a_page(name):
 
 
 def test_the_command_leaves_out_what_can_be_left_out():
-    assert report_command.PARTS == PARTS
+    assert report_command.REPORT_PARTS == REPORT_PARTS
 
 
 @pytest.mark.parametrize("setting", ["pose.z=3 m", "limits.longest_leg=10 cm"])

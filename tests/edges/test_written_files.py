@@ -10,7 +10,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
-from kinetostat.commands.report import PARTS
+from kinetostat.commands.report import REPORT_PARTS
 from kinetostat.exchange.formats import KNOWN, export
 from kinetostat.machine.loading import load
 from kinetostat.studies.storage import PREFIX, scratch, write_text
@@ -56,7 +56,7 @@ WRITING = {
     "map": [MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2"],
     "workspace": [MACHINE, "--over", "x=-1 cm:1 cm:3", "--over", "y=-1 cm:1 cm:3"],
     "optimize": ["study.toml"],
-    "report": [MACHINE, *(word for part in PARTS for word in ("--without", part))],
+    "report": [MACHINE, *(word for part in REPORT_PARTS for word in ("--without", part))],
     "analyze": [MACHINE, *HEAVY, "--loaded"],
     "command": [MACHINE, "poses.csv", *HEAVY],
     "path": [MACHINE, "poses.csv"],

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.diagnosis import InstallationCheck
 
-MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
+SOUNDNESS_MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
 NAME_WIDTH = 14
 """Characters for the name of what is checked."""
 
@@ -83,7 +83,7 @@ def print_checks(console: "Console", checks: "Iterable[InstallationCheck]") -> "
         if not shown or shown[-1].group != check.group:
             console.print(Text(("\n" if shown else "") + check.group.capitalize(), "bold"))
         shown.append(check)
-        mark, style = MARKS[check.state]
+        mark, style = SOUNDNESS_MARKS[check.state]
         line = Table.grid(padding=(0, 2, 0, 0))
         for width in (1, NAME_WIDTH, None):
             line.add_column(width=width, overflow="fold" if width is None else "ellipsis")

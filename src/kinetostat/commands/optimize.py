@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.optimisation.result import Result
 
-STUDY = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to continue"
+STUDY_HELP = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to continue"
 
 
 def add_optimize_commands(commands: "Commands") -> None:
@@ -38,7 +38,7 @@ def add_optimize_commands(commands: "Commands") -> None:
         "kinetostat pareto zhang-gosselin-front -o front",
     )  # fmt: skip
     for command in (optimize, pareto):
-        command.add_argument("study", metavar="STUDY", help=STUDY)
+        command.add_argument("study", metavar="STUDY_HELP", help=STUDY_HELP)
         takes_settings(
             command,
             'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.problem import Problem
     from kinetostat.studies.optimisation.result import Result
 
-FORMATS = (
+EXPORT_FORMATS = (
     "mjcf", "mjcf-vibration", "urdf", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space", "nastran",
     "abaqus", "ansys",
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
-PARTS = ("maps", "guidelines", "sensitivity", "validation")
+REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 
 
 def add_report_commands(commands: "Commands") -> None:
@@ -61,7 +61,7 @@ def _add_export_command(commands: "Commands") -> None:
     command.add_argument(
         "--to",
         metavar="FORMAT",
-        help=f"{' or '.join((', '.join(FORMATS[:-1]), FORMATS[-1]))} (default: given by the suffix of the file)",
+        help=f"{', '.join(EXPORT_FORMATS[:-1])} or {EXPORT_FORMATS[-1]} (default: given by the suffix of the file)",
     )
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
@@ -90,8 +90,8 @@ def _add_report_command(commands: "Commands") -> None:
     takes_units(command)
     takes_ranges(command, "an axis of the maps (one or two); default: two coordinates of the pose, over their reach")
     command.add_argument(
-        "--without", metavar="PART", action="append", default=[], choices=PARTS,
-        help=f"omit a part that takes time: {', '.join(PARTS)}; repeatable",
+        "--without", metavar="PART", action="append", default=[], choices=REPORT_PARTS,
+        help=f"omit a part that takes time: {', '.join(REPORT_PARTS)}; repeatable",
     )  # fmt: skip
     takes_loaded(command, "also show the machine at rest under its loads")
     command.add_argument(

@@ -95,7 +95,7 @@ def reinstall(packages: str) -> str:
 
 def diagnose() -> Iterator[InstallationCheck]:
     """Checks as they are made: packages and extras, the computer, known numbers computed again."""
-    for group, checks in PARTS.items():
+    for group, checks in DIAGNOSIS_PARTS.items():
         try:
             yield from checks()
         except Exception as trouble:
@@ -230,5 +230,5 @@ def self_test_checks() -> Iterator[InstallationCheck]:
     yield from import_module("kinetostat.studies.self_test").checks()
 
 
-PARTS = {"software": software_checks, "machine": machine_checks, "self-test": self_test_checks}
+DIAGNOSIS_PARTS = {"software": software_checks, "machine": machine_checks, "self-test": self_test_checks}
 """The parts of a diagnosis by the group under which a part is listed that breaks as a whole."""

@@ -19,7 +19,7 @@ from kinetostat.studies.study_folder import (
     read_question,
 )
 
-RESULT = "result.json"
+RESULT_FILE = "result.json"
 """File that a search writes last but for tables and figures."""
 
 
@@ -131,7 +131,7 @@ def _steps(folder: Path) -> StepsCheck:
         total = max((record.get("of", 0) for record in records.values()), default=0)
         damaged = _damaged_steps(folder, question, records)
         return _steps_check(
-            "steps", len(records) - damaged, damaged + broken, total, (folder / RESULT).exists(), question
+            "steps", len(records) - damaged, damaged + broken, total, (folder / RESULT_FILE).exists(), question
         )
     final = folder / str(question.get("file"))
     path = final if final.exists() else final.with_suffix(f".partial{final.suffix}")

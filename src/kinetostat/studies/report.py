@@ -57,7 +57,7 @@ ROUND_UNIT = {"length": 1.0, "angle": math.radians(1.0)}
 MAP_POINTS, GUIDELINE_POINTS = 41, 7
 """Points along each coordinate of the maps, and of the poses at which guidelines are tried."""
 MOST_AXES = 2
-PARTS = ("maps", "guidelines", "sensitivity", "validation")
+REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 """Parts that take time and may be left out of a report; validation is computed elsewhere, by an independent engine."""
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."
 
@@ -138,7 +138,7 @@ class Answers:
         ranges: of the maps.
         fit: what measurements have said of the machine as built, if a record of that is given.
         result: of the study that the machine is the best design of.
-        given: the answer to each question of `QUESTIONS` that was asked, by its name.
+        given: the answer to each question of `REPORT_QUESTIONS` that was asked, by its name.
     """
 
     machine: Machine
@@ -162,7 +162,7 @@ class ReportQuestion:
         name: of its answer.
         ask: answers it, from what is known so far.
         when: whether it is asked.
-        part: of `PARTS`, that leaves it out.
+        part: of `REPORT_PARTS`, that leaves it out.
     """
 
     name: str
@@ -171,7 +171,7 @@ class ReportQuestion:
     part: str = ""
 
 
-QUESTIONS = (
+REPORT_QUESTIONS = (
     ReportQuestion("requirements", lambda known: requirements(known.machine)),
     ReportQuestion("under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded),
     ReportQuestion("budget", lambda known: budget(known.machine), lambda known: bool(known.machine.tolerances)),
@@ -194,7 +194,7 @@ QUESTIONS = (
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
 error budget where the file has tolerances, vibrations where it has masses, and frequencies over the poses of the maps
 where there are modes."""
-STEPS = len(QUESTIONS) + 2
+REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
 
 
@@ -211,9 +211,9 @@ def gather(
     Args:
         machine: with its pose.
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: what is left out, of `PARTS`.
+        without: what is left out, of `REPORT_PARTS`.
         result: of a study whose best design the machine is.
-        progress: receives how far the work on a report is: all but the last two of `STEPS`.
+        progress: receives how far the work on a report is: all but the last two of `REPORT_STEPS`.
         fit: record of an identification of the machine, or the folder in which it lies.
 
     Raises:
@@ -221,7 +221,7 @@ def gather(
             or a record that is not one of this machine.
     """
     for part in without:
-        choice(part, PARTS, "the part of a report to leave out")
+        choice(part, REPORT_PARTS, "the part of a report to leave out")
     if len(ranges) > MOST_AXES:
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
     record = read_fit(fit) if fit else None
@@ -233,10 +233,10 @@ def gather(
         return Answers(machine, state, analysis, result=result)
     over = list(ranges) or usual_ranges(machine, MAP_POINTS)
     known = Answers(machine, state, analysis, tuple(over), record, result)
-    for step, question in enumerate(QUESTIONS, 1):
+    for step, question in enumerate(REPORT_QUESTIONS, 1):
         if question.part not in without and question.when(known):
             known.given[question.name] = question.ask(known)
-        progress(step, STEPS)
+        progress(step, REPORT_STEPS)
     return known
 
 

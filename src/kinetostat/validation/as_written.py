@@ -28,7 +28,7 @@ from kinetostat.validation.moving_legs import MovingLeg, apply, placement, turn,
 from kinetostat.validation.pieces import array, columns
 from kinetostat.validation.written_legs import written_legs
 
-MOST_NEWTON_STEPS = 20
+MOST_CLOSING_STEPS = 20
 """Steps of Newton's method from coordinates that should be those of the pose already."""
 X, Y, Z = np.eye(3)
 CRANKS_SUFFIX = "-rus"
@@ -53,7 +53,7 @@ GUIDED = ("passive-leg-4dof", "passive-leg-5dof")
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnMachine:
     """A machine at its pose as its file describes it.
 
     Attributes:
@@ -67,7 +67,7 @@ class Drawing:
     members: tuple[Member, ...]
 
 
-def drawing(machine: Machine, response: Response, joints: Joints | None) -> Drawing:
+def drawing(machine: Machine, response: Response, joints: Joints | None) -> DrawnMachine:
     """Return a machine as its file describes it.
 
     Args:
@@ -81,7 +81,7 @@ def drawing(machine: Machine, response: Response, joints: Joints | None) -> Draw
     if joints is None:
         placed = with_legs_of_file(machine, response.configuration)
         at = placed.platform.apply(Vector(*machine.tables["tool"].offset))
-        return Drawing(placed, at, tuple(located_members(machine, placed, None)))
+        return DrawnMachine(placed, at, tuple(located_members(machine, placed, None)))
     ours = response.configuration
     target, length = _platform(machine, ours.platform), float(ours.length)
     home = placement(np.eye(3), np.array(machine.tables["platform"].point, dtype=float))
@@ -95,7 +95,7 @@ def drawing(machine: Machine, response: Response, joints: Joints | None) -> Draw
     platform = Displacement(Rotation(*axes), vector(target[:3, 3]))
     plane = Plane() if machine.family.planar else None
     reference = vector(apply(target, np.array(machine.tables["tool"].offset, dtype=float)))
-    return Drawing(Configuration(platform, tuple(legs), (), length, plane), reference, tuple(members))
+    return DrawnMachine(Configuration(platform, tuple(legs), (), length, plane), reference, tuple(members))
 
 
 def closed_placements(leg: MovingLeg, start: Sequence[float], target: Array, length: float) -> list[Array]:
@@ -111,7 +111,7 @@ def closed_placements(leg: MovingLeg, start: Sequence[float], target: Array, len
         InputError: if the leg does not reach there.
     """
     coordinates = np.array(start, dtype=float)
-    for _ in range(MOST_NEWTON_STEPS):
+    for _ in range(MOST_CLOSING_STEPS):
         placements = leg.placements(coordinates.tolist())
         gap = _twist(target @ np.linalg.inv(placements[-1]))
         if _motion_size(gap, target, length) <= CLOSED:

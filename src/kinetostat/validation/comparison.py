@@ -30,7 +30,7 @@ from kinetostat.validation.answer import Answer, block_differences, difference
 from kinetostat.validation.as_written import drawing
 from kinetostat.vibration.modes import frequencies
 
-INSTALL = "Install it with `{}`."
+INSTALL_ENGINE = "Install it with `{}`."
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Engine:
     def _answer_of(self, question: Callable[[], Any]) -> Any:
         """Answer of the engine to a question; its trouble is an InputError."""
         if self.version is None:
-            raise InputError(f"The engine {self.name} is not installed. {INSTALL.format(adding('validate'))}")
+            raise InputError(f"The engine {self.name} is not installed. {INSTALL_ENGINE.format(adding('validate'))}")
         try:
             return question()
         except InputError:
@@ -169,7 +169,7 @@ def choose(name: str | None) -> Engine:
         if not installed:
             names = " or ".join(engine.package for engine in KNOWN)
             raise InputError(
-                f"No independent engine is installed; {names} can be used. {INSTALL.format(adding('validate'))}"
+                f"No independent engine is installed; {names} can be used. {INSTALL_ENGINE.format(adding('validate'))}"
             )
         return installed[0]
     named = [engine for engine in KNOWN if engine.name == name]

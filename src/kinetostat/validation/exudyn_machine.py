@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Configuration, Machine, Plane
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, UNBALANCED_LOAD, UNMOVED
 from kinetostat.validation.answer import Answer, Trial
-from kinetostat.validation.as_written import Drawing, drawing
+from kinetostat.validation.as_written import DrawnMachine, drawing
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
 from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
 from kinetostat.validation.pieces import (
@@ -37,7 +37,7 @@ from kinetostat.validation.pieces import (
 
 MOTION_SHARES = (1e-3, 1e-4, 1e-5)
 """Motions of the platform by finite loads: rad, or share of the machine's length."""
-VARIED = "how far loads move the platform, rad or share of the machine's length"
+VARIED_MOTION = "how far loads move the platform, rad or share of the machine's length"
 EPS = float(np.finfo(float).eps)
 ALL = (True,) * 6
 PLANAR_JOINT = (True, True, False, False, False, True)
@@ -61,9 +61,9 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     model, platform = build(configuration, reference, unit=greatest)
     tangent = _tangent(model, platform)
     if not np.any(tangent):
-        return Answer(tangent, tangent, VARIED, ())
+        return Answer(tangent, tangent, VARIED_MOTION, ())
     trials = tuple(_finite_loads(model, platform, tangent, length))
-    return Answer(tangent, _without_load(trials), VARIED, trials)
+    return Answer(tangent, _without_load(trials), VARIED_MOTION, trials)
 
 
 def _without_load(trials: tuple[Trial, ...]) -> Array | None:
@@ -302,7 +302,7 @@ def frequencies(machine: Machine) -> Array:
     return modal_frequencies(model)
 
 
-def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: Drawing) -> None:
+def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: DrawnMachine) -> None:
     """Add the masses of platform, payload and links to the bodies of a machine.
 
     Args:

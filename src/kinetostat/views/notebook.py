@@ -24,7 +24,7 @@ from kinetostat.views.picture import machine_picture
 
 WIDTH = 200
 """Characters of a line: a notebook scrolls."""
-SIZE = (640, 480)
+PICTURE_PIXELS = (640, 480)
 """Pixels of a picture, which is shown at half of that."""
 DOTS = 110
 """Pixels per inch of a figure."""
@@ -80,10 +80,10 @@ def _figures(answer: object) -> str:
 def _picture(machine: Machine, kind: str = "machine") -> str:
     """The machine from the corner, or why it cannot be drawn."""
     try:
-        data = machine_picture(machine, SIZE, transparent=True)
+        data = machine_picture(machine, PICTURE_PIXELS, transparent=True)
     except InputError as error:
         return f"<p class='dim'>{escape(str(error))}</p>"
-    return _image(data, machine.name, kind, SIZE[0] // 2)
+    return _image(data, machine.name, kind, PICTURE_PIXELS[0] // 2)
 
 
 def _image(data: bytes, what: str, kind: str, width: int | None = None) -> str:

@@ -62,9 +62,9 @@ def _unit(unit: str, display: Display) -> str:
 
 MOST_ROWS = 25
 """Designs of a front that are printed; result.json has all."""
-FEW = 1e-4
+LEAST_PERCENT = 1e-4
 """Percent per percent below which a 0 is printed."""
-MUCH = 0.01
+LEAST_STIFFNESS_LEFT = 0.01
 """Stiffness that is left, as a share, below which the loss is pointed out."""
 
 
@@ -123,7 +123,7 @@ def variable_table(result: Result) -> Table:
     values, display = result.problem.space.values(result.genes), result.problem.machine.display
     for variable, value in zip(result.problem.space.searched, values, strict=True):
         influence = influences.get(variable.name)
-        percents = [_percent(p) for p in influence.percents] if influence else [""] * len(objectives)
+        percents = [_percent_text(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
         shown = (variable.in_words(number, display) for number in (variable.initial, value))
         table.add_row(variable.name, *shown, bound, *percents)
@@ -194,7 +194,7 @@ def remarks(result: Result) -> Iterator[str]:
     if bounded and len(result.problem.objectives) == 1:
         names = ", ".join(f"{term.name} ({term.bound})" for term in bounded)
         yield f"At a bound: {names}. Wider bounds would improve the objective, by the percentages above."
-    lost = [term for term in result.directions if term.gain < MUCH]
+    lost = [term for term in result.directions if term.gain < LEAST_STIFFNESS_LEFT]
     for term in lost:
         name = term.name.removeprefix("compliance_")
         yield f"The best design gives up {name}: {term.gain:.2g} of its stiffness is left; add a constraint to keep it."
@@ -219,7 +219,7 @@ def times_stiffer(gain: float) -> str:
     return f"{_times(gain)} times stiffer" if gain >= 1.0 else f"{_times(1.0 / gain)} times softer"
 
 
-def _percent(value: float) -> str:
+def _percent_text(value: float) -> str:
     if math.isnan(value):
         return "–"
-    return "0" if abs(value) < FEW else f"{value:.3g}"
+    return "0" if abs(value) < LEAST_PERCENT else f"{value:.3g}"

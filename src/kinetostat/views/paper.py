@@ -35,7 +35,7 @@ from kinetostat.views.tables import text_table
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
 FIGURE_6 = "Fig. 6: the best design and the mean of the population"
-MACHINE = "The machine at its reference pose"
+MACHINE_TITLE = "The machine at its reference pose"
 
 
 def write_all(
@@ -79,7 +79,7 @@ def figures(reproduction: Reproduction) -> dict[str, Figure]:
     section = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
     section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
     return {
-        "machine": three_views(reproduction.machine, MACHINE),
+        "machine": three_views(reproduction.machine, MACHINE_TITLE),
         "figure-4": curves(reproduction.curves, GROUPS["stiffness"], FIGURE_4),
         "figure-5": contour_maps(section, GROUPS["compliance"], FIGURE_5),
         "figure-6": convergence(reproduction.search.log, FIGURE_6),
@@ -174,7 +174,7 @@ def _csv(rows: Sequence[PaperNumber | EquationCheck | Claim]) -> str:
     return text.getvalue()
 
 
-MARKS = {
+VERDICT_MARKS = {
     PrintVerdict.EQUAL: "good",
     PrintVerdict.MISPRINT: "note",
     PrintVerdict.DIFFERS: "bad",
@@ -187,7 +187,7 @@ COUNTS = ("no", "one", "two", "three", "four", "five", "six")
 NUMERIC = (False, False, True, True, False, False)
 """Columns of the table of numbers."""
 
-STYLE = """
+PAPER_STYLE = """
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
 .tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
 .tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
@@ -244,7 +244,7 @@ def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
         "<h2>Slips of typography</h2>",
         f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
     ]
-    return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", STYLE, body)
+    return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", PAPER_STYLE, body)
 
 
 def misprints(reproduction: Reproduction) -> Iterator[str]:
@@ -332,4 +332,4 @@ def _statements(claims: Sequence[Claim]) -> str:
 
 
 def _mark(verdict: PrintVerdict | Finding) -> Markup:
-    return Markup(f'<span class="mark {MARKS[verdict]}">{escape(verdict.value)}</span>')
+    return Markup(f'<span class="mark {VERDICT_MARKS[verdict]}">{escape(verdict.value)}</span>')

@@ -26,7 +26,7 @@ from kinetostat.units import KINDS, RIGID, UnitError, parse
 
 VALUE_DIGITS = 6
 """Digits of the value of a variable."""
-MOST_POSES = 1_000_000
+MOST_NODES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -321,8 +321,8 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     question = grid_question(machine, table.over or [], ["singularity_margin"])
-    if question.grid.size > MOST_POSES:
-        raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_POSES:,} are allowed.")
+    if question.grid.size > MOST_NODES:
+        raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_NODES:,} are allowed.")
     columns = question.grid.columns(0, question.grid.size)
     size = "x".join(str(count) for count in question.grid.shape)
     if table.within is None:

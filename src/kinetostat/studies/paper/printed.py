@@ -251,7 +251,7 @@ def section_4_3() -> Iterator[PaperNumber]:
     yield compare("Section 4.3", "gain", IMPROVEMENT, before / after, "1")
 
 
-DIFFERENCE_STEP = 1e-6
+MOTION_STEP = 1e-6
 """Step of central differences, rad and m: their error is about step² + rounding/step."""
 STEP_ERROR = 1e-8
 """Tolerance of a central difference with that step."""
@@ -385,11 +385,11 @@ def _velocities(machine: Machine) -> tuple[Array, Array, Array]:
     motion = {"pose.x": 0.02, "pose.z": -0.03, "pose.theta5": 0.05, "pose.theta6": -0.04}
     states = []
     for sign in (1.0, -1.0):
-        moved = {path: values(machine)[path] + sign * DIFFERENCE_STEP * rate for path, rate in motion.items()}
+        moved = {path: values(machine)[path] + sign * MOTION_STEP * rate for path, rate in motion.items()}
         states.append(respond(with_values(machine, moved)))
     ahead, behind = (_state(response) for response in states)
-    angles, lengths, position = ((p - q) / (2 * DIFFERENCE_STEP) for p, q in zip(ahead[:3], behind[:3], strict=True))
-    spin = (ahead[3] @ behind[3].T - behind[3] @ ahead[3].T) / (4 * DIFFERENCE_STEP)
+    angles, lengths, position = ((p - q) / (2 * MOTION_STEP) for p, q in zip(ahead[:3], behind[:3], strict=True))
+    spin = (ahead[3] @ behind[3].T - behind[3] @ ahead[3].T) / (4 * MOTION_STEP)
     return angles, lengths, np.concatenate([[spin[2, 1], spin[0, 2], spin[1, 0]], position])
 
 

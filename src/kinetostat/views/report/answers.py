@@ -38,14 +38,14 @@ from kinetostat.views.optimisation_tables import (
     worth_table,
 )
 from kinetostat.views.question import Description
-from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section
+from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section
 from kinetostat.views.report.pictures import figure_of
 from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 
 ANSWERS_WITH_SECTIONS = ("under_load", "vibration", "budget")
-"""Answers of `studies.report.QUESTIONS` with a section, in the order of a report."""
+"""Answers of `studies.report.REPORT_QUESTIONS` with a section, in the order of a report."""
 LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
 SAID_BEFORE = "Pose"
 """Line that a report has on its first page."""
@@ -211,7 +211,7 @@ def _study_question(problem: Problem) -> tuple[Block, ...]:
     fixed = not_searched(problem)
     return (
         Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.description}.")),
-        Points(tuple((typeset(text), "") for text in aims(problem))),
+        Bullets(tuple((typeset(text), "") for text in aims(problem))),
         as_table(bounds_table(problem), "Variables and their bounds."),
         *([Paragraph(f"{fixed}.", "Not searched:")] if fixed else []),
     )
@@ -246,4 +246,4 @@ def _study_answer(result: Result) -> tuple[Block, ...]:
         if result.robustness.failing:
             blocks.append(Paragraph(failing(result.robustness)))
     items = tuple((typeset(line), "") for line in remarks(result))
-    return (*blocks, Points(items)) if items else tuple(blocks)
+    return (*blocks, Bullets(items)) if items else tuple(blocks)

@@ -18,7 +18,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Points:
+class Bullets:
     """A list of short statements, each with a remark in grey, which may be empty."""
 
     items: tuple[tuple[str, str], ...]
@@ -78,7 +78,7 @@ class Listing:
     text: str
 
 
-Block: TypeAlias = "Paragraph | Points | Table | Figure | Formula | Listing | Section"
+Block: TypeAlias = "Paragraph | Bullets | Table | Figure | Formula | Listing | Section"
 
 
 @dataclass(frozen=True)

@@ -13,25 +13,25 @@ from kinetostat.views.page import Markup, whole_page
 from kinetostat.views.page import table as plain_table
 from kinetostat.views.report.content import (
     Block,
+    Bullets,
     Figure,
     Formula,
     Listing,
     Paragraph,
-    Points,
     Report,
     Section,
     Table,
 )
 from kinetostat.views.report.pictures import live_html
 
-STYLE = Path(__file__).with_name("report.css").read_text("utf-8")
+REPORT_STYLE = Path(__file__).with_name("report.css").read_text("utf-8")
 MEDIA_TYPES = {"json": "application/json", "toml": "text/plain"}
 """Media types of attachments, by the ending of their name."""
 
 
 def html_page(report: Report) -> str:
     """Write a report as an HTML page."""
-    return whole_page(f"{report.title}: {report.kind.lower()}", STYLE, _Writer(report).body())
+    return whole_page(f"{report.title}: {report.kind.lower()}", REPORT_STYLE, _Writer(report).body())
 
 
 class _Writer:
@@ -76,7 +76,7 @@ class _Writer:
         match block:
             case Paragraph(text, lead):
                 return f"<p>{f'<b>{escape(lead)}</b> ' if lead else ''}{escape(text)}</p>"
-            case Points(items):
+            case Bullets(items):
                 return f"<ul>{''.join(_point(text, aside) for text, aside in items)}</ul>"
             case Table():
                 return self._table(block)

@@ -19,7 +19,7 @@ from kinetostat.spec.installation import adding
 from kinetostat.views.report.content import Block, Figure, Formula, Report, Section
 
 TEMPLATE = Path(__file__).with_name("report.typ")
-INSTALL = "A PDF needs Typst; install it with `{}`, or write an HTML page: -o report.html."
+INSTALL_TYPST = "A PDF needs Typst; install it with `{}`, or write an HTML page: -o report.html."
 FIRST_SYSTEM_CHARACTER = "\u2e80"
 """From this character on, a text may need the fonts of the system. Without such characters the system's fonts are
 ignored, so that the bytes are the same on every computer."""
@@ -32,7 +32,7 @@ def check_typst() -> None:
         InputError: it is not; the message says how to install it.
     """
     if find_spec("typst") is None:
-        raise InputError(INSTALL.format(adding("report")))
+        raise InputError(INSTALL_TYPST.format(adding("report")))
 
 
 def pdf_bytes(report: Report) -> bytes:

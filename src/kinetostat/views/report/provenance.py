@@ -12,20 +12,20 @@ from kinetostat.studies.paper.printed import CITATION
 from kinetostat.views.report.content import Formula, Listing, Paragraph, Section, Table
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
-THEORY = (
+THEORY_TEXT = (
     "Every elastic part is described by its compliance, which is 0 for a rigid part: rigid and flexible parts are one "
     "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; a twist is "
     "(rotation, translation), a wrench (moment, force), both at the reference point. K and C hold for small motions."
 )
-LEGS = (
+LEGS_TEXT = (
     "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p). Under them it "
     "deflects by its elastic coordinates (unit twists J with index e, compliances S):"
 )
-SUM = (
+SUM_TEXT = (
     "The stiffnesses of the legs add up; where springs are rigid or the machine is overconstrained, the force method "
     "is used instead:"
 )
-AGAIN = (
+AGAIN_TEXT = (
     "The same command with the same input and the same versions makes this report again, byte for byte. The machine "
     "with all digits (machine.toml) and the results (results.json) are inside this file."
 )
@@ -75,7 +75,7 @@ def method_section() -> Section:
     source = f"Source: {CITATION}, and the documentation of kinetostat, theory."
     return Section(
         "Method",
-        (Paragraph(THEORY), Paragraph(LEGS), LEG, Paragraph(SUM), ASSEMBLY, Paragraph(source)),
+        (Paragraph(THEORY_TEXT), Paragraph(LEGS_TEXT), LEG, Paragraph(SUM_TEXT), ASSEMBLY, Paragraph(source)),
     )
 
 
@@ -109,7 +109,7 @@ def record_section(origin: Origin, engine: Sequence[str]) -> Section:
     return Section(
         "Record",
         (
-            Paragraph(AGAIN),
+            Paragraph(AGAIN_TEXT),
             Listing("Command.", origin.command),
             Table("Versions.", ("program", "version"), tuple(versions), (False, False)),
             *(Listing(f"Input: {name}.", text) for name, text in origin.inputs),

@@ -21,7 +21,7 @@ from kinetostat.validation.comparison import Validation
 from kinetostat.views.drawing import three_views
 from kinetostat.views.first_lines import first_lines, margins
 from kinetostat.views.report.answers import gains, verdict_of
-from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section, Table
+from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
 from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.requirement_lines import headline, requirement_lines
@@ -43,7 +43,7 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     for label, name in (("Vibration", "vibration"), ("As built", "budget")):
         known = answers.of(name)
         answer += [Paragraph(typeset(known.message), f"{label}:")] if known else []
-    return Section("Summary", (*answer, *_requirements(answers), portrait, Points(points), _directions(answers)))
+    return Section("Summary", (*answer, *_requirements(answers), portrait, Bullets(points), _directions(answers)))
 
 
 def _requirements(answers: Answers) -> tuple[Block, ...]:
@@ -52,7 +52,7 @@ def _requirements(answers: Answers) -> tuple[Block, ...]:
     if not judged:
         return ()
     lines = tuple((typeset(sentence), word) for _, word, sentence in requirement_lines(judged, display))
-    return Paragraph(headline(judged), "Requirements:"), Points(lines)
+    return Paragraph(headline(judged), "Requirements:"), Bullets(lines)
 
 
 def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:

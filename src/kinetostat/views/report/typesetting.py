@@ -15,7 +15,7 @@ _EXPONENT = re.compile(r"\*\*([2-4])\b")
 _MINUS = re.compile(r"(?<![\w.,)-])-(?=[\d.])")
 _DEGREES = re.compile(r"(?<=\d) deg\b")
 _WHOLE = re.compile(r"(?<=\d)\.0(?= (?:m|rad|N|kg|Pa)\b)")
-_NUMBER = re.compile(r"[-+.\de]+")
+_PLAIN_NUMBER = re.compile(r"[-+.\de]+")
 _ZEROS = re.compile(r"(?<![\w.,])(\d+?)(0{6,})(?:\.0)?(?= (?:m|rad|N|kg|Pa)\b)")
 _TIMES = re.compile(r"^(\d+) x ")
 
@@ -46,7 +46,7 @@ def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:
     columns = [[str(cell) for cell in column.cells] for column in table.columns]
     numeric = tuple(column.justify == "right" for column in table.columns)
     shown = [
-        [typeset(cell) if i or other or _NUMBER.fullmatch(cell) else cell for cell in column]
+        [typeset(cell) if i or other or _PLAIN_NUMBER.fullmatch(cell) else cell for cell in column]
         for i, (column, other) in enumerate(zip(columns, numeric, strict=True))
     ]
     heads = tuple(str(column.header).replace("\n", " ") for column in table.columns)

@@ -18,7 +18,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.result import Result, message
-from kinetostat.studies.report import STEPS, Answers, Texts, gather, texts_of
+from kinetostat.studies.report import REPORT_STEPS, Answers, Texts, gather, texts_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
@@ -149,7 +149,7 @@ def write_report(
         subject: words of the command line that name the machine or study, with its overrides.
         inputs: name and text of each file that it was read from.
         path: from `report_path`.
-        progress: called for the last two of `STEPS`.
+        progress: called for the last two of `REPORT_STEPS`.
 
     Raises:
         InputError: an unknown engine, or a path that cannot be written.
@@ -160,11 +160,11 @@ def write_report(
     about = {name: text for name, text in (("Author", options.author), ("Date", options.date)) if text}
     page = path.suffix == ".html"
     validation = _validation(answers.machine, options)
-    progress(STEPS - 1, STEPS)
+    progress(REPORT_STEPS - 1, REPORT_STEPS)
     whole = report_of(answers, validation, origin, about, page)
     data = html_page(whole).encode() if page else pdf_bytes(whole)
     write_bytes(path, data)
-    progress(STEPS, STEPS)
+    progress(REPORT_STEPS, REPORT_STEPS)
 
 
 def _validation(machine: Machine, options: ReportOptions) -> Validation | str:
