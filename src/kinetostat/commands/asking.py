@@ -149,6 +149,9 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
 
     Returns:
         The exit code.
+
+    Raises:
+        InputError: a folder is given for an answer that has neither files nor figures.
     """
     from kinetostat.views.answers import description_of
     from kinetostat.views.data_forms import json_of
