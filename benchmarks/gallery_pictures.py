@@ -9,7 +9,7 @@ from io import BytesIO
 from PIL import Image
 
 from kinetostat.machine.loading import bundled, load
-from kinetostat.studio.gallery import PICTURES
+from kinetostat.studio.menus import PICTURES
 from kinetostat.views.picture import machine_picture
 
 SIZE = (240, 180)

@@ -14,8 +14,8 @@ from studio_page import on_page
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.vibration import modes
-from kinetostat.studio.asking import tab
-from kinetostat.studio.asking.process import answer_html, in_words_of_the_page, values_of
+from kinetostat.studio import question_tab as tab
+from kinetostat.studio.question_process import answer_html, in_words_of_the_page, values_of
 from kinetostat.views.data_forms import json_of
 from kinetostat.views.question import Option, Question, late
 from kinetostat.views.questions import QUESTIONS
@@ -75,7 +75,7 @@ def test_what_is_refused_is_one_sentence_in_the_words_of_the_page():
             await page.choose(f"option {option}", text)
             await page.send("question-ask", "click")
             assert page.one("question-problem").text.startswith(reason)
-            assert page.one("question-answer").content.count(tab.NOTHING)
+            assert page.one("question-answer").content.count(tab.NOTHING_ASKED)
             await page.choose(f"option {option}", "")
         assert page.one("question-ask").enabled
 
@@ -91,7 +91,7 @@ def test_a_question_can_be_stopped_and_asked_again():
         await page.send("question-stop", "click")
         await answering
         assert page.one("question-problem").text == tab.STOPPED
-        assert tab.NOTHING in page.one("question-answer").content
+        assert tab.NOTHING_ASKED in page.one("question-answer").content
         await page.send("question-ask", "click")
         assert "<table" in page.one("question-answer").content
 
@@ -163,7 +163,7 @@ def test_files_that_were_sent_are_listed():
     async def steps(page):
         await asking(page)
         with page.user.client:
-            form = tab.Form(QUESTION)
+            form = tab.QuestionForm(QUESTION)
             ui_tab = tab.AskTab.__new__(tab.AskTab)
             ui_tab._file_row(form, QUESTION.options[4], "a file of poses")
         for name in ("../a.csv", "b.csv"):

@@ -16,7 +16,7 @@ from studio_page import on_page
 from kinetostat import export
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.studio.admission import BoundedBody
-from kinetostat.studio.gallery import about
+from kinetostat.studio.menus import about
 from kinetostat.studio.serving import LOOPBACK
 from kinetostat.studio.text_pane import explained, reading
 

@@ -6,8 +6,7 @@ from test_state_of_load import CABLES
 
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.under_load import under_load
-from kinetostat.studio.address import address_of, memory_of
-from kinetostat.studio.session import Memory, Session
+from kinetostat.studio.session import Memory, Session, address_of, memory_of
 
 DOWN = ("control load.force.2", "write", "-400 N")
 

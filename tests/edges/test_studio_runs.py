@@ -17,10 +17,10 @@ from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
 from kinetostat.studio.design.progress import Follower, Progress, failure
-from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.run_panel import convergence
 from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.design.state_folder import Favourites
+from kinetostat.studio.design.texts import result_text
 from refusals import refused
 from studies import PAPER, SMALL, problem, waited_for, written
 

@@ -8,7 +8,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.attribution import ranked
 from kinetostat.studies.vibration import modes
-from kinetostat.studio.ringing import SwingRequest, ringing, swing
+from kinetostat.studio.answers import SwingRequest, ringing, swing
 from kinetostat.views.scene.proportions import proportions_of
 from kinetostat.views.vibration import percent
 

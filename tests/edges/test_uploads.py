@@ -9,13 +9,13 @@ from nicegui.client import ClientConnectionTimeout
 
 from kinetostat.machine.loading import bundled
 from kinetostat.spec.errors import InputError
-from kinetostat.studio import serving, uploads
-from kinetostat.studio.turns import Turns
+from kinetostat.studio import processes, serving
+from kinetostat.studio.processes import Turns
 from refusals import refused
 
 
 def sent(data, kind="machine"):
-    asyncio.run(uploads.check_upload(kind, data, "mine.toml", "tab"))
+    asyncio.run(processes.check_upload(kind, data, "mine.toml", "tab"))
 
 
 def test_a_machine_passes():
@@ -32,9 +32,9 @@ def test_a_refusal_is_that_of_the_reader(kind, data, words):
 
 HOG = """
 import sys
-from kinetostat.studio import serving, uploads
-from kinetostat.studio.turns import Turns
-uploads._limit()
+from kinetostat.studio import processes, serving
+from kinetostat.studio.processes import Turns
+processes.limit_process(SECONDS, processes.MEMORY_TO_READ)
 taken = []
 while True:
     {work}
@@ -45,11 +45,9 @@ while True:
 @pytest.mark.parametrize("work", ["taken.append(bytearray(1 << 26))", "pass"], ids=["memory", "time"])
 def test_what_exceeds_the_limits_is_refused_in_a_sentence(work, tmp_path, monkeypatch):
     """Such a file is not known; a hog in the place of the reader shows that the limits hold."""
-    (tmp_path / "hog.py").write_text(
-        HOG.format(work=work).replace("uploads._limit()", "uploads.SECONDS = 3; uploads._limit()")
-    )
+    (tmp_path / "hog.py").write_text(HOG.format(work=work).replace("SECONDS", "3"))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
-    monkeypatch.setattr(uploads, "WORKER", "hog")
+    monkeypatch.setattr(processes, "READING_PROGRAM", "hog")
     with refused("or stops the program that reads it; a machine file is a short TOML text"):
         sent(b"")
 
@@ -57,7 +55,7 @@ def test_what_exceeds_the_limits_is_refused_in_a_sentence(work, tmp_path, monkey
 def test_a_tab_that_sends_many_files_is_refused_and_others_do_not_stand_behind_it(monkeypatch):
     """One tab sends ten files at once, then another tab one: two files are read, and nine are refused at once."""
     read = []
-    monkeypatch.setattr(uploads, "READING", Turns(1, "one after the other."))
+    monkeypatch.setattr(processes, "READING", Turns(1, "one after the other."))
     whole = asyncio.create_subprocess_exec
 
     async def noted(*words, **more):
@@ -68,7 +66,7 @@ def test_a_tab_that_sends_many_files_is_refused_and_others_do_not_stand_behind_i
 
     async def sent_by(tab, name):
         try:
-            await uploads.check_upload("machine", b"a = 1", name, tab)
+            await processes.check_upload("machine", b"a = 1", name, tab)
         except InputError as refusal:
             return str(refusal)
 

@@ -1,6 +1,7 @@
-"""The computations behind the page: a picture, a report, a map, curves, a ranking; each a function of a request.
+"""The computations behind the page: a picture, a report, a map, curves, a ranking, modes and their swing.
 
-They run in threads (`lanes`), so they take and return frozen data and touch no page. The formulas are elsewhere.
+Each is a function of a request. They run in threads (`lanes`), so they take and return frozen data and touch no page.
+The formulas are elsewhere.
 """
 
 import math
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Complex
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.equilibrium.state import MachineState, state_of
@@ -27,11 +28,12 @@ from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.quantities import without_derivatives
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.studies.under_load import LoadedState, under_load
+from kinetostat.studies.vibration import Vibration, frequency_range, modes
 from kinetostat.studio.pulling import handles
 from kinetostat.tolerances import SINGULAR
 from kinetostat.units import KINDS
 from kinetostat.views.scene import machine_scene as scenes
-from kinetostat.views.scene.analysis_overlays import loaded_overlays, overlays_of
+from kinetostat.views.scene.analysis_overlays import loaded_overlays, overlays_of, swing_data
 from kinetostat.views.scene.overlays import twist_solids
 from kinetostat.views.scene.proportions import Proportions
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
@@ -295,3 +297,57 @@ def _frequencies(machine: Machine) -> dict[str, str]:
     group = "loaded_frequency" if machine.loaded else "frequency"
     ways = [name for name in machine.family.component_names if name in "xyz"]
     return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(ways) + 1)}
+
+
+POINTS, NEAR = 300, 40
+"""Frequencies of a response, over its range and about each mode besides: what a small plot can show."""
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """The vibrations of a machine, and how its tool feels varying forces.
+
+    Attributes:
+        answer: modes at the pose; none where it has no answer or nothing can ring.
+        frequencies: of the response, Hz [frequencies]; none where there are no modes.
+        receptance: of the tool, SI [frequencies x 6 x 6].
+    """
+
+    answer: Vibration
+    frequencies: Array | None = None
+    receptance: Complex | None = None
+
+
+def ringing(machine: Machine) -> Ringing | str:
+    """Find modes and response of a machine at its pose, or say what it lacks, which is a mass as a rule."""
+    try:
+        answer = modes(machine)
+    except InputError as error:
+        return str(error)
+    if not answer.modes:
+        return Ringing(answer)
+    frequencies = frequency_range(answer, points=POINTS, near=NEAR)
+    return Ringing(answer, frequencies, answer.receptance(frequencies.tolist()))
+
+
+@dataclass(frozen=True)
+class SwingRequest:
+    """A mode to be drawn.
+
+    Attributes:
+        answer: with its modes.
+        number: of the mode, from 0.
+        sizes: proportions of the picture.
+    """
+
+    answer: Vibration
+    number: int
+    sizes: Proportions
+
+
+def swing(request: SwingRequest) -> list[dict[str, Any]]:
+    """Both ends of a mode's swing, for the browser to move the machine between them."""
+    shape, machine = request.answer.modes[request.number].shape, request.answer.machine
+    if shape is None:
+        return []
+    return swing_data(machine, request.answer.state.configuration, request.sizes, shape)

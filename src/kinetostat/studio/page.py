@@ -13,29 +13,24 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.address import address_of
 from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
-from kinetostat.studio.asking.tab import AskTab
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
-from kinetostat.studio.files_menu import FilesMenu
-from kinetostat.studio.gallery import Gallery
-from kinetostat.studio.handles import Handles
 from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.map_panel import MapPanel
+from kinetostat.studio.menus import FilesMenu, Gallery
 from kinetostat.studio.panels import Panel
-from kinetostat.studio.panels.contributions import ContributionsPanel, SensitivityPanel
-from kinetostat.studio.panels.link_stiffness import LinkPanel
-from kinetostat.studio.panels.requirements import RequirementsPanel
-from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
+from kinetostat.studio.panels.influences import ContributionsPanel, LinkPanel, SensitivityPanel
+from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel, RequirementsPanel
 from kinetostat.studio.panels.vibration import VibrationPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.playback import Playback
+from kinetostat.studio.processes import check_upload
 from kinetostat.studio.pulling import free_axes
-from kinetostat.studio.scene_panel import ScenePanel
-from kinetostat.studio.session import Memory, Session
+from kinetostat.studio.question_tab import AskTab
+from kinetostat.studio.scene_panel import Handles, ScenePanel
+from kinetostat.studio.session import Memory, Session, address_of
 from kinetostat.studio.text_pane import TextPane
-from kinetostat.studio.uploads import check_upload
 from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (

@@ -1,23 +1,27 @@
-"""The middle of the page: the machine with its overlays, the status of the pose, and the diagonal of C.
+"""The middle of the page: the machine with its overlays, the status of the pose, and the handles that pull it.
 
-What is drawn comes from `answers` as solids; this panel only places it on the page.
+What is drawn comes from `answers` as solids, and which numbers follow a pull from `pulling`; here both are only placed
+on the page and passed on.
 """
 
 from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
+from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from kinetostat.algebra.vector import Displacement
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
-from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow, icon_button
-from kinetostat.studio.lanes import as_sentence
-from kinetostat.studio.session import file_stem
+from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow, icon_button, refuse
+from kinetostat.studio.lanes import Lane, as_sentence
+from kinetostat.studio.pulling import PLATFORM, Pull, goal_of, placed, point_goal, pulled
+from kinetostat.studio.session import Session, file_stem
 
 LAYERS = {
     "ellipsoids": "compliance ellipsoids",
@@ -196,3 +200,58 @@ def headline(report: Report) -> str:
 
 def _tile(name: str, value: str, unit: str) -> str:
     return f"<div><dt>{name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>"
+
+
+class Handles:
+    """Listens to a view while its handles are pulled; the latest wish counts, those in between are never computed."""
+
+    def __init__(self, session: Session, view: Element, on_change: Callable[[], None]) -> None:
+        """Listen.
+
+        Args:
+            session: whose machine is pulled.
+            view: of the machine; sends `pull` and `settle`.
+            on_change: called after every change of the machine.
+        """
+        self._session, self._on_change = session, on_change
+        self._lane = Lane(pulled, self._follow)
+        self._pull_number: object = None
+        self._home: Displacement | None = None
+        self._ended = False
+        view.on("pull", self._ask, throttle=THROTTLE)
+        view.on("settle", self._settle)
+
+    def close(self) -> None:
+        self._lane.close()
+
+    def _ask(self, event: GenericEventArguments) -> None:
+        of, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
+        machine = self._session.machine
+        if self._home is None or number != self._pull_number:
+            self._pull_number, self._home = number, placed(machine).platform
+        self._ended = False
+        target = goal_of(self._home, axis, float(goal)) if of == PLATFORM else point_goal([float(c) for c in goal])
+        self._lane.ask(Pull(machine, of, leg, axis, target))
+
+    def _follow(self, _pull: Pull, numbers: dict[str, float]) -> None:
+        if numbers:
+            try:
+                self._session.move(numbers)
+            except InputError:
+                return  # a pull beyond what the file allows, such as a negative radius, leads no further
+            self._on_change()
+        if self._ended:
+            self._end()
+
+    def _settle(self, _event: GenericEventArguments) -> None:
+        self._ended = True
+        if not self._lane.busy:
+            self._end()
+
+    def _end(self) -> None:
+        self._ended, self._home = False, None
+        try:
+            self._session.settle()
+        except InputError as error:
+            refuse(str(error))
+        self._on_change()

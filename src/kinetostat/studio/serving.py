@@ -18,13 +18,12 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.address import memory_of
 from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.elements import refuse
-from kinetostat.studio.gallery import serve_pictures
+from kinetostat.studio.menus import serve_pictures
 from kinetostat.studio.page import StudioPage
-from kinetostat.studio.session import Memory
+from kinetostat.studio.session import Memory, memory_of
 
 STYLE = Path(__file__).parent / "style.css"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")

@@ -1,20 +1,26 @@
-"""The design tab: a study on the left, searches and their results on the right, the machine between them.
+"""The design tab: a study on the left, searches, their results and favourites on the right, the machine between them.
 
-It only arranges the panels of this package and connects them; `Workshop` holds what outlives the page.
+`Workshop` holds what outlives the page. Favourites are machines with a note, of which two to four are compared.
 """
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from nicegui import ui
 
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.comparison import Comparison, Design, compare
 from kinetostat.studio.design.draft import Draft
-from kinetostat.studio.design.favourites_panel import FavouritesPanel
 from kinetostat.studio.design.run_panel import RunPanel
 from kinetostat.studio.design.runs import Runs
-from kinetostat.studio.design.state_folder import Favourites
+from kinetostat.studio.design.state_folder import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
 from kinetostat.studio.design.study_form import StudyForm
+from kinetostat.studio.design.texts import comparison_text
+from kinetostat.studio.elements import MAIN_BUTTON, confirm, icon_button, in_quotes, refuse
+from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 
 RESULT, FRONT, FAVOURITES = "Result", "Front", "Favourites"
@@ -86,3 +92,125 @@ class DesignTab:
         run = self._workshop.runs.start(draft.problem(self._session.machine), self.tabs.client.id)
         self.tabs.set_value(RESULT)
         self.runs.follow(run)
+
+
+LEAST, MOST = 2, 4
+"""Designs that are compared at a time."""
+PRESENT = 0
+"""The number of the present machine in the list; favourites begin at 1."""
+PRESENT_NAME = "present machine"
+
+Named = list[tuple[str, Machine]]
+
+
+class FavouritesPanel:
+    """The list of favourites, a form to keep another one, and a window for the comparison."""
+
+    def __init__(self, session: Session, favourites: Favourites, load: Callable[[Machine], None]) -> None:
+        """Build the panel.
+
+        Args:
+            session: the session of this tab; its machine can be kept.
+            favourites: the favourites that the server keeps for all tabs.
+            load: puts a machine into the session.
+        """
+        self._session, self._favourites, self._load = session, favourites, load
+        self._lane = Lane(_compared, self._show)
+        self._chosen: set[int] = set()
+        with ui.element("div").classes("keep-row"):
+            self.name = ui.input("name").props(f"dense outlined maxlength={LONGEST_NAME}").mark("favourite-name")
+            self.note = ui.input("note").props(f"dense outlined maxlength={LONGEST_NOTE}").mark("favourite-note")
+            for box in (self.name, self.note):
+                box.classes("field grow")
+            button = ui.button("Keep", icon="star", on_click=self._keep).props(MAIN_BUTTON)
+            button.tooltip("keep the present machine as a favourite").mark("favourite-keep")
+        self._list = ui.element("div").classes("favourites")
+        with ui.element("div").classes("design-foot"):
+            ui.label("Tick two to four machines to compare them.").classes("note grow")
+            self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)
+            self.compare.props(MAIN_BUTTON).mark("favourite-compare")
+        with ui.dialog() as self.window, ui.element("div").classes("comparison-window"):
+            with ui.element("div").classes("comparison-head"):
+                ui.label("Designs side by side").classes("comparison-title")
+                icon_button("close", "Close", self.window.close, "comparison-close")
+            self.comparison = ui.html("", sanitize=False).classes("comparison").mark("comparison")
+        self.fill()
+
+    def fill(self) -> None:
+        """List the favourites that there are now."""
+        favourites = self._favourites.every()
+        self._chosen &= {PRESENT, *(favourite.number for favourite in favourites)}
+        self._list.clear()
+        with self._list:
+            self._line(PRESENT, PRESENT_NAME, "")
+            for kept in favourites:
+                with self._line(kept.number, kept.name, kept.note):
+                    self._button("input", f"Load {kept.name}", partial(self._take, kept), f"{kept.number} load")
+                    self._button("delete", f"Delete {kept.name}", partial(self._delete, kept), f"{kept.number} delete")
+        self._count()
+
+    def close(self) -> None:
+        self._lane.close()
+
+    def _line(self, number: int, name: str, note: str) -> ui.element:
+        with ui.element("div").classes("favourite") as line:
+            box = ui.checkbox(value=number in self._chosen, on_change=lambda event: self._tick(number, event.value))
+            box.props(f'dense aria-label="compare {in_quotes(name)}"').mark(f"favourite {number} tick")
+            with ui.element("div").classes("grow"):
+                ui.label(name).classes("favourite-name")
+                if note:
+                    ui.label(note).classes("favourite-note")
+        return line
+
+    @staticmethod
+    def _button(icon: str, text: str, action: Callable[[], None], mark: str) -> None:
+        icon_button(icon, text, action, f"favourite {mark}").props('size="sm"')
+
+    def _tick(self, number: int, on: bool) -> None:
+        self._chosen = self._chosen | {number} if on else self._chosen - {number}
+        self._count()
+
+    def _count(self) -> None:
+        self.compare.set_enabled(LEAST <= len(self._chosen) <= MOST)
+
+    def _keep(self) -> None:
+        try:
+            self._favourites.keep(self._session.machine, self.name.value or self._session.machine.name, self.note.value)
+        except InputError as error:
+            refuse(str(error))
+            return
+        self.name.value = self.note.value = ""
+        self.fill()
+
+    def _take(self, favourite: Favourite) -> None:
+        try:
+            self._load(favourite.machine())
+        except InputError as error:
+            refuse(str(error))
+
+    def _delete(self, favourite: Favourite) -> None:
+        def delete() -> None:
+            self._favourites.delete(favourite.number)
+            self.fill()
+
+        confirm(f"Delete the favourite {favourite.name}?", delete)
+
+    def _ask(self) -> None:
+        try:
+            chosen = [kept for kept in reversed(self._favourites.every()) if kept.number in self._chosen]
+            machines = [(kept.name, kept.machine()) for kept in chosen]
+        except InputError as error:
+            refuse(str(error))
+            return
+        if PRESENT in self._chosen:
+            machines.insert(0, (PRESENT_NAME, self._session.machine))
+        if len(machines) >= LEAST:
+            self._lane.ask(machines)
+
+    def _show(self, _machines: Named, comparison: Comparison) -> None:
+        self.comparison.set_content(comparison_text(comparison))
+        self.window.open()
+
+
+def _compared(machines: Named) -> Comparison:
+    return compare([Design(label, machine, analyze(machine)) for label, machine in machines])

@@ -22,7 +22,7 @@ from kinetostat.studies.optimisation.search import begin_search, optimize, store
 from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, read_history
 from kinetostat.studio.design.state_folder import RUNS, numbered, slug
-from kinetostat.studio.turns import make_modest
+from kinetostat.studio.processes import make_modest
 
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""

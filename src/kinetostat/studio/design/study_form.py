@@ -27,8 +27,8 @@ from kinetostat.studio.design.draft import (
     usual_bounds,
 )
 from kinetostat.studio.elements import choice, icon_button, upload_field
+from kinetostat.studio.processes import check_upload
 from kinetostat.studio.session import Session
-from kinetostat.studio.uploads import check_upload
 from kinetostat.studio.wording import full_label
 
 Change: TypeAlias = events.ValueChangeEventArguments[Any]

@@ -1,23 +1,30 @@
-"""The analysis as tables: the matrices K and C, the indices of the pose, and the loads in the springs.
+"""The analysis as tables: matrices K and C, indices of the pose, loads in the springs, verdicts on requirements.
 
-The tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers.
+Tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers. Requirements have a button
+that goes to the worst pose.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 from nicegui import ui
 
 from kinetostat.display import DASH, Display
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.studio.answers import Report
 from kinetostat.studio.elements import toggle
+from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
 from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
 from kinetostat.views.report.typesetting import as_table
+from kinetostat.views.requirement_lines import headline, requirement_lines
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
@@ -236,3 +243,52 @@ def _tangents(state: LoadedState) -> str:
 
 def _loaded(load: float, motion: float, turning: bool, display: Display) -> list[str]:
     return [display.show(load, "N·m" if turning else "N"), display.show_deflection(motion, "rad" if turning else "m")]
+
+
+NONE = 'The file has no requirements; a table [requirements] with NAME = "free_stiffness_z > 50 N/um" adds one.'
+
+
+class RequirementsPanel(Panel):
+    """Each requirement with its verdict, margin and worst pose; those that are not met come first."""
+
+    name = "Requirements"
+
+    def build(self) -> None:
+        self._session: Session | None = None
+        self._lane = Lane(_judged, self._draw)
+        self.lines = ui.column().mark("requirements")
+
+    def show(self, _report: Report, session: Session) -> None:
+        self._session = session
+        self._lane.ask(session.machine)
+
+    def close(self) -> None:
+        self._lane.close()
+
+    def _draw(self, machine: Machine, verdicts: tuple[Verdict, ...] | str) -> None:
+        self.lines.clear()
+        with self.lines:
+            if isinstance(verdicts, str) or not verdicts:
+                ui.label(verdicts if isinstance(verdicts, str) else NONE)
+                return
+            ui.label(headline(verdicts)).mark("requirements-headline")
+            for verdict, word, sentence in requirement_lines(verdicts, machine.display):
+                with ui.row().classes("items-center no-wrap"):
+                    ui.icon("check_circle" if verdict.met else "error", color="positive" if verdict.met else "negative")
+                    ui.label(f"{word}: {sentence}")
+                    if verdict.worst_pose:
+                        to_worst = ui.button("Worst pose", on_click=partial(self._go, verdict))
+                        to_worst.props("flat dense no-caps").mark(f"worst-{verdict.name}")
+
+    def _go(self, verdict: Verdict) -> None:
+        if self._session is not None:
+            self._session.move(verdict.worst_pose)
+            self.changed()
+
+
+def _judged(machine: Machine) -> tuple[Verdict, ...] | str:
+    """Judge requirements in a thread, or say what is wrong with them."""
+    try:
+        return requirements(machine)
+    except InputError as error:
+        return str(error)

@@ -17,12 +17,11 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.attribution import ranked
 from kinetostat.studies.vibration import Mode
-from kinetostat.studio.answers import Report, finite, weighs
+from kinetostat.studio.answers import Report, Ringing, SwingRequest, finite, ringing, swing, weighs
 from kinetostat.studio.controls import STEPS
 from kinetostat.studio.elements import CurveView, DesignTable, QuantityRow, choice, icon_button, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
-from kinetostat.studio.ringing import Ringing, SwingRequest, ringing, swing
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, heading, paragraph, shown
 from kinetostat.views.analysis_tables import entry_unit

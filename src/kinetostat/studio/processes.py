@@ -1,25 +1,71 @@
-"""Files that a browser has sent, read first in a process of their own, whose time and memory are limited.
+"""Work in processes of their own, whose time and memory are limited: turns of the tabs, and the reading of sent files.
 
-The process is `python -m kinetostat.studio.uploads KIND NAME`, with the file on its standard input. What it can read
-within its limits, the page then reads itself; any other file is refused, and no other page has noticed it.
+A file that a browser has sent is read first by `python -m kinetostat.studio.processes KIND NAME`, with the file on its
+standard input. What it can read within its limits, the page then reads itself; any other file is refused, and no other
+page has noticed it. A tab that asks for more than its turn is refused, so that no queue grows.
 """
 
 import asyncio
+import os
 import sys
-from collections.abc import Hashable
+from collections.abc import AsyncIterator, Hashable
+from contextlib import asynccontextmanager, suppress
 
 from kinetostat.machine.loading import build
 from kinetostat.spec.document import parse, text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
-from kinetostat.studio.turns import Turns, make_modest
 
-WORKER = "kinetostat.studio.uploads"
-SECONDS = 10
+MODESTY = 10
+"""Added to `nice` of such a process, so that the pages get their time first."""
+
+
+class Turns:
+    """Who works, and who waits."""
+
+    def __init__(self, at_a_time: int, refusal: str) -> None:
+        """Create an empty queue.
+
+        Args:
+            at_a_time: works of all tabs that are done at a time.
+            refusal: what is said to a tab that has one already.
+        """
+        self._places, self._refusal = asyncio.Semaphore(at_a_time), refusal
+        self._tabs: set[Hashable] = set()
+
+    @asynccontextmanager
+    async def turn(self, tab: Hashable) -> AsyncIterator[None]:
+        """Wait for a place; those who came first are served first.
+
+        Args:
+            tab: names the tab.
+
+        Raises:
+            InputError: this tab works or waits already.
+        """
+        if tab in self._tabs:
+            raise InputError(self._refusal)
+        self._tabs.add(tab)
+        try:
+            async with self._places:
+                yield
+        finally:
+            self._tabs.discard(tab)
+
+
+def make_modest(process: int) -> None:
+    """Let a process, by its number, give way to the pages, where the system can."""
+    if sys.platform != "win32":
+        with suppress(ProcessLookupError):  # it has ended already
+            os.setpriority(os.PRIO_PROCESS, process, MODESTY)
+
+
+READING_PROGRAM = "kinetostat.studio.processes"
+SECONDS_TO_READ = 10
 """Processor time of the process; a usual machine takes one second, nearly all of it to start."""
 PATIENCE = 60.0
 """Time, s, after which the process is stopped, on a server with much other work as well."""
-MEMORY = 2 << 30
+MEMORY_TO_READ = 2 << 30
 """Address space of the process, bytes; its libraries take half a gigabyte."""
 READING = Turns(1, "The file that this tab has sent before is still being read; wait for it, then send the next one.")
 """One file of all tabs is read at a time, so that a core is left to the pages."""
@@ -41,7 +87,7 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
     """
     async with READING.turn(tab):
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", WORKER, kind, name.replace("\0", "?"),
+            sys.executable, "-m", READING_PROGRAM, kind, name.replace("\0", "?"),
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
         make_modest(process.pid)
@@ -57,8 +103,8 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
         raise InputError(answer.decode())
     if process.returncode != 0:
         raise InputError(
-            f'"{name}" takes more than {SECONDS} s or {MEMORY >> 30} GiB to read, or stops the program that reads it; '
-            f"a {kind} file is a short TOML text: check what is in it."
+            f'"{name}" takes more than {SECONDS_TO_READ} s or {MEMORY_TO_READ >> 30} GiB to read, or stops the '
+            f"program that reads it; a {kind} file is a short TOML text: check what is in it."
         )
 
 
@@ -90,7 +136,7 @@ def limit_process(seconds: int, memory: int) -> None:
 
 
 if __name__ == "__main__":
-    limit_process(SECONDS, MEMORY)
+    limit_process(SECONDS_TO_READ, MEMORY_TO_READ)
     try:
         read(sys.argv[1], sys.stdin.buffer.read(), sys.argv[2])
     except InputError as refusal:

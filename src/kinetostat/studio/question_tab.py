@@ -1,6 +1,6 @@
 """The Ask tab: a choice of the question and its form on the left, its answer with its files on the right.
 
-Forms follow from the options of a question (`views.question`); what is computed happens in `process`.
+Forms follow from the options of a question (`views.question`); answers are computed in `question_process`.
 """
 
 import asyncio
@@ -17,50 +17,49 @@ from nicegui import background_tasks, events, run, ui
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.asking.process import (
+from kinetostat.studio.elements import MAIN_BUTTON, choice, icon_button, upload_field
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.processes import REFUSED, Turns, make_modest
+from kinetostat.studio.question_process import (
     ANSWER,
-    MACHINE,
-    MEMORY,
-    SECONDS,
+    ASKING_PROGRAM,
+    MACHINE_FILE,
+    MEMORY_TO_ANSWER,
+    SECONDS_TO_ANSWER,
     SENT,
     SHOWN,
-    WORKER,
     in_words_of_the_page,
     label_of,
 )
-from kinetostat.studio.elements import MAIN_BUTTON, choice, icon_button, upload_field
-from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
-from kinetostat.studio.turns import Turns, make_modest
-from kinetostat.studio.uploads import REFUSED
 from kinetostat.studio.wording import paragraph
 from kinetostat.views.question import Option, Question, late
 from kinetostat.views.questions import QUESTIONS
 
 ASKING = Turns(2, "The question before is still being answered; stop it, then ask again.")
 """Questions of all tabs that are answered at a time."""
-NOTHING = "Choose a question on the left and ask it; its answer is about the machine as it is then."
+NOTHING_ASKED = "Choose a question on the left and ask it; its answer is about the machine as it is then."
 CHANGED = "The machine has been changed since; ask again for its new answer."
 STOPPED = "The question was stopped."
 MOST_FILES = 8
 """Files that an option takes at most."""
 LARGEST_ANSWER = 24 << 20
 """Bytes of an answer that the page shows; a larger one is only downloaded."""
-FORMS = {"json": "JSON", "csv": "CSV", "nc": "NetCDF"}
-FULL = "full"
+NAMES_OF_FORMS = {"json": "JSON", "csv": "CSV", "nc": "NetCDF"}
+EVERY_ROW = "full"
 """Name of the switch for tables with every row, which is not an option of a question."""
 
 
 @dataclass
-class Form:
-    """What is filled in for one question: elements by the name of an option, and the files that were sent."""
+class QuestionForm:
+    """The form of one question: its elements by the name of an option, and the files that were sent."""
 
     question: Question
     fields: dict[str, Any] = field(default_factory=dict)
     files: dict[str, dict[str, bytes]] = field(default_factory=dict)
 
     def given(self) -> dict[str, Any]:
-        """What was given: a text, a flag or a list of texts by the name of an option."""
+        """Return what was filled in: a text, a flag or a list of texts by the name of an option."""
         texts = {}
         for option in self.question.options:
             if option.kind == "file":
@@ -76,7 +75,7 @@ class Form:
     @property
     def full(self) -> bool:
         """Whether tables show every row."""
-        return FULL in self.fields and bool(self.fields[FULL].value)
+        return EVERY_ROW in self.fields and bool(self.fields[EVERY_ROW].value)
 
 
 class AskTab:
@@ -89,12 +88,12 @@ class AskTab:
             session: whose machine a question is about.
         """
         self._session = session
-        self._forms: dict[str, Form] = {}
+        self._forms: dict[str, QuestionForm] = {}
         self._asked: Machine | None = None
         self._process: asyncio.subprocess.Process | None = None
         self._folder: TemporaryDirectory[str] | None = None
         self._stopped = self._busy = False
-        self._questions = Lane(_imported, self._offer)
+        self._questions = Lane(_import_questions, self._offer)
         with ui.element("section").classes("design of-asking left").props('aria-label="question"'):
             with ui.element("div").classes("design-head"):
                 self.choice = choice({}, "question", self._fill, "question", searchable=True).classes("grow")
@@ -110,9 +109,9 @@ class AskTab:
         ):
             with ui.element("div").classes("design-head"):
                 self.line = ui.label("").classes("run-line grow").props('role="status"').mark("question-line")
-                self.files = {form: self._download(form, name) for form, name in FORMS.items()}
+                self.files = {form: self._download(form, name) for form, name in NAMES_OF_FORMS.items()}
             self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"')
-            self.answer = ui.html(paragraph(NOTHING), sanitize=False).classes("answer").mark("question-answer")
+            self.answer = ui.html(paragraph(NOTHING_ASKED), sanitize=False).classes("answer").mark("question-answer")
             self.answer.props('tabindex="0" role="region" aria-label="answer"')
         self._show_busy(False)
 
@@ -138,7 +137,7 @@ class AskTab:
         return button
 
     def _offer(self, _words: tuple[str, ...], questions: dict[str, Question]) -> None:
-        self._forms = {word: Form(question) for word, question in questions.items()}
+        self._forms = {word: QuestionForm(question) for word, question in questions.items()}
         self.choice.set_options(
             {word: f"{word}: {QUESTIONS[word][0]}" for word in questions}, value=next(iter(questions))
         )
@@ -157,12 +156,12 @@ class AskTab:
             for option in form.question.options:
                 self._row(form, option)
             if form.question.full:
-                form.fields[FULL] = ui.checkbox("every row").props("dense").tooltip(form.question.full)
-                form.fields[FULL].mark(f"option {FULL}")
+                form.fields[EVERY_ROW] = ui.checkbox("every row").props("dense").tooltip(form.question.full)
+                form.fields[EVERY_ROW].mark(f"option {EVERY_ROW}")
         for name, value in kept.items():
             form.fields[name].set_value(value)
 
-    def _row(self, form: Form, option: Option) -> None:
+    def _row(self, form: QuestionForm, option: Option) -> None:
         """Build the field of an option."""
         label, meaning = label_of(option), in_words_of_the_page(form.question, option.meaning)
         if option.kind == "file":
@@ -181,7 +180,7 @@ class AskTab:
             made.props("dense outlined").classes("field")
         form.fields[option.name] = made.tooltip(meaning).mark(f"option {option.name}")
 
-    def _file_row(self, form: Form, option: Option, meaning: str) -> None:
+    def _file_row(self, form: QuestionForm, option: Option, meaning: str) -> None:
         """Build the field of an option that takes a file: the names of those that were sent, and a button for more."""
         with ui.element("div").classes("form-row"):
             ui.label(label_of(option)).classes("form-name").tooltip(meaning)
@@ -190,7 +189,9 @@ class AskTab:
             upload = upload_field(partial(self._take, form, option, names), self._refuse, f"upload {option.name}", "")
             icon_button("upload_file", f"Send a file: {label_of(option)}", lambda: upload.run_method("pickFiles"), "")
 
-    async def _take(self, form: Form, option: Option, names: ui.label, event: events.UploadEventArguments) -> None:
+    async def _take(
+        self, form: QuestionForm, option: Option, names: ui.label, event: events.UploadEventArguments
+    ) -> None:
         """Keep a file that was sent until the question is asked; where there is no room, the first one goes."""
         sent = form.files.setdefault(option.name, {})
         if len(sent) == (MOST_FILES if option.many else 1):
@@ -209,7 +210,7 @@ class AskTab:
             return
         self._refuse("")
         self._asked, self._stopped = self._session.machine, False
-        request = {"word": str(self.choice.value), "options": form.given(), FULL: form.full}
+        request = {"word": str(self.choice.value), "options": form.given(), EVERY_ROW: form.full}
         sent = {name: data for files in form.files.values() for name, data in files.items()}
         self._show_busy(True)
         background_tasks.create(self._answer(request, sent), name="studio question")
@@ -220,12 +221,12 @@ class AskTab:
         try:
             place = Path(folder.name)
             (place / SENT).mkdir()
-            (place / MACHINE).write_bytes(self._session.as_file()[1])
+            (place / MACHINE_FILE).write_bytes(self._session.as_file()[1])
             for name, data in sent.items():
                 (place / SENT / name).write_bytes(data)
             async with ASKING.turn(self.button.client.id):
                 problem = await self._run(place, json.dumps(request).encode())
-            shown = "" if problem else await run.io_bound(_shown, place / SHOWN)
+            shown = "" if problem else await run.io_bound(_read_answer, place / SHOWN)
         except InputError as error:
             problem, shown = str(error), ""
         finally:
@@ -246,7 +247,7 @@ class AskTab:
     async def _run(self, folder: Path, request: bytes) -> str:
         """Run the process in its folder; return why there is no answer, empty if there is one."""
         self._process = process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", WORKER, cwd=folder,
+            sys.executable, "-m", ASKING_PROGRAM, cwd=folder,
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
         if self._stopped:
@@ -259,10 +260,10 @@ class AskTab:
         words.write_eof()
         refusal = ""
         async for line in answers:
-            told = json.loads(line)
-            refusal = told.get("refused", "")
-            if told.get("total"):
-                self.bar.set_value(told["done"] / told["total"])
+            report = json.loads(line)
+            refusal = report.get("refused", "")
+            if report.get("total"):
+                self.bar.set_value(report["done"] / report["total"])
         await process.wait()
         if self._stopped:
             return STOPPED
@@ -270,8 +271,8 @@ class AskTab:
             return str(refusal)
         if process.returncode != 0:
             return (
-                f"The question takes more than {SECONDS // 60} minutes or {MEMORY >> 30} GiB, or stops the program; "
-                "ask for less, or use the command on a larger computer."
+                f"The question takes more than {SECONDS_TO_ANSWER // 60} minutes or {MEMORY_TO_ANSWER >> 30} GiB, or "
+                "stops the program; ask for less, or use the command on a larger computer."
             )
         return ""
 
@@ -299,7 +300,7 @@ class AskTab:
             ui.download.file(Path(self._folder.name) / f"{ANSWER}.{form}", f"{self.choice.value}.{form}")
 
 
-def _imported(words: tuple[str, ...]) -> dict[str, Question]:
+def _import_questions(words: tuple[str, ...]) -> dict[str, Question]:
     """Import questions, in a thread: some bring large libraries."""
     return {word: late(QUESTIONS[word][1]) for word in words}
 
@@ -309,7 +310,7 @@ def _safe(name: str) -> str:
     return re.sub(r"[^\w.-]", "_", Path(name).name).lstrip(".-")[-80:] or "file"
 
 
-def _shown(path: Path) -> str:
+def _read_answer(path: Path) -> str:
     """Read the answer as the page shows it, unless it is too large for that."""
     if path.stat().st_size > LARGEST_ANSWER:
         return paragraph(f"The answer has more than {LARGEST_ANSWER >> 20} MiB; download it instead.")

@@ -1,6 +1,6 @@
 """A question that the studio asks in a process of its own, so that it can be stopped and its memory is limited.
 
-The process is `python -m kinetostat.studio.asking.process`, with a request as JSON on its standard input. It runs in
+The process is `python -m kinetostat.studio.question_process`, with a request as JSON on its standard input. It runs in
 a folder with the machine and the files that were sent, prints its progress as JSON, and writes its answer there.
 """
 
@@ -18,7 +18,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import doubts
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.studies.storage import write_text
-from kinetostat.studio.uploads import REFUSED, limit_process
+from kinetostat.studio.processes import REFUSED, limit_process
 from kinetostat.studio.wording import paragraph, table
 from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
@@ -26,16 +26,16 @@ from kinetostat.views.question import Description, Option, Question, late
 from kinetostat.views.questions import QUESTIONS
 from kinetostat.views.report.typesetting import as_table
 
-WORKER = "kinetostat.studio.asking.process"
-SECONDS = 3600
+ASKING_PROGRAM = "kinetostat.studio.question_process"
+SECONDS_TO_ANSWER = 3600
 """Processor time of a question."""
-MEMORY = 4 << 30
+MEMORY_TO_ANSWER = 4 << 30
 """Address space of the process, bytes."""
 SHOWN = "shown.html"
 """The answer as the page shows it."""
 ANSWER = "answer"
 """Stem of the names of the answer's other files."""
-MACHINE = "machine.toml"
+MACHINE_FILE = "machine.toml"
 SENT = "sent"
 """Folder of the files that were sent, within that of the process."""
 
@@ -127,7 +127,7 @@ def ask(request: Mapping[str, Any], tell: Callable[[int, int], None]) -> None:
     question: Question = late(QUESTIONS[choice(request["word"], QUESTIONS, "the question")][1])
     reports = {"progress": tell} if question.reports_progress else {}
     try:
-        answer = question.answer(load(MACHINE), **values_of(question, request["options"]), **reports)
+        answer = question.answer(load(MACHINE_FILE), **values_of(question, request["options"]), **reports)
     except InputError as error:
         raise InputError(in_words_of_the_page(question, str(error))) from None
     description = description_of(answer)
@@ -142,7 +142,7 @@ def _tell(done: int, total: int) -> None:
 
 
 if __name__ == "__main__":
-    limit_process(SECONDS, MEMORY)
+    limit_process(SECONDS_TO_ANSWER, MEMORY_TO_ANSWER)
     try:
         ask(json.load(sys.stdin), _tell)
     except InputError as refusal:
