@@ -118,6 +118,8 @@ def question(new_tab: Any) -> None:
         page = new_tab()
         page.open(f"{address}?machine=hexapod&tool.mass=12+kg&linear_density.legs=4+kg%2Fm")
         page.tab.get_by_role("button", name="Ask", exact=True).first.click()
+        page.tab.get_by_role("combobox", name="question", exact=True).fill("modes")
+        page.tab.get_by_role("option", name="modes:").click()
         page.tab.get_by_label("lowest").fill("10 Hz")
         page.tab.locator(".of-asking .design-foot").get_by_role("button", name="Ask", exact=True).click()
         page.tab.locator(".answer figure").first.wait_for(state="attached")

@@ -191,6 +191,8 @@ def test_the_tab_in_a_browser():
         page = new_tab()
         page.open(f"{address}?machine=hexapod&tool.mass=12+kg")
         page.tab.get_by_role("button", name="Ask", exact=True).first.click()
+        page.tab.get_by_role("combobox", name="question", exact=True).fill("modes")
+        page.tab.get_by_role("option", name="modes:").click()
         page.tab.get_by_label("lowest").fill("10 Hz")
         page.tab.locator(".of-asking .design-foot").get_by_role("button", name="Ask", exact=True).click()
         page.tab.wait_for_function("document.querySelector('.answer')?.innerText.includes('first natural frequency')")
