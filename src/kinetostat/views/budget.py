@@ -4,14 +4,14 @@ Nothing is computed here.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from kinetostat.display import Display, number
-from kinetostat.engine.batch import Progress
+from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.budget.budget import (
@@ -329,7 +329,12 @@ POSSIBLE_ERRORS = Description(
 
 
 def _ask(
-    machine: Machine, poses: Any, ranges: list[str], list_errors: bool, progress: Progress, **options: Any
+    machine: Machine,
+    poses: Any = None,
+    ranges: Sequence[str] = (),
+    list_errors: bool = False,
+    progress: Progress = silent,
+    **options: Any,
 ) -> Budget | PossibleErrors:
     """Answer the command, whose tolerances are in the machine."""
     if list_errors:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.display import DASH, number
-from kinetostat.engine.batch import Progress
+from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError
@@ -204,11 +204,11 @@ CORRECTIONS = Description(
 
 def _ask(
     machine: Machine,
-    poses: Path | None,
-    ranges: Sequence[str],
-    tolerance: str | None,
-    fit: Path | None,
-    progress: Progress,
+    poses: Path | None = None,
+    ranges: Sequence[str] = (),
+    tolerance: str | None = None,
+    fit: Path | None = None,
+    progress: Progress = silent,
 ) -> Command | CorrectionTable:
     if not ranges:
         if tolerance is not None:

@@ -228,11 +228,11 @@ RECORDED_FIT = Description(
 def _ask(
     machine: Machine,
     data: str,
-    fit: Sequence[str],
-    priors: Sequence[str],
-    bounds: Sequence[str],
-    no_outliers: bool,
-    progress: Tell,
+    fit: Sequence[str] = (),
+    priors: Sequence[str] = (),
+    bounds: Sequence[str] = (),
+    no_outliers: bool = False,
+    progress: Tell = lambda *_: None,
     **options: Any,
 ) -> Identification:
     return identify(
