@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import Vector
-from kinetostat.cli import DONE, NO_ANSWER, main
+from kinetostat.cli import DONE, main
+from kinetostat.commands.common import NO_ANSWER
 from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
