@@ -118,7 +118,7 @@ def _validate(options: argparse.Namespace) -> int:
             tell(console, VALIDATION, validation, full=True)
 
     agreed = all(validation.difference <= AGREED for validation in validations)
-    return give(options, agreed, lambda: [json_of(VALIDATION, one) for one in validations], show)
+    return give(options, agreed, lambda: [json_of(VALIDATION, validation) for validation in validations], show)
 
 
 def _check_words(options: argparse.Namespace) -> None:
