@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
-    from kinetostat.studies.requirements import Verdict
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
@@ -352,19 +351,14 @@ def said_when_slow(what: str) -> "Iterator[None]":
         print(CLEAR_LINE, end="", file=words, flush=True)
 
 
-def verdicts_of(machine: "Machine") -> "tuple[Verdict, ...]":
-    """Judge the requirements of a machine; what judges them is loaded only where there are any."""
-    if not machine.requirements:
-        return ()
-    from kinetostat.studies.requirements import requirements
-
-    return requirements(machine)
-
-
 def judged(machine: "Machine", printing: bool = True) -> int:
     """Judge the requirements of a machine's file, print the verdicts, and return the exit code."""
-    verdicts = verdicts_of(machine)
-    if verdicts and printing:
+    if not machine.requirements:
+        return DONE
+    from kinetostat.studies.requirements import requirements
+
+    verdicts = requirements(machine)
+    if printing:
         from kinetostat.views.requirement_lines import print_requirements
         from kinetostat.views.tables import terminal
 

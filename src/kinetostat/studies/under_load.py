@@ -15,12 +15,14 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.limit import LoadLimit
 from kinetostat.equilibrium.links import Strut, loaded_links
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
 from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
+from kinetostat.kinematics.mobility import describe
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response
@@ -28,11 +30,11 @@ from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.loaded_sentences import about_rest, moving_legs, why_no_rest, why_no_tensions
 from kinetostat.studies.rounding import clean_matrix, clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
-SHARES = tuple(i / 12 for i in range(16))
+ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
+CURVE_SHARES = tuple(i / 12 for i in range(16))
 """Of the loads, at which a curve is drawn: up to 125 %."""
 
 
@@ -158,7 +160,7 @@ class LoadCurve(Immutable):
     loads: Array
 
 
-def load_curve(machine: Machine | MachineState, shares: Sequence[float] = SHARES) -> LoadCurve:
+def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_SHARES) -> LoadCurve:
     """Follow the state of rest while the loads grow, each share from the one before.
 
     Args:
@@ -289,3 +291,85 @@ def _without_rest(state: MachineState) -> LoadedState:
     return LoadedState(
         state, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
     )
+
+
+def about_rest(state: MachineState, judged: Stability, slack: Sequence[str]) -> str:
+    """Say what is special about a state of rest.
+
+    Args:
+        state: of the machine that is at rest.
+        judged: what the springs make of it.
+        slack: names of legs in which a spring carries nothing.
+    """
+    sentences = [*_about_stability(judged, state.limit)]
+    if slack:
+        sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
+    bent = sorted((strut for strut in state.struts if strut.bends_away), key=lambda strut: strut.factor)
+    if bent:
+        sentences.append(_bends_away(state.machine, bent[0], len(bent) - 1))
+    return " ".join(sentences) or "At rest and stable."
+
+
+def _about_stability(judged: Stability, limit: LoadLimit | None) -> list[str]:
+    """That the machine is not stable, or has passed a state in which it was not, and how it gives way there."""
+    if not judged.stable:
+        stands = how_it_gives_way(limit)
+        return [f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"]
+    if limit is None or limit.share == 1.0 or limit.least:
+        return []
+    return [f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}"]
+
+
+def _bends_away(machine: Machine, strut: Strut, others: int) -> str:
+    """That a strut is pressed with more than Euler's load, which the springs do not know, and so many others too."""
+    show, more = machine.display.show, f" (and {others} more)" if others else ""
+    return (
+        f"Strut {strut.name} bends away{more}: it is pressed with {show(strut.compression, 'N')}, and Euler's load of "
+        f"a column of {show(strut.length, 'm')} between two hinges is {show(strut.euler_load, 'N')}. Make it shorter "
+        "or its cross-section stiffer."
+    )
+
+
+def why_no_rest(machine: Machine, limit: LoadLimit | None) -> str:
+    """Say that a machine comes to no rest under its loads, and under which share of them it stood last."""
+    return f"{machine.name} comes to no rest under this load. {how_it_gives_way(limit)} {ADVICE}"
+
+
+def why_no_tensions(machine: Machine) -> str:
+    """Say that no tensions within the bounds of [load] hold the load."""
+    load, show = machine.tables["load"], machine.display.show
+    least = 0.0 if math.isinf(load.min_tension) else load.min_tension
+    upper = "or more" if math.isinf(load.max_tension) else f"to {show(load.max_tension, 'N')}"
+    return (
+        f"No tensions of {show(least, 'N')} {upper} hold this load at the pose of {machine.name}; change the bounds "
+        "load.min_tension and load.max_tension, the load, or the pose."
+    )
+
+
+def how_it_gives_way(limit: LoadLimit | None) -> str:
+    """Say up to which share of its loads a machine stands, by which motion it gives way, and what is slack then.
+
+    Args:
+        limit: of the machine; None if no share of its loads was found under which it stands.
+    """
+    if limit is None:
+        return "No share of it was found under which it stands."
+    mode = describe((limit.judged.mode * limit.balance.mechanism.twist_units[0]).tolist(), ("rad", "m"))
+    slack, legs = _slack_legs(limit.balance), moving_legs(limit.balance, limit.judged)
+    known = limit.judged.mode.any()
+    by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
+    what = f" Slack there: {', '.join(slack)}." if slack else ""
+    least = "at least " if limit.least else ""
+    return f"It stands up to {least}{limit.share:.3g} times this load{by}.{what}"
+
+
+def moving_legs(equations: Balance, judged: Stability) -> list[str]:
+    """The legs that move most when a state gives way."""
+    legs = zip(equations.mechanism.legs, judged.legs, strict=True)
+    return [leg.name for leg, size in legs if size > 0.5 * max(judged.legs)]
+
+
+def _slack_legs(equations: Balance) -> list[str]:
+    """The legs in which a spring could carry loads of the other sign only, and carries nothing."""
+    pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
+    return [leg.name for leg, terms in pairs if ((leg.sign != 0.0) & (terms.carrying[0] == 0.0)).any()]
