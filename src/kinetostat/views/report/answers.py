@@ -17,7 +17,7 @@ from kinetostat.studies.optimisation.result import Result, message
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
-from kinetostat.views.answers import described, kind_of
+from kinetostat.views.answers import description_of
 from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
@@ -57,12 +57,11 @@ def answer_sections(answers: Answers) -> Iterator[Section]:
         answer = answers.of(name)
         if not answer:
             continue
-        description = kind_of(answer).description
-        if description:
-            more = _frequencies(answers) if name == "vibration" else ()
-            yield described_section(described(description), answer, more)
-        else:
+        if name in WRITTEN_SECTIONS:
             yield WRITTEN_SECTIONS[name](answer, answers)
+        else:
+            more = _frequencies(answers) if name == "vibration" else ()
+            yield described_section(description_of(answer), answer, more)
     if answers.fit:
         yield _fit_section(answers.machine, answers.fit)
 
@@ -151,7 +150,7 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
 
 
 WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": loaded_section}
-"""Sections on answers that have no description."""
+"""Sections that say more than the description: the state under load is shown beside the free one."""
 
 
 def _fit_section(machine: Machine, record: FitRecord) -> Section:
