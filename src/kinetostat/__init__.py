@@ -49,22 +49,11 @@ _HOMES = {
 }
 _SHOWN = {
     "Machine": "kinetostat.machine.machine",
-    "Analysis": "kinetostat.studies.analysis",
-    "Forward": "kinetostat.studies.assembly",
-    "LoadedState": "kinetostat.studies.under_load",
-    "Vibration": "kinetostat.studies.vibration",
     "Command": "kinetostat.studies.commanding",
     "CorrectionTable": "kinetostat.studies.corrections",
-    "Workspace": "kinetostat.studies.workspace",
     "Carrying": "kinetostat.studies.carrying",
-    "Sensitivity": "kinetostat.studies.sensitivity",
-    "Guidelines": "kinetostat.studies.guidelines",
     "Budget": "kinetostat.studies.budget.budget",
-    "Identification": "kinetostat.studies.identification.identification",
-    "MeasuredComparison": "kinetostat.studies.measured.comparison",
-    "Comparison": "kinetostat.studies.comparison",
     "Result": "kinetostat.studies.optimisation.result",
-    "Validation": "kinetostat.validation.comparison",
 }
 """Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
@@ -79,6 +68,9 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
+    questions = import_module("kinetostat.views.questions").QUESTIONS
+    if name in questions:
+        return import_module("kinetostat.views.question").late(questions[name][1]).answer
     raise AttributeError(f"kinetostat has no {name!r}; it has {', '.join(__all__)}")
 
 
@@ -89,7 +81,9 @@ def __dir__() -> list[str]:
 def load_ipython_extension(shell: object) -> None:
     """Let IPython show machines, answers and figures as tables and pictures; in a notebook, importing does it."""
     formatters = shell.display_formatter.formatters
-    for name, module in _SHOWN.items():
+    described = import_module("kinetostat.views.questions").ANSWERS
+    classes = [(module, name) for name, module in _SHOWN.items()]
+    for module, name in [*classes, *(f"kinetostat.{place}".rsplit(".", 1) for place in described)]:
         formatters["text/html"].for_type_by_name(module, name, lambda answer: _notebook().html_of(answer))
     formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", lambda figure: _notebook().png_of(figure))
 

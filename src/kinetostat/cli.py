@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from kinetostat.commands.asking import add_question
+from kinetostat.commands.asking import add_other_questions, add_question
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
@@ -184,6 +184,7 @@ def _parser() -> Parser:
     add_report_commands(commands)
     add_studio_command(commands)
     add_doctor_command(commands)
+    add_other_questions(commands)
     return parser
 
 

@@ -28,6 +28,7 @@ TITLES = (
     "Add an index",
     "Add an export format",
     "Add a damper or a mass",
+    "Add a question",
 )
 
 

@@ -46,6 +46,13 @@ def add_question(commands: "Commands", word: str) -> None:
     command.later = partial(_fill, summary=summary, where=where)
 
 
+def add_other_questions(commands: "Commands") -> None:
+    """Add the commands of all questions that have none yet."""
+    for word in QUESTIONS:
+        if word not in commands.choices:
+            add_question(commands, word)
+
+
 def _fill(command: Parser, summary: str, where: str) -> None:
     question: Question = late(where)
     command.description = f"{summary[0].upper()}{summary[1:]}."

@@ -15,6 +15,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
 from kinetostat.views.question import Description, late
+from kinetostat.views.questions import ANSWERS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -89,10 +90,6 @@ KINDS = (
             ".glb": "views.scene.glb.machine_glb",
         },
     ),
-    Kind("studies.analysis.Analysis", description="views.analysis.ANALYSIS"),
-    Kind("studies.assembly.Forward", description="views.forward.MODES"),
-    Kind("studies.under_load.LoadedState", description="views.analysis.LOADED"),
-    Kind("studies.vibration.Vibration", description="views.vibration.VIBRATION"),
     Kind(
         "studies.commanding.Command",
         files={".csv": "views.command.command_csv"},
@@ -110,7 +107,6 @@ KINDS = (
         "studies.carrying.as_json",
         {".nc": "studies.carrying.as_dataset"},
     ),
-    Kind("studies.evaluation.PoseAnswers", description="views.path.PATH"),
     Kind(
         "xarray.Dataset",
         "views.grid_tables.print_grid",
@@ -118,25 +114,18 @@ KINDS = (
         "studies.grid.as_json",
         {".nc": "studies.grid.as_dataset"},
     ),
-    Kind("studies.workspace.Workspace", description="views.workspace.WORKSPACE"),
-    Kind("studies.sensitivity.Sensitivity", description="views.sensitivity.SENSITIVITY"),
-    Kind("studies.identification.identification.Identification", description="views.identification.IDENTIFICATION"),
-    Kind("studies.guidelines.Guidelines", description="views.guidelines.GUIDELINES"),
     Kind(
         "studies.budget.budget.Budget",
         files={".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.budget_dataset"},
         description="views.budget.BUDGET",
     ),
-    Kind("studies.budget.budget.PossibleErrors", description="views.budget.POSSIBLE_ERRORS"),
-    Kind("studies.comparison.Comparison", description="views.comparison.COMPARISON"),
-    Kind("studies.measured.comparison.MeasuredComparison", description="views.measured.MEASURED_STIFFNESS"),
     Kind(
         "studies.optimisation.result.Result",
         "views.optimisation_tables.print_result",
         "views.optimisation_figures.pictures",
         "studies.optimisation.result.as_json",
     ),
-    Kind("validation.comparison.Validation", description="views.validation.VALIDATION"),
+    *(Kind(name, description=place) for name, place in ANSWERS.items()),
 )
 """All kinds of results that Python and notebooks show."""
 

@@ -1,4 +1,4 @@
-"""All questions by their word, with a phrase that says what is computed, and where they live. Nothing is imported."""
+"""All questions and all described answers: what they are called, and where they live. Nothing is imported here."""
 
 from collections.abc import Mapping
 
@@ -33,3 +33,20 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
     ),
 }
 """Word, which is the command and the Python function; phrase; and the place of the `Question` in kinetostat."""
+
+ANSWERS: Mapping[str, str] = {
+    "studies.analysis.Analysis": "views.analysis.ANALYSIS",
+    "studies.assembly.Forward": "views.forward.MODES",
+    "studies.under_load.LoadedState": "views.analysis.LOADED",
+    "studies.vibration.Vibration": "views.vibration.VIBRATION",
+    "studies.evaluation.PoseAnswers": "views.path.PATH",
+    "studies.workspace.Workspace": "views.workspace.WORKSPACE",
+    "studies.sensitivity.Sensitivity": "views.sensitivity.SENSITIVITY",
+    "studies.identification.identification.Identification": "views.identification.IDENTIFICATION",
+    "studies.guidelines.Guidelines": "views.guidelines.GUIDELINES",
+    "studies.budget.budget.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
+    "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
+    "validation.comparison.Validation": "views.validation.VALIDATION",
+    "studies.comparison.Comparison": "views.comparison.COMPARISON",
+}
+"""Place of the `Description` of each class of answers."""
