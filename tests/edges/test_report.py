@@ -358,7 +358,7 @@ def test_a_machine_with_tolerances_has_a_section_of_its_error(tmp_path):
     assert f"As built: {built['message']}" in page.text
     _, *rows = page.table("Error of the tool at the platform point P")
     assert number(rows[-1][4]) == pytest.approx(1e6 * built["errors"]["usual"]["position"], rel=5e-3)
-    assert [row[0] for row in page.table("Contributions of the lines")[1:]] == ["joints"]
+    assert [row[0] for row in page.table("Contributions to the variance: lines")[1:]] == ["joints"]
     assert "As built:" not in Page(reported(tmp_path / "s.html", "hexapod", *LESS)).text
 
 
