@@ -74,7 +74,7 @@ def coordinates_by_name(texts: Sequence[str]) -> Mapping[str, str]:
     return given
 
 
-def _asked(machine: Machine, actuators: Sequence[str], starts: int, spread: float) -> Forward:
+def _asked(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:
     return forward(machine, coordinates_by_name(actuators), starts, spread)
 
 
