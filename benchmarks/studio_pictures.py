@@ -15,6 +15,8 @@ ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / "tests" / "edges"))
 from browser import Watched, browser, served  # noqa: E402  (of the tests)
 
+from kinetostat.views.questions import QUESTIONS  # noqa: E402
+
 IMAGES = ROOT / "docs" / "images"
 SWEEPS = 20
 """Improvements of the palette: without them, rare colours such as those of marks are lost."""
@@ -118,8 +120,8 @@ def question(new_tab: Any) -> None:
         page = new_tab()
         page.open(f"{address}?machine=hexapod&tool.mass=12+kg&linear_density.legs=4+kg%2Fm")
         page.tab.get_by_role("button", name="Ask", exact=True).first.click()
-        page.tab.get_by_role("combobox", name="question", exact=True).fill("modes")
-        page.tab.get_by_role("option", name="modes:").click()
+        page.tab.locator(".of-asking .form-about").wait_for()
+        page.choose("question", f"modes: {QUESTIONS['modes'][0]}")
         page.tab.get_by_label("lowest").fill("10 Hz")
         page.tab.locator(".of-asking .design-foot").get_by_role("button", name="Ask", exact=True).click()
         page.tab.locator(".answer figure").first.wait_for(state="attached")
