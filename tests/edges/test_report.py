@@ -383,7 +383,7 @@ def test_a_fit_has_a_section_with_its_numbers_and_pictures(tmp_path):
     (folder / "residuals.png").write_bytes(residual.read_bytes())
     (folder / "poses.png").write_text("not a picture")
     page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, "--fit", str(folder)))
-    for words in ("60 values at 20 poses (m.csv)", "3.2 times as large", "123.4 2.0 µm", "12.5", "not seen", "400 µm",
+    for words in ("60 values at 20 poses", "m.csv", "3.2 times as large", "123.4 2.0 µm", "12.5", "not seen", "400 µm",
                   "A <common> shift.", "17"):  # fmt: skip
         assert words in page.text
     assert "What is left of every measured value" in page.text

@@ -220,7 +220,7 @@ RECORDED_FIT = Description(
     type="studies.identification.record.RecordedFit",
     title="Identification",
     fields=(),
-    lines=lambda fit: _fit_lines(fit.record),
+    lines=lambda fit: [*_fit_lines(fit.record), ("Measurements", f"{fit.record.data}.")],
     tables=lambda fit, _full: _fit_tables(fit.record, fit.machine.display),
 )
 
