@@ -386,7 +386,11 @@ def work_of_drives(case: Case) -> str | None:
 
 
 def at_rest(case: Case) -> str | None:
-    """A loaded machine answers a further load by its compliance, and its springs do the work of its loads."""
+    """A loaded machine answers a further load by its compliance, and its springs do the work of its loads.
+
+    The compliance is given in its symmetric form. A moment m that keeps its direction makes the stiffness unsymmetric
+    by half of its cross product, and so the compliance by C [m] C / 2 (theory, tangent stiffness under load).
+    """
     state = case.loaded
     if state is None or state.rest is not Rest.OK or state.compliance is None or case.planar:
         return None
@@ -399,7 +403,10 @@ def at_rest(case: Case) -> str | None:
     if any(end is None or end.rest is not Rest.OK for end in ends) or any(end.slack_legs for end in ends):
         return None
     slope = (np.array(ends[1].displacement[3:]) - np.array(ends[0].displacement[3:])) / (2.0 * PUSH * size)
-    expected = np.array(state.compliance)[3:, 3 + axis]
+    moment = np.array([values(case.machine)[f"load.moment.{i}"] for i in range(3)])
+    compliance, unsymmetric = np.array(state.compliance), np.zeros((6, 6))
+    unsymmetric[:3, :3] = np.cross(np.eye(3), moment) / 2.0
+    expected = (compliance + compliance @ unsymmetric @ compliance)[3:, 3 + axis]
     scale = float(
         np.sqrt(np.trace(np.array(state.compliance)[3:, 3:]) * abs(np.array(state.compliance)[3 + axis, 3 + axis]))
     )
