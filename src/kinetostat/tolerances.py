@@ -189,6 +189,9 @@ UNBALANCED_LOAD = 1e-6
 """Share of a load that may remain where a singular system is solved by least squares; more means a free motion."""
 IDLE_MOTION = 1e-15
 """Relative stiffness below which a motion counts as idle: the round-off of the largest stiffness."""
+NO_MOMENTUM = 1e-14
+"""Share of all mass, moving as far as the softest motion, below which the mass of a motion is what round-off leaves
+where parts without stiffness have taken all momentum."""
 MASSLESS_MODE = 1e-9
 """Square of a frequency ratio: a mode this much faster than the first one is a motion without mass, by round-off."""
 UNMOVED = 1e-9

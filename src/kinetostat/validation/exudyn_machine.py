@@ -18,7 +18,7 @@ from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Machine, Plane
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, UNBALANCED_LOAD, UNMOVED
+from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, NO_MOMENTUM, UNBALANCED_LOAD, UNMOVED
 from kinetostat.validation.answer import Answer, Trial
 from kinetostat.validation.as_written import DrawnMachine, drawing
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
@@ -354,5 +354,6 @@ def modal_frequencies(model: Multibody) -> Array:
     idle, masses = idle @ turned[:, heavy], masses[heavy]
     softened -= idle @ (idle.T @ mass @ softened / masses[:, None])
     periods = np.linalg.eigvalsh(softened.T @ np.asarray(mass) @ softened)[::-1]
-    felt = periods[periods > MASSLESS_MODE * np.max(periods, initial=0.0)]
+    round_off = NO_MOMENTUM * np.trace(mass) * np.sum(softened**2)
+    felt = periods[periods > max(MASSLESS_MODE * np.max(periods, initial=0.0), round_off)]
     return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(felt)))

@@ -20,7 +20,7 @@ from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, withi
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
-from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, UNRESISTED
+from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, NO_MOMENTUM, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 
 WELL = 0.1
@@ -151,8 +151,11 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
             shapes = _spread(combined, [part[holds] for part in basis])
         else:
             squares, shapes = np.linalg.eigvalsh(ringing), np.zeros((int(holds.sum()), starts[-1], 0))
+        sizes = _within(np.broadcast_to(np.eye(starts[-1]), mass.shape), rows, basis, starts)[holds]
+        largest = np.trace(factors @ sizes @ np.swapaxes(factors, 1, 2), axis1=1, axis2=2)
+        round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * largest
         squares = squares[:, ::-1]
-        squares = np.where(squares > UNRESISTED * squares[:, :1], squares, 0.0)
+        squares = np.where(squares > np.maximum(UNRESISTED * squares[:, :1], round_off[:, None]), squares, 0.0)
         yield Solved(rows[holds], squares, shapes)
 
 
