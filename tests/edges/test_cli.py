@@ -15,7 +15,7 @@ from kinetostat.commands import common
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER, STOPPED
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
-from kinetostat.studies import analysis
+from kinetostat.views import analysis
 
 MACHINE = "zhang-gosselin-4dof"
 
