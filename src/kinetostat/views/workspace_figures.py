@@ -81,11 +81,11 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Po
         shown = ", ".join(_at(dataset, dim) for dim in fixed)
         title = f"{title}, {shown}"
     if len(dims) == 2:
-        return {"": partial(_sections, [dataset], labels, conditions, title)}
+        return {"": partial(_sections, [dataset], labels, conditions, title=title)}
     cuts = [dataset.isel({dims[2]: int(i)}) for i in _shown(dataset, dims)]
     return {
-        "-sections": partial(_sections, cuts, labels, conditions, title),
-        "-solid": partial(_solid, dataset, dims[:3], _telling(conditions), title),
+        "-sections": partial(_sections, cuts, labels, conditions, title=title),
+        "-solid": partial(_solid, dataset, dims[:3], _telling(conditions), title=title),
     }
 
 
