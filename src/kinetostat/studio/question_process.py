@@ -114,12 +114,12 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
     return "".join(parts)
 
 
-def ask(request: Mapping[str, Any], tell: Callable[[int, int], None]) -> None:
+def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
     """Ask a question about the machine in this folder, and write its answer there as a page and in every other form.
 
     Args:
         request: its `word`, the `options` that were given, and whether tables show every row (`full`).
-        tell: is called with how much is done, and of how much.
+        tell: is called with how much is done, and of how much, and perhaps with a few words.
 
     Raises:
         InputError: what the question refuses.
@@ -141,7 +141,7 @@ def ask(request: Mapping[str, Any], tell: Callable[[int, int], None]) -> None:
     write_text(Path(SHOWN), answer_html(description, answer, bool(request["full"])))
 
 
-def _tell(done: int, total: int) -> None:
+def _tell(done: int, total: int, _words: str = "") -> None:
     print(json.dumps({"done": done, "total": total}), flush=True)
 
 
