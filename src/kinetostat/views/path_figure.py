@@ -31,6 +31,7 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
 
     Args:
         answers: at the poses, which are taken as neighbours in the order in which they are given.
+        title: over the figure, with braces for the name of the machine.
     """
     names = list(answers.values)
     groups = {unit: [n for n in names if QUANTITIES[n].unit == unit] for unit in (QUANTITIES[n].unit for n in names)}
