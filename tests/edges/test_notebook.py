@@ -116,7 +116,7 @@ def test_nothing_is_fetched_and_the_page_keeps_its_own_colours(shown):
     assert "color:inherit" in style
 
 
-def test_importing_in_a_notebook_is_enough_and_loads_nothing_else():
+def test_importing_in_a_notebook_is_enough_and_loads_only_the_list_of_answers():
     code = (
         "import sys; from IPython.core.interactiveshell import InteractiveShell as S; s = S.instance();"
         "import kinetostat; print([m for m in sys.modules if m.startswith('kinetostat.')]);"
@@ -124,4 +124,5 @@ def test_importing_in_a_notebook_is_enough_and_loads_nothing_else():
         "print('kinetostat' in s.display_formatter.format(load('planar-3rpr'))[0]['text/html'])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split("\n")[:2] == ["[]", "True"]
+    loaded = ["kinetostat.views", "kinetostat.views.questions"]
+    assert done.stdout.split("\n")[:2] == [str(loaded), "True"]
