@@ -78,7 +78,7 @@ def _asked(machine: Machine, starts: int, spread: float, actuators: Sequence[str
     return forward(machine, coordinates_by_name(actuators), starts, spread)
 
 
-MODES = Description(
+ASSEMBLY_MODES = Description(
     type="studies.assembly.Forward",
     title="Poses of the actuator coordinates",
     fields=(

@@ -36,7 +36,7 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
 
 ANSWERS: Mapping[str, str] = {
     "studies.analysis.Analysis": "views.analysis.ANALYSIS",
-    "studies.assembly.Forward": "views.forward.MODES",
+    "studies.assembly.Forward": "views.forward.ASSEMBLY_MODES",
     "studies.under_load.LoadedState": "views.analysis.LOADED",
     "studies.vibration.Vibration": "views.vibration.VIBRATION",
     "studies.evaluation.PoseAnswers": "views.path.PATH",
