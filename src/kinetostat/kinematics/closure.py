@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.arrays import Array, Codes
+from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
@@ -141,9 +141,9 @@ class ClosedForms:
             # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
             status = self._status_where_determined(task, np.where(np.isnan(coordinates), 0.0, coordinates), status)
             if left.any():
-                rest = NEWTON(task)
-                coordinates = np.where(left[:, None], stacked(rest.coordinates, count), coordinates)
-                status = np.where(left, rest.status, status)
+                followed, codes = joints_followed(task.chains, task.goal, left)
+                coordinates = np.where(left[:, None], followed, coordinates)
+                status = np.where(left, codes, status)
         return task.joints(coordinates, status)
 
     @staticmethod
@@ -195,19 +195,23 @@ def _angle(amount: Scalar | Turn) -> Scalar:
     return np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
 
 
-def joints_followed(chains: Chains, goal: Array) -> tuple[Array, Codes]:
+def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> tuple[Array, Codes]:
     """Follow the joint coordinates of a machine from the home pose to its poses.
 
     Args:
         chains: the machine.
         goal: coordinates of the poses, in the order of the chains' pose [n x given], rad or m.
+        chosen: which of the poses are followed [n]; all if None. Nothing is said of the others.
 
     Returns:
         Joint coordinates, rad or m [n x coordinates], and `Status` codes [n].
     """
     count, free = len(goal), free_coordinates(chains)
     coordinates, status = np.zeros((count, chains.size)), np.full(count, int(Status.OK))
-    stated = [(problems, goal_of(problems, goal)) for problems in problems_of(chains, count, free)]
+    every = problems_of(chains, count, free)
+    if chosen is not None:
+        every = [problems.take(np.flatnonzero(chosen[problems.poses])) for problems in every]
+    stated = [(problems, goal_of(problems, goal)) for problems in every]
     for problems, there in stated:
         status[problems.poses[too_far_or_near(problems, there)]] = int(Status.OUT_OF_REACH)
     for whole, everywhere in stated:

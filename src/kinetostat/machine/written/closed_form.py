@@ -1,7 +1,7 @@
 """Closed-form joint coordinates of legs with three parallel revolutes and at most one slide along them.
 
-Which legs these are is seen from their axes at the home pose. All other legs are closed by Newton's method
-(`kinematics.closure`), and so are these where the platform turns out of the leg's plane.
+Which legs have a closed form, this or that of `ball_legs`, is seen from their axes at the home pose. All other legs are
+closed by Newton's method (`kinematics.closure`), and so are these where the platform turns out of the leg's plane.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,8 @@ from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Closure, Step
+from kinetostat.machine.machine import Closure, Inverse, Step
+from kinetostat.machine.written.ball_legs import across, ball_leg, point_of, turn_between
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
 
@@ -48,13 +49,13 @@ class ParallelAxes:
         """
         movers = [step.element.mover for step in steps if step.moves]
         axis = movers[self.revolutes[0]].axis
-        first, middle, last = (_point(movers[i]) for i in self.revolutes)
+        first, middle, last = (point_of(movers[i]) for i in self.revolutes)
         goal = motion.apply(last)
-        lower, upper, span = (_across(v, axis) for v in (middle - first, last - middle, goal - first))
+        lower, upper, span = (across(v, axis) for v in (middle - first, last - middle, goal - first))
         bent, closure = self._triangle(axis, lower, upper, span)
-        lower_turn = _turn(axis, lower, bent)
-        both = _turn(axis, upper, span - bent)
-        whole = _turn(axis, lower, motion.rotation.apply(lower))
+        lower_turn = turn_between(axis, lower, bent)
+        both = turn_between(axis, upper, span - bent)
+        whole = turn_between(axis, lower, motion.rotation.apply(lower))
         amounts: list[Scalar | Turn] = [0.0] * len(movers)
         turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, whole))
         for i, turn in zip(self.revolutes, turns, strict=True):
@@ -74,23 +75,6 @@ class ParallelAxes:
         return span * along + axis.cross(span) * (self.bend * across), closure
 
 
-def _point(joint: Joint) -> Vector:
-    if joint.point is None:
-        raise ValueError("a slide has no point")
-    return joint.point
-
-
-def _across(vector: Vector, axis: Vector) -> Vector:
-    """The part of a vector at right angles to an axis."""
-    return vector - axis * vector.dot(axis)
-
-
-def _turn(axis: Vector, old: Vector, new: Vector) -> Turn:
-    """The turn about an axis that takes one vector at right angles to it to another of the same length."""
-    size = reciprocal(old.dot(old))
-    return Turn(old.dot(new) * size, axis.dot(old.cross(new)) * size)
-
-
 def _remaining_turn(first: Turn, whole: Turn) -> Turn:
     """The rest of a turn after the first part of it."""
     return Turn(
@@ -99,13 +83,17 @@ def _remaining_turn(first: Turn, whole: Turn) -> Turn:
     )
 
 
-def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
+def closed_form(name: str, steps: Sequence[Step]) -> Inverse | None:
     """Recognise the closed form of a leg at the home pose, if it has one; its numbers must be floats."""
     moving = [step.element for step in steps if step.moves]
     # The far side of a parallelogram slides along the axes at the home pose, and on a circle away from it.
     if any(isinstance(element, Parallelogram) for element in moving):
         return None
     movers = [element.mover for element in moving]
+    return _parallel_axes(name, movers) or ball_leg(name, movers)
+
+
+def _parallel_axes(name: str, movers: Sequence[Joint]) -> ParallelAxes | None:
     turning = [i for i, joint in enumerate(movers) if joint.point is not None]
     sliding = [i for i, joint in enumerate(movers) if joint.point is None]
     if len(turning) != 3 or len(sliding) > 1 or any(joint.pitch for joint in movers):
@@ -114,7 +102,7 @@ def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
     axis = axes[turning[0]]
     if np.linalg.norm(np.cross(axes, axis), axis=1).max() > PARALLEL_AXES:
         return None
-    points = np.array([_point(movers[i]).components() for i in turning], dtype=float)
+    points = np.array([point_of(movers[i]).components() for i in turning], dtype=float)
     lower, upper = (link - axis * (link @ axis) for link in np.diff(points, axis=0))
     bend = float(np.cross(upper, lower) @ axis)
     if min(np.linalg.norm(lower), np.linalg.norm(upper)) < NO_LINK or bend == 0.0:
