@@ -58,7 +58,9 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
         return np.where(rest.settled, largest(off), np.nan), lambda going: change[going]
 
     newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, settled=COMMANDED)
-    return CommandedState(Equilibria(mechanism, state, settled), logarithm(state.platform), before, ways @ rates)
+    return CommandedState(
+        Equilibria(mechanism, state, settled, settled), logarithm(state.platform), before, ways @ rates
+    )
 
 
 def with_tensions(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, Mask]:

@@ -195,8 +195,10 @@ def _model(equations: Balance, part: Admissible) -> _Model:
             elastic[:, start + i, start + i] = 0.0
             left[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
     force = -(np.swapaxes(part.motions, 1, 2) @ left[:, :, None])[:, :, 0]
-    columns = (np.stack(lines, axis=1), np.stack(loads, axis=1), np.stack(springs, axis=1))
-    return _Model(within(elastic + geometric, part.motions), force, *columns)
+    columns = [np.stack(each, axis=1) for each in (lines, loads, springs) if each]
+    nothing = np.zeros((len(part.rows), 0))
+    no_springs = (np.zeros((len(part.rows), 0, part.motions.shape[2])), nothing, nothing)
+    return _Model(within(elastic + geometric, part.motions), force, *(columns or no_springs))
 
 
 def least_within(stiffness: Array, force: Array, radius: Array) -> Array:

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.arrays import Array, Mask
-from kinetostat.equilibrium.balance import Balance, State, free_state
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.balance import Balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.solving import at_rest, states_near, with_share
+from kinetostat.equilibrium.solving import FEW_STEPS, are_near, at_rest, states_near, with_share
 from kinetostat.equilibrium.tangent import Stability, stabilities, stability
-from kinetostat.numerics.motions import logarithm
-from kinetostat.tolerances import AT_REST, ZERO_PIVOT
 
 STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
@@ -24,13 +22,6 @@ MOST_LOAD_STEPS = 14
 seconds."""
 ACCURACY_OF_SHARE = 1e-3
 """Relative accuracy of the load factor."""
-MOST_STEPS_BETWEEN_LOADS = 8
-"""Number of Newton's steps in a step of the loads: where it needs more, the step is too long."""
-MISSED_BY_TANGENTS = 0.5
-"""Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
-has snapped over, or the step is too long."""
-LONGEST_PLATFORM_STEP = 0.3
-"""Motion of the platform in a step, rad or in units of the machine's length."""
 
 
 @dataclass(frozen=True)
@@ -111,27 +102,12 @@ def _standing(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> Lo
     rows = np.zeros(len(shares), dtype=np.int64)
     every, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
     loaded = with_share(every, shares, preload=1.0)
-    solution = states_near(loaded, start, MOST_STEPS_BETWEEN_LOADS)
+    solution = states_near(loaded, start, FEW_STEPS)
     stands = solution.settled & stabilities(solution.balance).stable
     if last is not None:
-        stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)
+        stands &= are_near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)
     count = int(np.cumprod(stands).sum())
     if not count:
         return None
     equations = solution.at(np.array([count - 1]))
     return LoadLimit(float(shares[count - 1]), equations, stability(equations))
-
-
-def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask:
-    """Whether states moved as the tangents at the start and at the end foresee, or as any mixture of both [n].
-
-    Where a cable goes slack on the way, the one holds up to there and the other one from there.
-    """
-    ahead, behind = (states_near(loads, state, 1).state for loads, state in ((after, start), (before, end)))
-    pairs = ((ahead, start), (end, behind), (end, start))
-    first, last, moved = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
-    across = last - first
-    share = ((moved - first) * across).sum(axis=1) / np.maximum((across * across).sum(axis=1), ZERO_PIVOT)
-    foreseen = first + np.clip(share, 0.0, 1.0)[:, None] * across
-    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
-    return np.asarray((size <= LONGEST_PLATFORM_STEP) & (wrong <= MISSED_BY_TANGENTS * size + AT_REST))

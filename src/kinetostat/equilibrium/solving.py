@@ -1,4 +1,4 @@
-"""Solve for the state in which a mechanism is at rest: Newton's method, a descent or steps of the load where it fails.
+"""Solve for the state in which a mechanism is at rest: Newton's method, or small steps of the load, or a descent.
 
 Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
@@ -16,14 +16,25 @@ from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.tangent import solve, stabilities
 from kinetostat.numerics.iteration import Steps, largest, newton
-from kinetostat.tolerances import AT_REST
+from kinetostat.numerics.motions import logarithm
+from kinetostat.tolerances import AT_REST, ZERO_PIVOT
 
 MOST_STEPS_OF_LOAD = 25
 """Number of Newton's steps for one step of the load."""
 LONGEST_STEP = 0.2
 """Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
-LOAD_STEPS = (1, 8, 64)
-"""Numbers of steps of the load: one, and more where that does not converge and no spring goes slack."""
+FEW_STEPS = 8
+"""Number of Newton's steps that lead to a state nearby; where more are needed, or one is shortened, they wander, and
+round-off decides which state they meet."""
+FIRST_LOAD_STEP, LEAST_LOAD_STEP = 0.125, 1e-5
+"""Share of the loads by which they grow first where Newton's steps wander, and with which the state counts as lost."""
+MOST_LOAD_STEPS = 60
+"""Number of tries with which a state is followed: a machine that moves very far before it is lost takes seconds."""
+MISSED_BY_TANGENTS = 0.5
+"""Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
+has snapped over, or the step is too long."""
+LONGEST_PLATFORM_STEP = 0.3
+"""Motion of the platform in a step of the loads, rad or in units of the machine's length."""
 
 
 class Rest(IntEnum):
@@ -49,11 +60,13 @@ class Equilibria:
         mechanism: the mechanism with its load.
         state: those that were reached.
         settled: where these are at rest [n].
+        sure: where they are, and no other state could have been reached but for a large change of what is given [n].
     """
 
     mechanism: Mechanism
     state: State
     settled: Mask
+    sure: Mask
 
     @cached_property
     def balance(self) -> Balance:
@@ -66,17 +79,23 @@ class Equilibria:
 
     def with_part(self, rows: Integers, part: "Equilibria") -> "Equilibria":
         """The states with those of some of the poses [rows] in their places."""
-        settled = self.settled.copy()
-        settled[rows] = part.settled
-        return Equilibria(self.mechanism, self.state.with_part(rows, part.state), settled)
+        settled, sure = self.settled.copy(), self.sure.copy()
+        settled[rows], sure[rows] = part.settled, part.sure
+        return Equilibria(self.mechanism, self.state.with_part(rows, part.state), settled, sure)
+
+    def some(self, rows: Integers) -> "Equilibria":
+        """The states at some of the poses [rows]."""
+        return Equilibria(self.mechanism.at(rows), self.state.at(rows), self.settled[rows], self.sure[rows])
 
 
 def at_rest(mechanism: Mechanism, start: State | None = None) -> Equilibria:
     """Find the states of rest under the full load.
 
-    Newton's steps come first. Springs that carry loads of one sign only change the stiffness when they go slack, so
-    that these steps often end nowhere, or where the machine does not stay; then the potential is descended. Without
-    such springs, the load is applied in steps.
+    Newton's steps come first. Where they wander, it would be round-off that chooses among the states that they may
+    meet, stable or not: then the state is followed while all loads grow from nothing, and where it is lost, the
+    potential is descended from there, which leads to where the machine snaps over. Springs that carry loads of one sign
+    only change the stiffness when they go slack, so that Newton's steps often wander; then the potential is descended
+    from the beginning.
 
     Args:
         mechanism: the mechanism with its load.
@@ -86,32 +105,70 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Equilibria:
     reached = states_near(mechanism, state)
     if any(leg.sign.any() for leg in mechanism.legs):
         return _by_descent(mechanism, state, reached)
-    for steps in LOAD_STEPS[1:]:
-        rows = np.flatnonzero(~reached.settled)
+    rows = np.flatnonzero(~reached.sure)
+    if not len(rows):
+        return reached
+    part = mechanism.at(rows)
+    followed = _follow_loads(part, replace(free_state(part), amounts=state.amounts[rows]))
+    lost = np.flatnonzero(~followed.settled)
+    if len(lost):
+        fallen = states_near(part.at(lost), descent_from(part.at(lost), followed.state.at(lost)))
+        followed = followed.with_part(lost, replace(fallen, settled=fallen.sure))
+    return reached.with_part(rows, followed)
+
+
+def _follow_loads(mechanism: Mechanism, state: State) -> Equilibria:
+    """Follow states while all loads grow from nothing: to rest under all of them, or as far as they go."""
+    count = len(mechanism.length)
+    share, step, rows = np.zeros(count), np.full(count, FIRST_LOAD_STEP), np.arange(count)
+    for _ in range(MOST_LOAD_STEPS):
+        part, start = mechanism.at(rows), state.at(rows)
+        more = np.minimum(share[rows] + step[rows], 1.0)
+        before, after = with_share(part, share[rows]), with_share(part, more)
+        solution = states_near(after, start, FEW_STEPS)
+        going = np.flatnonzero(solution.sure)
+        nearby = solution.sure.copy()
+        nearby[going] = are_near(before.at(going), start.at(going), after.at(going), solution.state.at(going))
+        taken = np.flatnonzero(nearby)
+        state = state.with_part(rows[taken], solution.state.at(taken))
+        share[rows] = np.where(nearby, more, share[rows])
+        step[rows] *= np.where(nearby, 2.0, 0.25)
+        rows = rows[(share[rows] < 1.0) & (step[rows] > LEAST_LOAD_STEP)]
         if not len(rows):
             break
-        part = mechanism.at(rows)
-        state_of_part = replace(free_state(part), amounts=state.amounts[rows])
-        for number in range(1, steps + 1):
-            solution = states_near(with_share(part, number / steps), state_of_part)
-            state_of_part = solution.state
-            if not solution.settled.any():
-                break
-        reached = reached.with_part(rows, replace(solution, mechanism=part))
-    return reached
+    stands: Mask = np.asarray(share == 1.0)
+    return Equilibria(mechanism, state, stands, stands)
+
+
+def are_near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask:
+    """Whether states moved as the tangents at the start and at the end foresee, or as any mixture of both [n].
+
+    Where a cable goes slack on the way, the one holds up to there and the other one from there.
+
+    Args:
+        before, after: the mechanism with the loads of the start and of the end.
+        start, end: the states.
+    """
+    ahead, behind = (states_near(loads, state, 1).state for loads, state in ((after, start), (before, end)))
+    pairs = ((ahead, start), (end, behind), (end, start))
+    first, last, moved = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
+    across = last - first
+    share = ((moved - first) * across).sum(axis=1) / np.maximum((across * across).sum(axis=1), ZERO_PIVOT)
+    foreseen = first + np.clip(share, 0.0, 1.0)[:, None] * across
+    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
+    return np.asarray((size <= LONGEST_PLATFORM_STEP) & (wrong <= MISSED_BY_TANGENTS * size + AT_REST))
 
 
 def _by_descent(mechanism: Mechanism, start: State, reached: Equilibria) -> Equilibria:
-    """The states to which a descent leads where those that were reached are not at rest or not stable."""
-    rows = np.flatnonzero(~(reached.settled & stabilities(reached.balance).stable))
+    """The states to which a descent leads where those that were reached are not surely at rest, or not stable."""
+    rows = np.flatnonzero(~(reached.sure & stabilities(reached.balance).stable))
     if not len(rows):
         return reached
     part = mechanism.at(rows)
     solution = states_near(part, descent_from(part, start.at(rows)))
     better = solution.settled & (~reached.settled[rows] | stabilities(solution.balance).stable)
     chosen = np.flatnonzero(better)
-    settled = Equilibria(part.at(chosen), solution.state.at(chosen), solution.settled[chosen])
-    return reached.with_part(rows[chosen], settled) if len(chosen) else reached
+    return reached.with_part(rows[chosen], solution.some(chosen)) if len(chosen) else reached
 
 
 def with_share(mechanism: Mechanism, share: float | Array, preload: float | None = None) -> Mechanism:
@@ -160,4 +217,5 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
         longest=LONGEST_STEP,
         size=partial(motion_of, mechanism),
     )
-    return Equilibria(mechanism, end.value, end.converged)
+    sure = end.converged & (end.steps <= FEW_STEPS) & (end.longest <= LONGEST_STEP)
+    return Equilibria(mechanism, end.value, end.converged, sure)

@@ -72,12 +72,14 @@ class Solution(Generic[Value]):
         outcome: `Ending` codes [n].
         residual: the largest residual of each problem where it was evaluated last [n].
         steps: number of steps that were taken [n].
+        longest: size of the longest step, before it was shortened [n]; 0 where sizes of steps are not measured.
     """
 
     value: Value
     outcome: Integers
     residual: Array
     steps: Integers
+    longest: Array
 
     @property
     def converged(self) -> Mask:
@@ -142,6 +144,7 @@ def newton(
     limits = np.broadcast_to(closed, (count,))
     outcome, steps = np.full(count, int(Ending.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
     residual, last = np.full((2, count), np.inf)
+    greatest = np.zeros(count)
     for number in range(1, most_steps + 1):
         left, steps_of = equations(trial, rows)
         solved = left <= limits[rows]
@@ -150,7 +153,7 @@ def newton(
         value, residual[rows[nearer]] = _with_part(value, rows, trial, nearer), left[nearer]
         going = np.flatnonzero(nearer & ~solved)
         if not going.size:
-            return Solution(value, outcome, residual, steps)
+            return Solution(value, outcome, residual, steps, greatest)
         step, trial, rows = steps_of(going), _at(trial, going, len(rows)), rows[going]
         length = size(step)
         finite = np.isfinite(length)
@@ -160,7 +163,7 @@ def newton(
             enough = np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
             arrived = enough & (number > 1)
         outcome[rows[arrived]], outcome[rows[~finite]] = Ending.CONVERGED, Ending.DIVERGED
-        last[rows], steps[rows] = length, number
+        last[rows], steps[rows], greatest[rows] = length, number, np.maximum(greatest[rows], length)
         if (length > longest).any():
             step = step * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
         trial = move(trial, step)
@@ -168,8 +171,8 @@ def newton(
         going = np.flatnonzero(finite & ~arrived)
         trial, rows = _at(trial, going, len(rows)), rows[going]
         if not rows.size:
-            return Solution(value, outcome, residual, steps)
-    return Solution(_with_part(value, rows, trial, rows >= 0), outcome, residual, steps)
+            return Solution(value, outcome, residual, steps, greatest)
+    return Solution(_with_part(value, rows, trial, rows >= 0), outcome, residual, steps, greatest)
 
 
 def _at(value: Value, places: Integers, count: int) -> Value:
@@ -235,7 +238,7 @@ def least_squares(
         stuck = ~solved & ~(damping[rows] < MOST_DAMPING)
         outcome[rows[solved]], outcome[rows[stuck]] = Ending.CONVERGED, Ending.DIVERGED
         going[rows] = ~solved & ~stuck
-    return Solution(value, outcome, largest(left), steps)
+    return Solution(value, outcome, largest(left), steps, np.zeros(count))
 
 
 def damped_steps(left: Array, rates: Array, damping: Array) -> Array:
