@@ -32,8 +32,8 @@ class _Triangular:
     reflections: list["_Reflection"]
 
     @property
-    def turned(self) -> list[Row]:
-        """Q^T by columns."""
+    def images(self) -> list[Row]:
+        """Q^T by columns: the images of the unit vectors."""
         columns = _identity(len(self.vectors[0]))
         for reflection in self.reflections:
             for column in columns:
@@ -76,12 +76,12 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     """
     solved = _triangularise(basis)
     dual: list[Row] = [[] for _ in basis]
-    turned = solved.turned
+    images = solved.images
     for k in reversed(range(len(basis))):
         here, row = solved.order[k], solved.pivots[k]
         later = solved.order[k + 1 :]
         inverse = reciprocal(solved.vectors[here][row])
-        for column, rows in enumerate(turned):
+        for column, rows in enumerate(images):
             known = total([solved.vectors[j][row] * dual[j][column] for j in later])
             dual[here].append(weighted(inverse, rows[row] - known))
     return dual, _singularity_margin(basis, dual, solved.least)
@@ -95,12 +95,12 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
         singularity margin n / (|A| |A+|), as in `dual_basis`.
     """
     solved = _triangularise(rows)
-    size, steps, turned = len(rows), solved.inverse(), solved.turned
+    size, steps, images = len(rows), solved.inverse(), solved.images
     solution = [
         [total([column[p] * steps[k][j] for k, p in enumerate(solved.pivots)]) for j in range(size)]
-        for column in turned
+        for column in images
     ]
-    null = [[column[row] for column in turned] for row in solved.free]
+    null = [[column[row] for column in images] for row in solved.free]
     return solution, null, _singularity_margin(rows, steps, solved.least)
 
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, where
-from kinetostat.algebra.vector import Displacement, Vector, rotation_along
+from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Closure, Step
 from kinetostat.tolerances import NO_LINK, SAME_CENTRE
@@ -81,17 +81,16 @@ def _ball_turns(
 ) -> list[Turn]:
     """Turns of a ball's axes that are left of a motion after that of the joints before it (theory (75))."""
     first, middle, last = ball
-
-    def rest(vector: Vector, joints: Sequence[Joint], moved: Sequence[Scalar | Turn]) -> Vector:
-        for joint, amount in zip(joints, moved, strict=True):
-            if isinstance(amount, Turn):
-                vector = rotation_along(joint.axis, amount.cosine, -amount.sine).apply(vector)
-        return vector
-
-    wanted = rest(motion.rotation.apply(last.axis), arm, amounts)
+    turn = IDENTITY
+    for joint, amount in zip(arm, amounts, strict=True):
+        turn = turn @ joint.moved(amount)[1].rotation
+    back = turn.inverse()
+    wanted = back.apply(motion.rotation.apply(last.axis))
     two = by_two_axes((first, middle), last.axis, wanted, last.axis)
     across_last = across(middle.axis, last.axis)
-    turned = rest(motion.rotation.apply(across_last), [*arm, first, middle], [*amounts, *two])
+    turned = back.apply(motion.rotation.apply(across_last))
+    for joint, amount in zip((first, middle), two, strict=True):
+        turned = rotation_along(joint.axis, amount.cosine, -amount.sine).apply(turned)
     return [*two, turn_between(last.axis, across_last, across(turned, last.axis))]
 
 
@@ -143,17 +142,17 @@ def by_two_axes(joints: Sequence[Joint], start: Vector, end: Vector, home: Vecto
         start, end: the arms, of one length; the second axis turns the first of them, and the first axis the result.
         home: both of them at the home pose: the arm between the turns stays on the side of both axes where this lies.
     """
-    one, two = (joint.axis for joint in joints)
-    normal, slant = one.cross(two), one.dot(two)
+    first, second = (joint.axis for joint in joints)
+    normal, slant = first.cross(second), first.dot(second)
     shrink = reciprocal(normal.dot(normal))
-    high, low = end.dot(one), start.dot(two)
+    high, low = end.dot(first), start.dot(second)
     alpha, beta = (high - slant * low) * shrink, (low - slant * high) * shrink
     square = _square(start) - alpha * alpha - beta * beta - 2.0 * slant * (alpha * beta)
     side = sqrt(square * shrink) * _sign(home.dot(normal))
-    between = one * alpha + two * beta + normal * side
+    between = first * alpha + second * beta + normal * side
     return [
-        turn_between(one, across(between, one), across(end, one)),
-        turn_between(two, across(start, two), across(between, two)),
+        turn_between(first, across(between, first), across(end, first)),
+        turn_between(second, across(start, second), across(between, second)),
     ]
 
 

@@ -222,7 +222,10 @@ def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tu
         if names.count(name) > 1:
             raise InputError(f'"{origin}": a leg and a copy of another are both called "{name}"; rename one of them.')
     if len(legs) > MOST_LEGS:
-        raise InputError(f'"{origin}": it has {len(legs)} legs with all copies; at most {MOST_LEGS} are allowed.')
+        raise InputError(
+            f'"{origin}": it has {len(legs)} legs with all copies; at most {MOST_LEGS} are allowed, because the work '
+            "of sharing loads among them grows with the cube of their number."
+        )
     return tuple(legs)
 
 
