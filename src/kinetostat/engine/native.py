@@ -54,9 +54,11 @@ class Program:
         """Evaluate fewer points than there are lanes, by repeating the last of them."""
         count = len(codes)
         if count:
-            longer = [np.pad(column, (0, self._lanes - count), mode="edge") for column in columns]
+            longer = np.empty((len(columns), self._lanes))
+            for row, column in zip(longer, columns, strict=True):
+                row[:count], row[count:] = column, column[-1]
             padded, all_codes = np.empty((len(results), self._lanes)), np.empty(self._lanes, dtype=np.int8)
-            self.run(fixed, longer, padded, all_codes)
+            self.run(fixed, list(longer), padded, all_codes)
             results[:], codes[:] = padded[:, :count], all_codes[:count]
 
 
