@@ -26,6 +26,8 @@ from kinetostat.units import KINDS
 # to the import of this module: then the first answer takes as long as the others.
 xr.Dataset(coords={"pose": [0]})
 
+LOADS_LEFT_OUT = "loads_left_out"
+"""Attribute with the sentence on loads of the file that do not count; missing where all do."""
 ABOUT_STATUS = {
     "flag_values": [int(status) for status in Status],
     "flag_meanings": " ".join(status.word for status in Status),
@@ -45,12 +47,13 @@ def about_field(field: Parameter) -> dict[str, Any]:
     return {"units": kind.unit, "long_name": field.quantity.meaning, "kind": kind.name}
 
 
-def origin_of(machine: Machine, varied: Collection[str] = ()) -> dict[str, str]:
+def origin_of(machine: Machine, varied: Collection[str] = (), uncounted: str = "") -> dict[str, str]:
     """Attributes of a dataset: its machine with all numbers, how it is shown, and where the results hold.
 
     Args:
         machine: gives all that does not vary.
         varied: leaf paths of the parameters that do.
+        uncounted: the loads of its file that do not count, in a sentence; empty if all do.
     """
     return {
         "machine": machine.name,
@@ -59,6 +62,7 @@ def origin_of(machine: Machine, varied: Collection[str] = ()) -> dict[str, str]:
         "kinetostat": version("kinetostat"),
         "frame": frame_of(machine),
         "pose": pose_of(machine, varied),
+        **({LOADS_LEFT_OUT: uncounted} if uncounted else {}),
     }
 
 
@@ -108,5 +112,5 @@ def as_dataset(answers: PoseAnswers) -> xr.Dataset:
     return xr.Dataset(
         {"status": ("pose", answers.status, ABOUT_STATUS), **variables},
         coordinates,
-        origin_of(machine, list(poses.leaves)),
+        origin_of(machine, list(poses.leaves), answers.loads_left_out),
     )

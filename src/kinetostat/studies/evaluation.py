@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import several
 from kinetostat.studies.poses import PoseColumns
-from kinetostat.studies.quantities import refuse_absent, resolve_quantities
+from kinetostat.studies.quantities import refuse_absent, resolve_quantities, uncounted_loads
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Whole matrices by name, and how the names of their entries begin."""
@@ -53,6 +53,11 @@ class PoseAnswers:
     def failures(self) -> dict[Status, list[int]]:
         """The numbers of the poses, from 0, that have each status other than OK."""
         return {s: np.flatnonzero(self.status == s).tolist() for s in Status if s and (self.status == s).any()}
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return uncounted_loads(self.machine, self.values)
 
     def matrix(self, name: str) -> Array:
         """K or C at every pose [poses x n x n]; n is 6, or 3 of a planar machine."""

@@ -16,10 +16,10 @@ from kinetostat.machine.parameters import Parameter, dimension
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range
-from kinetostat.studies.datasets import ABOUT_STATUS, about_field, about_quantity, origin_of
+from kinetostat.studies.datasets import ABOUT_STATUS, LOADS_LEFT_OUT, about_field, about_quantity, origin_of
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.poses import chosen_axes, grid_of
-from kinetostat.studies.quantities import refuse_absent, resolve_quantities
+from kinetostat.studies.quantities import refuse_absent, resolve_quantities, uncounted_loads
 
 IN_MEMORY = 5_000_000
 """Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
@@ -67,7 +67,7 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     grid = grid_of(pairs)
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
-    labels = xr.Dataset({}, _coordinates(grid, pairs), origin_of(machine, taken))
+    labels = xr.Dataset({}, _coordinates(grid, pairs), origin_of(machine, taken, uncounted_loads(machine, names)))
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
 
@@ -165,6 +165,7 @@ def as_json(dataset: xr.Dataset) -> dict[str, Any]:
     return as_answer(
         {
             "name": dataset.attrs["machine"],
+            LOADS_LEFT_OUT: dataset.attrs.get(LOADS_LEFT_OUT, ""),
             "coordinates": {
                 field_of(dataset[dim]): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values}
                 for dim in dims

@@ -155,6 +155,11 @@ class Guidelines(Immutable):
         return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
 
     @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return state_of(self.machine).left_out
+
+    @property
     def over_grid(self) -> Roles | None:
         """Roles over the grid, if there is one with any answer."""
         return self.everywhere if self.poses[0] else None

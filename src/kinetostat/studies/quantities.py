@@ -4,11 +4,12 @@ All that is decided here follows from the file and from where the legs are, so t
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.equilibrium.cut import cut_machine
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.closure import legs_at_pose
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.machine.limits import LIMITS, About, Parts
@@ -20,6 +21,19 @@ from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
 ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
+
+
+def uncounted_loads(machine: Machine, names: Collection[str]) -> str:
+    """Say which loads of a file do not count in quantities of a machine; empty if they all do.
+
+    Quantities of the machine at rest under its loads count all of them, the others only those of which
+    `MachineState.left_out` does not speak.
+
+    Args:
+        machine: with its loads.
+        names: of quantities; none for an answer about the free machine.
+    """
+    return "" if names and all(QUANTITIES[name].loaded for name in names) else state_of(machine).left_out
 
 
 def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:

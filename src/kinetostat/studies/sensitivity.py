@@ -26,7 +26,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import ranked
-from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
+from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
 
@@ -156,6 +156,11 @@ class Sensitivity(Immutable):
     parameters: tuple[Influence, ...] = ()
     without_influence: tuple[str, ...] = ()
     without_derivative: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return uncounted_loads(self.machine, self.quantities)
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table of pandas, SI: for each parameter its value, and derivative and percent of each index."""

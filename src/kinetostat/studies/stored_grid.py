@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.datasets import ABOUT_STATUS, about_quantity
+from kinetostat.studies.datasets import ABOUT_STATUS, LOADS_LEFT_OUT, about_quantity
 from kinetostat.studies.grid import GridQuestion
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.result_file import (
@@ -326,6 +326,7 @@ def summary_json(stored: StoredGrid) -> dict[str, Any]:
     return as_answer(
         {
             "name": question.machine.name,
+            LOADS_LEFT_OUT: question.labels.attrs.get(LOADS_LEFT_OUT, ""),
             "file": str(stored.path),
             "points": question.grid.size,
             "coordinates": coordinates,

@@ -16,15 +16,14 @@ import xarray as xr
 from kinetostat.arrays import Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PER_CELL, Cells
-from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.limits import limits_loads
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
+from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question
 from kinetostat.studies.poses import MOST_DIMENSIONS
 from kinetostat.studies.workspace_borders import borders
@@ -36,7 +35,6 @@ BORDER_VARIABLES = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
-LEFT_OUT = "loads_left_out"
 """Attribute with the sentence about loads that a workspace with limited actuators does not count."""
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
@@ -152,6 +150,11 @@ class Workspace(Immutable):
     def __repr__(self) -> str:
         of = sum(self.nodes.values())
         return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return str(self.dataset.attrs.get(LOADS_LEFT_OUT, ""))
 
     @property
     def exists(self) -> bool:
@@ -315,6 +318,4 @@ def _dataset(
         wanted[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
-    uncounted = state_of(judge.machine).left_out
-    left_out = {LEFT_OUT: uncounted} if uncounted and limits_loads(judge.machine.tables["limits"]) else {}
-    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **left_out, **pose})
+    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})

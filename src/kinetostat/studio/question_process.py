@@ -97,7 +97,8 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
     if not description.answered(answer):
         return paragraph(str(answer.message), "lead")
     parts = [
-        f'<p class="note"><b>{escape(head)}</b> {escape(sentence)}</p>' for head, sentence in description.lines(answer)
+        f'<p class="note"><b>{escape(head)}</b> {escape(sentence)}</p>'
+        for head, sentence in description.sentences(answer)
     ]
     parts += [paragraph(f"Note: {doubt}") for doubt in doubts(answer.machine)]
     for shown in description.tables(answer, full):

@@ -27,7 +27,7 @@ from kinetostat.views import analysis_tables as free
 from kinetostat.views import loaded_tables as loaded
 from kinetostat.views.first_lines import first_lines
 from kinetostat.views.forward import actuator_coordinates
-from kinetostat.views.question import Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import MESSAGE, NAME, STATUS, Description, Field, Lines, Option, Question, Records
 
 INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
 
@@ -151,13 +151,13 @@ ANALYSIS = Description(
     type="studies.analysis.Analysis",
     title="Stiffness",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field("family", "machine.family.name"),
         Field("components"),
         Field("axes"),
         Field("pose", _pose),
-        Field("status", "status.word"),
-        Field("message"),
+        STATUS,
+        MESSAGE,
         Field("platform", _platform),
         Field("tool_offset", lambda analysis: analysis.machine.tables["tool"].offset),
         Field("stiffness"),
@@ -205,10 +205,10 @@ LOADED = Description(
     type="studies.under_load.LoadedState",
     title="Under load",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field("family", "machine.family.name"),
         Field("rest", "rest.word"),
-        Field("message"),
+        MESSAGE,
         Field("components"),
         Field("displacement"),
         Field("linear"),

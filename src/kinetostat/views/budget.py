@@ -28,7 +28,7 @@ from kinetostat.studies.budget.data import budget_dataset, contributions_csv, po
 from kinetostat.studies.budget.tolerances import is_about
 from kinetostat.units import KINDS
 from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.question import Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table, text_table
 
 MOST_LISTED_PARTS = 12
@@ -263,8 +263,8 @@ BUDGET = Description(
     type="studies.budget.budget.Budget",
     title="Error by tolerances",
     fields=(
-        Field("name", "machine.name"),
-        Field("message"),
+        NAME,
+        MESSAGE,
         Field("tolerances", lambda answer: {line.about: line.text for line in answer.tolerances}),
         Field("measures", lambda answer: dict(zip(answer.measures, answer.units, strict=True))),
         Field("leading_measure", "leading"),
@@ -314,7 +314,7 @@ POSSIBLE_ERRORS = Description(
     type="studies.budget.budget.PossibleErrors",
     title="Numbers that may be off",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field(
             "errors",
             lambda answer: [

@@ -19,7 +19,7 @@ from kinetostat.studies.corrections import CorrectionTable, Term, correction_tab
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.forward import precise
-from kinetostat.views.question import Description, Field, Lines, Option, Question
+from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 
 MOST_LISTED_TERMS = 40
@@ -76,8 +76,8 @@ COMMAND = Description(
     type="studies.commanding.Command",
     title="Commands",
     fields=(
-        Field("name", "machine.name"),
-        Field("message"),
+        NAME,
+        MESSAGE,
         Field("actuators"),
         Field("units"),
         Field("coordinates"),
@@ -183,8 +183,8 @@ CORRECTIONS = Description(
     type="studies.corrections.CorrectionTable",
     title="Corrections",
     fields=(
-        Field("name", "machine.name"),
-        Field("message"),
+        NAME,
+        MESSAGE,
         Field("axes", lambda answer: {f.path: values for f, values in zip(answer.fields, answer.axes, strict=True)}),
         Field("actuators", "command.actuators"),
         Field("units", "command.units"),

@@ -27,6 +27,10 @@ def _lines(comparison: Comparison) -> Lines:
     for letter, design in zip(letters, comparison.designs, strict=True):
         why = "" if design.answered else f": {design.analysis.message}"
         yield letter, f"{design.label}  {design.machine.name}{why}"
+    uncounted = [design.analysis.state.left_out for design in comparison.designs]
+    for text in dict.fromkeys(filter(None, uncounted)):
+        concerned = ", ".join(letter for letter, sentence in zip(letters, uncounted, strict=True) if sentence == text)
+        yield "Loads", f"{concerned}: {text}"
     yield "Percent", "Percentages are changes against A; the best value of each row is bold."
     if not _differing(comparison):
         yield "Files", "The files have equal values."
@@ -126,6 +130,7 @@ def _designs(comparison: Comparison) -> list[dict[str, Any]]:
             "components": design.analysis.components,
             "status": design.analysis.status.word,
             "message": design.analysis.message,
+            "loads_left_out": design.analysis.state.left_out,
             "softest": [{"direction": part.direction, "shares": dict(part.shares)} for part in softest],
         }
         for design, softest in zip(comparison.designs, comparison.softest, strict=True)

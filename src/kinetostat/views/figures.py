@@ -22,6 +22,7 @@ from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.parameters import entry_name, names_entries
+from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of, quantities_of
@@ -199,11 +200,12 @@ def note_setting(figure: Figure, *lines: str) -> None:
     figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
 
 
-def setting_lines(dataset: xr.Dataset) -> tuple[str, str]:
-    """Frame and pose of a grid, and how many of its poses have no result."""
+def setting_lines(dataset: xr.Dataset) -> tuple[str, str, str]:
+    """Frame and pose of a grid, loads that do not count, and how many of its poses have no result."""
     counts = [f"{status.word.replace('_', ' ')}: {count:,}" for status, count in failures(dataset).items()]
     missing = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses" if counts else ""
-    return "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text), missing
+    where = "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text)
+    return where, dataset.attrs.get(LOADS_LEFT_OUT, ""), missing
 
 
 def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:

@@ -9,7 +9,7 @@ from kinetostat.machine.parameters import find
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.assembly import Forward, ForwardPose, forward
 from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.question import Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
 
 DIGITS = 7
@@ -82,9 +82,9 @@ ASSEMBLY_MODES = Description(
     type="studies.assembly.Forward",
     title="Poses of the actuator coordinates",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field("family", "machine.family.name"),
-        Field("message"),
+        MESSAGE,
         Field("actuators", forms=("json",)),
         Records(
             "poses",

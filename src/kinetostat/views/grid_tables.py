@@ -12,6 +12,7 @@ from kinetostat.display import Display, number
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.parameters import shown
+from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import failures, field_of
 from kinetostat.studies.stored_grid import Extremes, StoredGrid
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
@@ -23,6 +24,7 @@ MOST_ROWS_OF_A_SWEEP = 60
 
 def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
     """A one-dimensional dataset as a table; of a larger one, the extremes of each quantity."""
+    print_uncounted(console, dataset)
     if len(dataset["status"].dims) == 1 and dataset["status"].size <= MOST_ROWS_OF_A_SWEEP:
         _print_curve(console, dataset, names)
     else:
@@ -35,6 +37,12 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
 def print_grid(console: Console, dataset: xr.Dataset) -> None:
     """Print a dataset with all its quantities, see `print_dataset`."""
     print_dataset(console, dataset, quantities_of(dataset))
+
+
+def print_uncounted(console: Console, dataset: xr.Dataset) -> None:
+    """Print which loads of the file do not count, if there are any."""
+    if LOADS_LEFT_OUT in dataset.attrs:
+        console.print(dataset.attrs[LOADS_LEFT_OUT], highlight=False)
 
 
 def quantities_of(dataset: xr.Dataset) -> list[str]:
@@ -55,6 +63,7 @@ def display_of(dataset: xr.Dataset) -> Display:
 def print_stored(console: Console, stored: StoredGrid) -> None:
     """A grid in a file: the extremes of each quantity, and what was there before."""
     question = stored.question
+    print_uncounted(console, question.labels)
     sizes = dict(zip(map(shown, question.fields), question.grid.shape, strict=True))
     _print_extremes(console, question.machine.name, sizes, stored.tally.extremes, question.machine.display)
     failed: dict[Status, int] = {

@@ -165,7 +165,7 @@ def rigid_figure(
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
         set_title(figure, title.format(guidelines.machine.name))
-        note_setting(figure, setting_of(guidelines.machine))
+        note_setting(figure, setting_of(guidelines.machine), guidelines.loads_left_out)
         fix_layout(figure)
     return figure
 

@@ -16,7 +16,7 @@ from kinetostat.studies.poses import read_poses
 from kinetostat.studies.quantities import usual_quantities
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import DISPLACED, quantities_option
-from kinetostat.views.question import Description, Field, Lines, Option, Question
+from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 
 USUAL_QUANTITY = "free_stiffness"
@@ -70,7 +70,8 @@ PATH = Description(
     type="studies.evaluation.PoseAnswers",
     title="Along the poses",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
+        LOADS_LEFT_OUT,
         Field("poses", _poses),
         Field("variables", _variables),
         Field("matrices", lambda answer: {name: answer.matrix(name) for name in answer.matrices}),

@@ -77,7 +77,7 @@ def _shade(panel: Axes, numbers: Integers) -> None:
             panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=ABSENT, linewidth=0.0)
 
 
-def _notes(answers: PoseAnswers) -> tuple[str, str]:
+def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
     counts = [f"{status.word.replace('_', ' ')}: {len(numbers):,}" for status, numbers in answers.failures.items()]
     missing = f"no result (grey) at {', '.join(counts)} of {answers.poses.count:,} poses" if counts else ""
-    return setting_of(answers.machine, list(answers.poses.leaves)), missing
+    return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing

@@ -68,6 +68,13 @@ class Field:
         return item[take] if isinstance(item, Mapping) else attrgetter(take)(item)
 
 
+NAME = Field("name", "machine.name")
+STATUS = Field("status", "status.word")
+MESSAGE = Field("message")
+LOADS_LEFT_OUT = Field("loads_left_out", forms=("json",))
+"""Sentence on the loads of the file that do not count: where an answer has this field, it is a line of all surfaces."""
+
+
 @dataclass(frozen=True)
 class Records:
     """Several things of one kind in an answer, such as its modes: objects in JSON, rows in CSV, an axis in NetCDF.
@@ -172,6 +179,13 @@ class Description:
         csv = ("csv",) if any("csv" in part.forms for part in tables) else ()
         nc = ("nc",) if arrays or any("nc" in part.forms for part in tables) else ()
         return tuple(dict.fromkeys(["json", *csv, *nc, *self.makers]))
+
+    def sentences(self, answer: Any) -> Lines:
+        """The lines of an answer, with one about the loads of the file that do not count behind the first."""
+        first, *others = [*self.lines(answer)] or [("", "")]
+        uncounted = answer.loads_left_out if LOADS_LEFT_OUT in self.fields else ""
+        lines = [first, ("Loads", uncounted), *others]
+        return [(head, sentence) for head, sentence in lines if sentence]
 
     def drawings(self, answer: Any) -> "dict[str, Drawing]":
         """The figures of an answer by name; none where nothing can be drawn."""

@@ -10,7 +10,17 @@ from kinetostat.studies.sensitivity import PER, Sensitivity, notes, sensitivity
 from kinetostat.units import KINDS, RIGID
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import quantities_option
-from kinetostat.views.question import Description, Field, Lines, Question, Records
+from kinetostat.views.question import (
+    LOADS_LEFT_OUT,
+    MESSAGE,
+    NAME,
+    STATUS,
+    Description,
+    Field,
+    Lines,
+    Question,
+    Records,
+)
 from kinetostat.views.tables import numeric_table, omitted
 
 MOST_INFLUENCES = 40
@@ -90,9 +100,10 @@ SENSITIVITY = Description(
     type="studies.sensitivity.Sensitivity",
     title="Sensitivity",
     fields=(
-        Field("name", "machine.name"),
-        Field("status", "status.word"),
-        Field("message"),
+        NAME,
+        STATUS,
+        MESSAGE,
+        LOADS_LEFT_OUT,
         Field("characteristic_length", lambda answer: answer.characteristic_length if answer.parameters else None),
         Field("indices", _indices),
         Records("parameters", "parameter", PARAMETER, _parameters),

@@ -12,7 +12,9 @@ from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import print_doubts
 
 HEADS = 11
-"""Columns of the words that stand before sentences."""
+"""Least columns of the words that stand before sentences."""
+GAP = 2
+"""Columns between them and the sentences."""
 
 
 def tell(console: Console, description: Description, answer: Any, full: bool = False) -> None:
@@ -25,10 +27,12 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
         full: whether tables show every row.
     """
     console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
-    lines = Table.grid(padding=(0, 2, 0, 0))
-    for head, sentence in description.lines(answer):
+    lines = Table.grid(padding=(0, GAP, 0, 0))
+    sentences = [*description.sentences(answer)]
+    room = console.width - max([HEADS, *(len(head) + GAP for head, _ in sentences)])
+    for head, sentence in sentences:
         # Rich would also break a line between a number and its percent sign, at a space that is not for breaking.
-        lines.add_row(Text(head, "bold"), "\n".join(textwrap.wrap(sentence, console.width - HEADS)))
+        lines.add_row(Text(head, "bold"), "\n".join(textwrap.wrap(sentence, room)))
     console.print(lines)
     if verdicts := getattr(answer, "requirements", ()):
         print_requirements(console, verdicts, answer.machine.display)

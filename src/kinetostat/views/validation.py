@@ -11,7 +11,7 @@ from kinetostat.machine.parameters import values
 from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation, frequency_difference
 from kinetostat.views.analysis_tables import matrix_table
-from kinetostat.views.question import Axis, Description, Field, Lines, Records
+from kinetostat.views.question import NAME, Axis, Description, Field, Lines, Records
 from kinetostat.views.tables import numeric_table
 
 COMPARED_DIGITS = 9
@@ -92,7 +92,7 @@ VALIDATION = Description(
     type="validation.comparison.Validation",
     title="Validation",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field("pose", _pose),
         Field("components", lambda _: list(COMPONENTS)),
         Field("engine"),

@@ -11,7 +11,7 @@ from kinetostat.studies.attribution import ranked
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.question import Axis, Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import MESSAGE, NAME, STATUS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
 
 LEAST_SHARE = 0.005
@@ -185,9 +185,9 @@ VIBRATION = Description(
     type="studies.vibration.Vibration",
     title="Vibration",
     fields=(
-        Field("name", "machine.name"),
-        Field("status", "status.word"),
-        Field("message"),
+        NAME,
+        STATUS,
+        MESSAGE,
         Field("loaded"),
         Field("components", lambda answer: list(answer.components)),
         Field("moving_mass"),

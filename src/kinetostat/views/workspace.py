@@ -8,11 +8,11 @@ from typing import Any
 from kinetostat.machine.limits import Limits, unlimited
 from kinetostat.machine.parameters import dimension, shown
 from kinetostat.studies.grid import field_of
-from kinetostat.studies.workspace import FEWEST_CELLS, LEFT_OUT, METHOD, Workspace, workspace
+from kinetostat.studies.workspace import FEWEST_CELLS, METHOD, Workspace, workspace
 from kinetostat.studies.workspace_verdicts import INSIDE, phrase
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import ranges_option
-from kinetostat.views.question import Description, Field, Lines, Option, Question
+from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 
 SHOWN_ERRORS = 2
@@ -51,8 +51,6 @@ def _lines(answer: Workspace) -> Lines:
         )
     if not answer.limits:
         yield "Limits", unlimited(Limits())
-    if LEFT_OUT in answer.dataset.attrs:
-        yield "Loads", str(answer.dataset.attrs[LEFT_OUT])
     if not answer.exists:
         yield "Inside", "No pose of the box is in the workspace; the table shows why."
     elif answer.connected is None:
@@ -124,12 +122,12 @@ WORKSPACE = Description(
     type="studies.workspace.Workspace",
     title="Workspace",
     fields=(
-        Field("name", "machine.name"),
+        NAME,
         Field("coordinates", _coordinates),
         Field("volume", _volume),
         Field("assembly_mode", lambda answer: answer.dataset.attrs.get("assembly_mode")),
         Field("limits", lambda answer: list(answer.limits)),
-        Field(LEFT_OUT, lambda answer: answer.dataset.attrs.get(LEFT_OUT, "")),
+        LOADS_LEFT_OUT,
         Field("nodes"),
         Field("connected"),
         Field("singularities_divide"),

@@ -17,8 +17,9 @@ from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loads import loads_left_out, loads_platform
+from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -117,6 +118,11 @@ class Budget(Immutable):
 
     def __repr__(self) -> str:
         return f"<Budget of {self.machine.name!r}: {len(self.parts)} tolerances, {len(self.status)} poses>"
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return state_of(self.machine).left_out
 
     @property
     def settled(self) -> Mask:
@@ -401,7 +407,7 @@ def _message(answer: Budget) -> str:
     size, most = (_small_motion(answer, value, "m") for value in (usual, worst))
     first = f"95 % of all machines are off by at most {size} {where}{many} (worst case {most})."
     if not worst:
-        return f"The tolerances do not move the tool {where}."
+        return f"The tolerances do not move the tool {where}. {answer.loads_left_out}".strip()
     ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in answer.shares_by("line").items() if share > 0.005]
     sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
     if answer.freedoms < len(answer.machine.family.components):
@@ -409,8 +415,7 @@ def _message(answer: Budget) -> str:
     if answer.pressed:
         some = f" ({len(answer.sometimes)} of them at some poses only)" if answer.sometimes else ""
         sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance{some}.")
-    uncounted = loads_left_out(answer.machine, answer.machine.configure((0.0,) * _joints(answer.machine)))
-    return " ".join([*sentences, uncounted]).strip()
+    return " ".join([*sentences, answer.loads_left_out]).strip()
 
 
 def _parasitic_sentence(answer: Budget, pose: int) -> str:

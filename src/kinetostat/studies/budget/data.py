@@ -79,4 +79,4 @@ def _labels(answer: Budget) -> xr.Dataset:
     pairs = [] if answer.poses is None else zip(answer.poses.fields, answer.poses.values, strict=True)
     for field, values in pairs:
         coordinates[field.dimension] = ("pose", values, {"units": field.unit, "field": field.path})
-    return xr.Dataset({}, coordinates, origin_of(answer.machine, varied))
+    return xr.Dataset({}, coordinates, origin_of(answer.machine, varied, answer.loads_left_out))

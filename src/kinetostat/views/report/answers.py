@@ -91,7 +91,7 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
     if not description.answered(answer):
         yield Paragraph(typeset(answer.message))
         return
-    for head, sentence in description.lines(answer):
+    for head, sentence in description.sentences(answer):
         if head != SAID_BEFORE:
             yield Paragraph(typeset(sentence), f"{head}:")
     for part in description.tables(answer, False):

@@ -222,7 +222,8 @@ def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
     for n, link in enumerate(moved.links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
         path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * moving.radii[link.leg]
-        wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
+        if len(set(path)) == len(path):  # a link without a length is no wire
+            wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
     motion = exaggerated_displacement(moved.motion, moving.point, factor)
     body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
     return [*wires, *body]
