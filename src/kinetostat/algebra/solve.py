@@ -18,19 +18,34 @@ Row = list[Scalar]
 
 @dataclass(frozen=True)
 class _Triangular:
-    """Q^T V = R for given vectors V: `vectors` holds R and `turned` Q^T, both by columns.
+    """Q^T V = R for given vectors V: `vectors` holds R by columns.
 
     Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot. Q is the
-    product of as many reflections. `least` is the smallest pivot, 0 where the vectors are dependent.
+    product of the `reflections`. `least` is the smallest pivot, 0 where the vectors are dependent.
     """
 
     vectors: list[Row]
-    turned: list[Row]
     order: list[int]
     pivots: list[int]
     free: list[int]
     least: Scalar
-    reflections: int
+    reflections: list["_Reflection"]
+
+    @property
+    def images(self) -> list[Row]:
+        """Q^T by columns: the images of the unit vectors."""
+        columns = _identity(len(self.vectors[0]))
+        for reflection in self.reflections:
+            for column in columns:
+                reflection.apply(column)
+        return columns
+
+    def column(self, row: int) -> Row:
+        """The column of Q of one row, by the reflections in reverse: less work than all columns of Q^T."""
+        result = _identity(len(self.vectors[0]))[row]
+        for reflection in reversed(self.reflections):
+            reflection.apply(result)
+        return result
 
     def inverse(self) -> list[Row]:
         """R^-T: row k gives the component along pivot k for each vector's coefficient."""
@@ -61,13 +76,14 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     """
     solved = _triangularise(basis)
     dual: list[Row] = [[] for _ in basis]
+    images = solved.images
     for k in reversed(range(len(basis))):
         here, row = solved.order[k], solved.pivots[k]
         later = solved.order[k + 1 :]
         inverse = reciprocal(solved.vectors[here][row])
-        for column, turned in enumerate(solved.turned):
+        for column, rows in enumerate(images):
             known = total([solved.vectors[j][row] * dual[j][column] for j in later])
-            dual[here].append(weighted(inverse, turned[row] - known))
+            dual[here].append(weighted(inverse, rows[row] - known))
     return dual, _singularity_margin(basis, dual, solved.least)
 
 
@@ -79,12 +95,12 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
         singularity margin n / (|A| |A+|), as in `dual_basis`.
     """
     solved = _triangularise(rows)
-    size, wide, steps = len(rows), len(rows[0]), solved.inverse()
+    size, steps, images = len(rows), solved.inverse(), solved.images
     solution = [
         [total([column[p] * steps[k][j] for k, p in enumerate(solved.pivots)]) for j in range(size)]
-        for column in solved.turned
+        for column in images
     ]
-    null = [[solved.turned[i][row] for i in range(wide)] for row in solved.free]
+    null = [[column[row] for column in images] for row in solved.free]
     return solution, null, _singularity_margin(rows, steps, solved.least)
 
 
@@ -95,7 +111,7 @@ def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         The n - a basis vectors, and the singularity margin a / (|V| |V+|) of the given ones, as in `dual_basis`.
     """
     solved = _triangularise(vectors)
-    basis = [[column[row] for column in solved.turned] for row in solved.free]
+    basis = [solved.column(row) for row in solved.free]
     return basis, _singularity_margin(vectors, solved.inverse(), solved.least)
 
 
@@ -118,7 +134,7 @@ def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
     columns = [*zip(solved.order, solved.pivots, strict=True), *enumerate(solved.free, len(vectors))]
     rows = [row for _, row in sorted(columns)]
     swaps = sum(rows[i] > rows[j] for j in range(len(rows)) for i in range(j))
-    sign: Scalar = -1.0 if (swaps + solved.reflections) % 2 else 1.0
+    sign: Scalar = -1.0 if (swaps + len(solved.reflections)) % 2 else 1.0
     for here, row in zip(solved.order, solved.pivots, strict=True):
         sign = where(solved.vectors[here][row] < 0.0, -sign, sign)
     return sign
@@ -126,44 +142,57 @@ def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
 
 def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     """Householder QR, backward stable without pivoting, so that it needs no data-dependent branch."""
-    size = len(vectors[0])
     reduced = [list(vector) for vector in vectors]
-    turned: list[Row] = [[1.0 if i == j else 0.0 for i in range(size)] for j in range(size)]
-    waiting, free = list(range(len(vectors))), list(range(size))
+    waiting, free = list(range(len(vectors))), list(range(len(vectors[0])))
     order: list[int] = []
     pivots: list[int] = []
     least: Scalar = math.inf
-    reflections = 0
+    reflections: list[_Reflection] = []
     while waiting:
         # The sparsest vector first: its few rows fill the others least, so that structural zeros last longest.
         here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
         waiting.remove(here)
         filled = [i for i in free if not is_zero(reduced[here][i])] or free[:1]
-        _reflect(reduced[here], [*(reduced[j] for j in waiting), *turned], filled)
-        reflections += len(filled) > 1
+        if len(filled) > 1:
+            reflections.append(_reflection(reduced[here], filled))
+            for other in waiting:
+                reflections[-1].apply(reduced[other])
         order.append(here)
         pivots.append(filled[0])
         free.remove(filled[0])
         least = smaller(least, abs(reduced[here][filled[0]]))
-    return _Triangular(reduced, turned, order, pivots, free, least, reflections)
+    return _Triangular(reduced, order, pivots, free, least, reflections)
 
 
-def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
-    """Reflect all in place so that `column` keeps, of `rows`, only the first."""
-    if len(rows) == 1:
-        return
+@dataclass(frozen=True)
+class _Reflection:
+    """A reflection of some rows: what it subtracts is the product with `normal`, times `weight`, of the normal."""
+
+    rows: list[int]
+    normal: Row
+    weight: Scalar
+
+    def apply(self, other: Row) -> None:
+        """Reflect a vector in place."""
+        share = weighted(self.weight, total([a * other[i] for a, i in zip(self.normal, self.rows, strict=True)]))
+        for a, i in zip(self.normal, self.rows, strict=True):
+            other[i] = other[i] - share * a
+
+
+def _reflection(column: Row, rows: list[int]) -> _Reflection:
+    """The reflection after which a vector keeps, of some rows, only the first; the vector is changed so."""
     pivot = sqrt(total([column[i] * column[i] for i in rows]))
     # The sign opposite to the first entry: the difference below then adds two sizes and loses no digits.
     pivot = where(column[rows[0]] < 0.0, pivot, -pivot)
     normal = [column[rows[0]] - pivot, *(column[i] for i in rows[1:])]
-    weight = reciprocal(pivot * -normal[0])
-    for other in others:
-        share = weighted(weight, total([a * other[i] for a, i in zip(normal, rows, strict=True)]))
-        for a, i in zip(normal, rows, strict=True):
-            other[i] = other[i] - share * a
     for i in rows:
         column[i] = 0.0
     column[rows[0]] = pivot
+    return _Reflection(rows, normal, reciprocal(pivot * -normal[0]))
+
+
+def _identity(size: int) -> list[Row]:
+    return [[1.0 if i == j else 0.0 for i in range(size)] for j in range(size)]
 
 
 @dataclass(frozen=True)

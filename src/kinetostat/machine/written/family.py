@@ -69,16 +69,36 @@ def chains(plan: Plan, **tables: Any) -> Chains:
 
 
 def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
-    """A chain at given coordinates, and the displacement of its platform end from the home pose."""
+    """A chain at given coordinates, and the displacement of its platform end from the home pose.
+
+    Revolutes are turned in their axes at the home pose, which are often those of the base, so that traced products are
+    sparse; and revolutes about one point, as those of a ball, share its place.
+    """
     motion = Displacement(IDENTITY, ZERO)
     chain: list[Element] = []
+    home, centre = ZERO, ZERO
     for step in steps:
         placed = step.element.displaced(motion)
         if step.moves:
-            placed, moved = placed.moved(next(coordinates))
-            motion = moved @ motion
+            amount, mover = next(coordinates), step.element.mover
+            placed, moved = placed.moved(amount)
+            if moved.rotation is IDENTITY or mover.point is None or not is_zero(mover.pitch):
+                motion, home = moved @ motion, ZERO
+            else:
+                if mover.point is home:
+                    placed = _at_point(placed, centre)
+                home, centre = mover.point, placed.mover.point
+                turn = motion.rotation @ step.element.moved(amount)[1].rotation
+                motion = Displacement(turn, centre - turn.apply(home))
         chain.append(placed)
     return chain, motion
+
+
+def _at_point(element: Joint | Spring, point: Vector) -> Joint | Spring:
+    """A revolute, or a spring on one, with its place as it is known from the joint before it."""
+    if isinstance(element, Spring):
+        return replace(element, joint=replace(element.joint, point=point))
+    return replace(element, point=point)
 
 
 def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
