@@ -27,7 +27,8 @@ FEW_STEPS = 8
 """Number of Newton's steps that lead to a state nearby; where more are needed, or one is shortened, they wander, and
 round-off decides which state they meet."""
 FIRST_LOAD_STEP, LEAST_LOAD_STEP = 0.125, 1e-5
-"""Share of the loads by which they grow first where Newton's steps wander, and with which the state counts as lost."""
+"""The first step by which the loads grow where Newton's steps wander, and the step below which the state counts as
+lost: shares of all loads."""
 MOST_LOAD_STEPS = 60
 """Number of tries with which a state is followed: a machine that moves very far before it is lost takes seconds."""
 MISSED_BY_TANGENTS = 0.5
@@ -141,7 +142,7 @@ def _follow_loads(mechanism: Mechanism, state: State) -> Equilibria:
 
 
 def are_near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask:
-    """Whether states moved as the tangents at the start and at the end foresee, or as any mixture of both [n].
+    """Return which states have moved as the tangents at the start and at the end predict, or in between [n].
 
     Where a cable goes slack on the way, the one holds up to there and the other one from there.
 

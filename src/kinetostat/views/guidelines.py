@@ -15,17 +15,7 @@ from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guide
 from kinetostat.studies.plain_data import stiffness_of_spring
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import ranges_option
-from kinetostat.views.question import (
-    LOADS_LEFT_OUT,
-    MESSAGE,
-    NAME,
-    STATUS,
-    Description,
-    Field,
-    Lines,
-    Question,
-    Records,
-)
+from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
 from kinetostat.views.tables import numeric_table, omitted, text_table
 
 TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "design": "Design"}
@@ -262,9 +252,7 @@ GUIDELINES = Description(
     type="studies.guidelines.Guidelines",
     title="Guidelines",
     fields=(
-        NAME,
-        STATUS,
-        MESSAGE,
+        *FIRST_FIELDS,
         LOADS_LEFT_OUT,
         Field("components"),
         Field("rigid_within", lambda _answer: EXCESS),

@@ -71,8 +71,10 @@ class Field:
 NAME = Field("name", "machine.name")
 STATUS = Field("status", "status.word")
 MESSAGE = Field("message")
+FIRST_FIELDS = (NAME, STATUS, MESSAGE)
+"""Fields with which answers about a machine begin: its name, and the status of its pose in a word and in a sentence."""
 LOADS_LEFT_OUT = Field("loads_left_out", forms=("json",))
-"""Sentence on the loads of the file that do not count: where an answer has this field, it is a line of all surfaces."""
+"""The sentence on loads of the file that do not count: an answer with this field says it on all surfaces."""
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,7 @@ from kinetostat.studies.sensitivity import PER, Sensitivity, notes, sensitivity
 from kinetostat.units import KINDS, RIGID
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import quantities_option
-from kinetostat.views.question import (
-    LOADS_LEFT_OUT,
-    MESSAGE,
-    NAME,
-    STATUS,
-    Description,
-    Field,
-    Lines,
-    Question,
-    Records,
-)
+from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
 from kinetostat.views.tables import numeric_table, omitted
 
 MOST_INFLUENCES = 40
@@ -100,9 +90,7 @@ SENSITIVITY = Description(
     type="studies.sensitivity.Sensitivity",
     title="Sensitivity",
     fields=(
-        NAME,
-        STATUS,
-        MESSAGE,
+        *FIRST_FIELDS,
         LOADS_LEFT_OUT,
         Field("characteristic_length", lambda answer: answer.characteristic_length if answer.parameters else None),
         Field("indices", _indices),

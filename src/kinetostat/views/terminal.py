@@ -12,9 +12,9 @@ from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import print_doubts
 
 HEADS = 11
-"""Least columns of the words that stand before sentences."""
+"""Least width of the words that stand before the sentences, in columns of the terminal."""
 GAP = 2
-"""Columns between them and the sentences."""
+"""Width of the gap between these words and the sentences, in columns of the terminal."""
 
 
 def tell(console: Console, description: Description, answer: Any, full: bool = False) -> None:

@@ -11,7 +11,7 @@ from kinetostat.studies.attribution import ranked
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.question import MESSAGE, NAME, STATUS, Axis, Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
 
 LEAST_SHARE = 0.005
@@ -185,9 +185,7 @@ VIBRATION = Description(
     type="studies.vibration.Vibration",
     title="Vibration",
     fields=(
-        NAME,
-        STATUS,
-        MESSAGE,
+        *FIRST_FIELDS,
         Field("loaded"),
         Field("components", lambda answer: list(answer.components)),
         Field("moving_mass"),

@@ -39,16 +39,16 @@ class BallLeg:
     pair_first: bool
 
     def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
-        """Find joint coordinates that displace the platform end by `motion`, on the branches of the home pose.
+        """Find the joint coordinates at which the platform has moved by `motion`, on the branches of the home pose.
 
         Args:
             steps: the leg at the home pose.
             motion: the motion of the platform from its home pose, base frame.
 
         Returns:
-            One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where there are
-            none. The condition for the single joint to reach comes with them. Where it holds and they are NaN all the
-            same, the axes of the pair do not reach on this branch, and Newton's method says what kind of pose it is.
+            One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the leg
+            cannot reach. The condition for the single joint to reach comes with them. Where it holds and the
+            coordinates are NaN all the same, the pair does not reach on this branch, and Newton's method finds out why.
         """
         movers = [step.element.mover for step in steps if step.moves]
         if not self.backwards:
@@ -157,13 +157,16 @@ def by_two_axes(joints: Sequence[Joint], start: Vector, end: Vector, home: Vecto
 
 
 def ball_leg(name: str, movers: Sequence[Joint]) -> BallLeg | None:
-    """Recognise a leg with a ball at one end by its joints at the home pose, whose numbers are floats."""
+    """Recognise a leg with a ball at one end by its joints at the home pose; None if it is another leg.
+
+    Numbers of the joints must be floats.
+    """
     if len(movers) != 6 or any(not is_zero(joint.pitch) for joint in movers):
         return None
     for backwards in (False, True):
         row = movers[::-1] if backwards else movers
         arm, ball = row[:3], row[3:]
-        if not _meet(ball) or _squeezed(ball, ball[2].axis):
+        if not _meet(ball) or _is_in_plane(ball, ball[2].axis):
             continue
         for pair_first in (True, False):
             pair, single = (arm[:2], arm[2]) if pair_first else (arm[1:], arm[0])
@@ -173,9 +176,9 @@ def ball_leg(name: str, movers: Sequence[Joint]) -> BallLeg | None:
 
 
 def _decides(pair: Sequence[Joint], single: Joint, centre: Vector) -> bool:
-    """Whether the home pose lies clearly on one branch of both subproblems."""
+    """Whether the home pose is clearly on one branch: of the distance that the single joint sets, and of the pair."""
     arm = centre - point_of(pair[0])
-    if _squeezed(pair, arm):
+    if _is_in_plane(pair, arm):
         return False
     if single.point is None:
         return bool(abs(arm.dot(single.axis)) > LEAST_SHARE * arm.norm())
@@ -183,8 +186,8 @@ def _decides(pair: Sequence[Joint], single: Joint, centre: Vector) -> bool:
     return bool(abs(_bend(single, centre, point_of(pair[0]))) > LEAST_SHARE * crank.norm() * arm.norm())
 
 
-def _squeezed(joints: Sequence[Joint], arm: Vector) -> bool:
-    """Whether an arm lies in the plane of the first two axes, as far as can be told, or is none."""
+def _is_in_plane(joints: Sequence[Joint], arm: Vector) -> bool:
+    """Whether an arm lies in the plane of the first two axes, as far as can be told, or has no length."""
     volume = arm.dot(joints[0].axis.cross(joints[1].axis))
     return bool(arm.norm() < NO_LINK or abs(volume) <= LEAST_SHARE * arm.norm())
 

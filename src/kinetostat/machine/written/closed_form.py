@@ -69,10 +69,10 @@ class ParallelAxes:
         near, far, square = lower.dot(lower), upper.dot(upper), span.dot(span)
         shrink = reciprocal(square)
         along = 0.5 * (1.0 + (near - far) * shrink)
-        across = sqrt(near * shrink - along * along)
+        aside = sqrt(near * shrink - along * along)
         sizes = sqrt(near), sqrt(far)
         closure = Closure(self.leg, sqrt(square), abs(sizes[0] - sizes[1]), sizes[0] + sizes[1])
-        return span * along + axis.cross(span) * (self.bend * across), closure
+        return span * along + axis.cross(span) * (self.bend * aside), closure
 
 
 def _remaining_turn(first: Turn, whole: Turn) -> Turn:
