@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.machine.loading import build, load
+from kinetostat.machine.parameters import values
 from kinetostat.studies.under_load import under_load
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -37,3 +40,19 @@ def test_a_machine_that_snaps_over_comes_to_one_rest_in_whatever_order_its_legs_
     assert np.linalg.norm(state.displacement) == pytest.approx(0.0659, abs=1e-4)
     assert again.displacement == pytest.approx(state.displacement, rel=1e-6)
     assert state.residual < 1e-9
+
+
+@pytest.mark.parametrize("name", ["snaps-over.toml", "soft-stands.toml"])
+@pytest.mark.parametrize("count", [2, 300])
+def test_many_poses_have_the_rest_of_one(name, count):
+    """A matrix of rank 5 has a rigid spring, whose stiffness was NaN where poses are columns: no rest was found."""
+    machine = load(CASES / name)
+    here = values(machine)
+    path = next(path for path in here if path.startswith("pose."))
+    poses = PointTable({path: np.full(count, here[path])})
+    names = [f"displacement_{component}" for component in ("rx", "ry", "rz", "x", "y", "z")]
+    answers = evaluate(machine, poses, names)
+    assert not answers.status.any()
+    alone = under_load(machine).displacement
+    for place, quantity in enumerate(names):
+        assert answers.values[quantity] == pytest.approx(np.full(count, alone[place]), rel=1e-6)

@@ -14,6 +14,7 @@ from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.kinematics.chain import Chain, bar_turns
+from kinetostat.machine.column import plain
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
@@ -328,12 +329,18 @@ class _Row:
             return
         if spring.actuated:
             self._move(twist, -1, self.amounts.actuator(spring))
-        if not (isinstance(spring.stiffness, float) and np.isinf(spring.stiffness)):
+        if not _is_rigid(spring.stiffness):
             coordinate = self._coordinate(spring)
             self._move(twist, coordinate)
             if self.travels and not is_zero(spring.returns):
                 returned = self.units.load(spring, spring.returns) * self.travels[number - 1]
                 self.preload[coordinate] = self.preload[coordinate] + returned
+
+
+def _is_rigid(stiffness: Scalar) -> bool:
+    """Whether a stiffness is infinite, at every pose if it is a column."""
+    numbers = plain(stiffness)
+    return isinstance(numbers, float | np.ndarray) and bool(np.isinf(numbers).all())
 
 
 def elastic_leg(
