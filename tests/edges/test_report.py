@@ -333,7 +333,7 @@ def test_a_machine_meant_under_load_has_a_section_of_it(tmp_path, capsys):
 
 
 def test_loads_without_rest_are_said_in_the_report(tmp_path):
-    words = ["--set", "load.force=[0, 0, -2e6]", "--set", "limits.actuator_force=none", "--loaded"]
+    words = ["--set", "load.force=[0, 0, -2e9]", "--set", "limits.actuator_force=none", "--loaded"]
     page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, *words))
     assert "Under load, no rest: 6-UPS hexapod (stewart-simscape) comes to no rest" in page.text
     assert not any(caption.startswith("Load and deformation of every") for caption in page.tables)

@@ -14,6 +14,7 @@ from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
 from machines import CASES, every_machine, few, regular, stiffness_paths
 from numeric import (
+    BLOCKS,
     U,
     array,
     assert_blocks_close,
@@ -88,12 +89,28 @@ def test_rigid_is_the_exact_limit(case, data):
 @few
 @given(data=st.data())
 def test_free_is_the_limit(case, data):
-    """K(1e-3) - K(free) is small: what other springs hold stays held, and a leg carries what loads no free spring."""
+    """K(1e-3) - K(free) is small: what other springs hold stays held, and a leg carries what loads no free spring.
+
+    Where free springs together are hardly loaded, the limit is still some way off; then springs ten times softer come
+    nearer to it in proportion.
+    """
     response = data.draw(regular(case))
     some = data.draw(some_springs(response).map(lambda every: every[:MOST_FREE]))
     not_in_doubt(response, some, CLEARLY)
-    free, soft = (respring(response, dict.fromkeys(some, k)) for k in (0.0, SOFT))
-    assert_blocks_close(array(free.stiffness), array(soft.stiffness), 1e-2, array(response.stiffness))
+    free, soft, softer = (array(respring(response, dict.fromkeys(some, k)).stiffness) for k in (0.0, SOFT, 0.1 * SOFT))
+    if is_nearer(free, soft, softer):
+        return
+    assert_blocks_close(free, soft, 1e-2, array(response.stiffness))
+
+
+def is_nearer(free, soft, softer):
+    """Whether a tenth of the stiffness leaves at most a fifth of the difference, in every block of K."""
+    left, before = softer - free, soft - free
+    return all(
+        np.linalg.norm(left[rows, columns]) <= 0.2 * np.linalg.norm(before[rows, columns])
+        for rows in BLOCKS
+        for columns in BLOCKS
+    )
 
 
 ONE_STIFFNESS = [(case, path) for case in CASES for path in stiffness_paths(case.machine)]
