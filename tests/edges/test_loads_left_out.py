@@ -90,3 +90,20 @@ def test_a_pose_without_a_place_has_no_weight_of_its_links(capsys):
     heavy = ["--set", "load.gravity=[0, 0, -9.81]", "--set", "linear_density.legs=5 kg/m", "--set", "pose.z=9 m"]
     main(["guidelines", "hexapod", *heavy])
     assert "nan" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("given", [{"load.gravity.2": [0.0, -9.81]}, {"temperature_rise.legs": [0.0, 20.0]}])
+def test_a_load_that_only_a_swept_axis_brings_in_is_left_out_by_name(given):
+    machine = load("hexapod", ["linear_density.legs=5 kg/m", "expansion.legs=1e-5"])
+    (field,), (ends,) = given, given.values()
+    said = "the weight of the links" if "gravity" in field else "the growth of warm links"
+    grid = evaluate_grid(machine, [f"{field}={ends[0]}:{ends[1]}:2"], ["compliance_z"])
+    assert said in grid.attrs["loads_left_out"]
+    assert said in evaluate(machine, given, ["compliance_z"]).attrs["loads_left_out"]
+    assert "loads_left_out" not in evaluate_grid(machine, ["x=0:1e-3:2"], ["compliance_z"]).attrs
+
+
+def test_warmer_links_that_do_not_grow_are_no_load():
+    assert (
+        "loads_left_out" not in evaluate_grid(load("hexapod"), ["temperature_rise.legs=0:20:2"], ["compliance_z"]).attrs
+    )

@@ -7,6 +7,7 @@ import pytest
 
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -242,7 +243,7 @@ class TestBorders:
     def test_on_either_side_of_a_border_the_verdict_is_another(self):
         machine = load("hexapod", ["limits.longest_leg=20 cm"])
         result = workspace(machine, ["pose.x=-8 cm:8 cm:9", "pose.z=14 cm:26 cm:9"], ["free_stiffness_z > 30 N/um"])
-        judge = Judge(machine, result.conditions)
+        judge = Judge(state_of(machine), result.conditions)
         data = result.dataset
         border = data["border_x"].values
         verdict, x, z = data["verdict"].values, data["x"].values, data["z"].values

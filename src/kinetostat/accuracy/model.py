@@ -27,13 +27,13 @@ from kinetostat.accuracy.closing import (
 from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_error_sources, shared_error_sources
 from kinetostat.accuracy.rows import HomeRows, LegRow, home_rows, random_coordinates
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.kinematics.closure import solve_joints
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.machine.parameters import POSE
 from kinetostat.numerics.motions import Motions, cross
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
@@ -281,12 +281,12 @@ def _bracket(screw: Array, wrenches: Array) -> Array:
 
 
 def error_model(
-    machine: Machine, columns: Mapping[str, Array], count: int, load: npt.ArrayLike | None = None
+    machine: Machine | MachineState, columns: Mapping[str, Array], count: int, load: npt.ArrayLike | None = None
 ) -> ErrorModel:
     """State the errors of a machine at n poses.
 
     Args:
-        machine: as drawn.
+        machine: as drawn, or its state, as `state_of` returns it.
         columns: coordinates of the pose that vary, by leaf path ("pose.x"), SI [n].
         count: n.
         load: wrench at the tool point under which compliances count, base axes, N·m and N [6] or [n x 6]; that of the
@@ -295,13 +295,13 @@ def error_model(
     Raises:
         InputError: a column is not a coordinate of the pose, or the machine has no place at its home place.
     """
-    others = [path for path in columns if not path.startswith(POSE)]
+    given = state_of(machine)
+    machine, others = given.machine, [path for path in columns if not path.startswith(POSE)]
     if others:
         raise InputError(f'"{others[0]}" is not a coordinate of the pose of {machine.name}; errors are of one machine.')
-    posed = with_values(machine, columns) if columns else machine
-    joints = solve_joints(posed) if machine.family.chains else None
+    posed = states_at(machine, columns, count) if columns else given
     with np.errstate(all="ignore"):  # poses without a place
-        response, stands = respond(posed, joints), stand(posed, joints)
+        response, stands = posed.free, stand(posed.machine, posed.joints)
     status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
     rows = home_rows(machine)
     if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):

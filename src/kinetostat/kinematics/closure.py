@@ -20,7 +20,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Turn
-from kinetostat.machine.machine import Chains, Configuration, Machine
+from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import CLOSED
 
 
@@ -57,11 +57,6 @@ class Task:
         if self.single:
             return Joints(tuple(float(q) for q in coordinates[0]), int(status[0]))
         return Joints(tuple(map(column, coordinates.T)), status)
-
-
-def legs_at_pose(machine: Machine) -> Configuration:
-    """Place the legs of a machine at its pose; they mean something where the joints have been found."""
-    return machine.configure(solve_joints(machine).coordinates if machine.family.chains else ())
 
 
 def solve_joints(machine: Machine) -> Joints:

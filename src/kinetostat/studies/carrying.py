@@ -15,7 +15,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.numbers import states_of_rest
-from kinetostat.equilibrium.state import state_of, states_at
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
@@ -52,13 +52,13 @@ class Carrying(Immutable):
 
 
 @checked
-def carrying_legs(machine: Machine, ranges: Sequence[str], progress: Progress = silent) -> Carrying:
+def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progress: Progress = silent) -> Carrying:
     """Find which legs carry the machine at rest under its loads, over all combinations of some ranges.
 
     A leg is slack where one of its springs could only carry loads of the other sign; all other legs carry.
 
     Args:
-        machine: with its loads; gives all parameters that do not vary.
+        machine: with its loads, or its state, as `state_of` returns it; gives all parameters that do not vary.
         ranges: one axis each, "FIELD=from:to:count[:log]".
         progress: receives how far the work is.
 
@@ -66,8 +66,8 @@ def carrying_legs(machine: Machine, ranges: Sequence[str], progress: Progress = 
         InputError: no leg of the machine can go slack, a range that `evaluate_grid` refuses, or loads that
             `under_load` refuses.
     """
-    question = grid_question(machine, ranges, ["slack_springs"])
-    placed = state_of(machine).configuration
+    state = state_of(machine)
+    question, placed, machine = grid_question(state, ranges, ["slack_springs"]), state.configuration, state.machine
     if not any(spring.acts for spring in springs(placed)):
         raise InputError(
             f'all legs of {machine.name} pull and push, so that all of them carry; write acts = "pulls" at an '

@@ -13,6 +13,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -35,6 +36,7 @@ class PoseAnswers:
         matrices: "K", "C", both or none.
         values: values by quantity, with the entries of the matrices [poses]; NaN where the status is not OK.
         status: `Status` codes [poses].
+        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
     machine: Machine
@@ -43,6 +45,7 @@ class PoseAnswers:
     matrices: tuple[str, ...]
     values: Mapping[str, Array]
     status: Codes
+    loads_left_out: str = ""
 
     @property
     def answered(self) -> bool:
@@ -53,11 +56,6 @@ class PoseAnswers:
     def failures(self) -> dict[Status, list[int]]:
         """The numbers of the poses, from 0, that have each status other than OK."""
         return {s: np.flatnonzero(self.status == s).tolist() for s in Status if s and (self.status == s).any()}
-
-    @property
-    def loads_left_out(self) -> str:
-        """A sentence on the loads of the file that do not count; empty where all do."""
-        return uncounted_loads(self.machine, self.values)
 
     def matrix(self, name: str) -> Array:
         """K or C at every pose [poses x n x n]; n is 6, or 3 of a planar machine."""
@@ -89,10 +87,12 @@ def answers_at(
     wanted, parts = several(quantities), machine.family.component_names
     matrices = tuple(dict.fromkeys(name for name in wanted if name in MATRICES))
     names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts))
-    refuse_absent(machine, names, poses.fields)
+    state = state_of(machine)
+    refuse_absent(state, names, poses.fields)
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
-    return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status)
+    uncounted = uncounted_loads(state, computed.values, zip(poses.fields, poses.values, strict=True))
+    return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status, uncounted)
 
 
 def as_csv(answers: PoseAnswers) -> str:

@@ -10,6 +10,7 @@ import xarray as xr
 from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, in_chunks, in_this_process
 from kinetostat.engine.points import Grid
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, dimension
@@ -54,20 +55,24 @@ class GridQuestion:
         return self.grid.size <= IN_MEMORY
 
 
-def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[str]) -> GridQuestion:
-    """Read a question about a grid from texts; see `evaluate_grid`.
+def grid_question(machine: Machine | MachineState, ranges: Sequence[str], quantities: Sequence[str]) -> GridQuestion:
+    """Read a question about a grid from texts; see `evaluate_grid`. The machine may be given as its state.
 
     Raises:
         InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
             than six dimensions.
     """
+    state = state_of(machine)
+    machine = state.machine
     pairs = chosen_axes(machine, ranges)
     chosen = [parameter for _, parameter in pairs]
     taken = [leaf for parameter in chosen for leaf in parameter.leaves]
     grid = grid_of(pairs)
     names = resolve_quantities(quantities, machine.family.component_names)
-    refuse_absent(machine, names, chosen)
-    labels = xr.Dataset({}, _coordinates(grid, pairs), origin_of(machine, taken, uncounted_loads(machine, names)))
+    refuse_absent(state, names, chosen)
+    varied = [(parameter, axis.values) for parameter, axis in zip(chosen, grid.axes, strict=True)]
+    about = origin_of(machine, taken, uncounted_loads(state, names, varied))
+    labels = xr.Dataset({}, _coordinates(grid, pairs), about)
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
 
@@ -81,7 +86,7 @@ def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[s
 
 @checked
 def evaluate_grid(
-    machine: Machine,
+    machine: Machine | MachineState,
     ranges: Sequence[str],
     quantities: Sequence[str] = ("compliance",),
     progress: Progress = silent,
@@ -89,7 +94,7 @@ def evaluate_grid(
     """Evaluate quantities over all combinations of some ranges.
 
     Args:
-        machine: gives all parameters that do not vary.
+        machine: gives all parameters that do not vary; or its state, as `state_of` returns it.
         ranges: one axis each, "FIELD=from:to:count[:log]"; a field with several entries varies them together.
         quantities: names of quantities or groups.
         progress: receives how far the work is.

@@ -15,7 +15,7 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, responses, silent
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Points
-from kinetostat.equilibrium.state import state_of
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
     Element,
@@ -27,7 +27,7 @@ from kinetostat.kinetostatics.elements import (
     with_links_together,
     without_rounding,
 )
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.arguments import checked
@@ -117,7 +117,7 @@ class Guidelines(Immutable):
     """Design guidelines.
 
     Attributes:
-        machine: the machine.
+        state: of the machine at its pose.
         status: of its pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         components: names of the directions.
@@ -132,9 +132,10 @@ class Guidelines(Immutable):
         ranges: of the grid, as written.
         poses: how many poses of the grid have an answer, and how many there are.
         everywhere: roles at those that have one; None without a grid.
+        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
-    machine: Machine
+    state: MachineState
     status: Status
     message: str
     components: tuple[str, ...]
@@ -149,15 +150,16 @@ class Guidelines(Immutable):
     ranges: tuple[str, ...] = ()
     poses: tuple[int, int] = (0, 0)
     everywhere: Roles | None = None
+    loads_left_out: str = ""
+
+    @property
+    def machine(self) -> Machine:
+        """The machine."""
+        return self.state.machine
 
     def __repr__(self) -> str:
         count = len(self.parameters)
         return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
-
-    @property
-    def loads_left_out(self) -> str:
-        """A sentence on the loads of the file that do not count; empty where all do."""
-        return state_of(self.machine).left_out
 
     @property
     def over_grid(self) -> Roles | None:
@@ -172,24 +174,27 @@ class Guidelines(Immutable):
 
 
 @checked
-def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress = silent) -> Guidelines:
+def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), progress: Progress = silent) -> Guidelines:
     """Derive what the stiffness of a machine depends on, at its pose and over a grid.
 
     Args:
-        machine: with its pose.
+        machine: with its pose, or its state, as `state_of` returns it.
         ranges: of the grid, "FIELD=from:to:count", coordinates of the pose; none for the file's pose alone.
         progress: receives how far the work is.
 
     Raises:
         InputError: a bad range, one that is not of a coordinate of the pose, or too many poses.
     """
-    ranges = several(ranges)
+    state, ranges = state_of(machine), several(ranges)
+    machine = state.machine
     grid = _grid(machine, ranges) if ranges else None
-    sensitivities = sensitivity(machine)
+    sensitivities = sensitivity(state)
     names = machine.family.component_names
     if sensitivities.status is not Status.OK:
-        return Guidelines(machine, sensitivities.status, sensitivities.message, names)
-    kept, response = list(machine.family.components), respond(machine)
+        return Guidelines(
+            state, sensitivities.status, sensitivities.message, names, loads_left_out=sensitivities.loads_left_out
+        )
+    kept, response = list(machine.family.components), state.free
     single = elements(response.configuration)
     every = with_links_together(single)
     whole = without_rounding(response.compliance.diagonal(), response)[kept, 0]
@@ -197,10 +202,10 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
     everywhere, poses = None, (0, 0)
     if grid is not None:
         everywhere, poses = roles_over(machine, grid, every, kept, progress)
-        moves = with_signs(machine, grid, moves)
+        moves = with_signs(state, grid, moves)
     without_derivative = [pair for pair in sensitivities.without_derivative if designed(machine, pair[0])]
     return Guidelines(
-        machine,
+        state,
         sensitivities.status,
         sensitivities.message,
         names,
@@ -215,6 +220,7 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
         tuple(ranges),
         poses,
         everywhere,
+        sensitivities.loads_left_out,
     )
 
 
@@ -278,18 +284,18 @@ def roles_over(
     return Roles(*part), (int(good.sum()), grid.size)
 
 
-def stiffening(machine: Machine, element: Element, factors: Array) -> Array:
+def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
     """Stiffness of each direction while an element changes, as a share of the one with the element rigid.
 
     Args:
-        machine: at its pose.
+        state: of the machine at its pose.
         element: whose stiffness is multiplied.
         factors: on its stiffness; of an element that is rigid, its stiffness itself (SI) [points].
 
     Returns:
         1 / C_ii over its limit [components x points]; 0 where nothing else is compliant.
     """
-    kept, response = list(machine.family.components), respond(machine)
+    kept, response = list(state.machine.family.components), state.free
     with np.errstate(all="ignore"):
         rigid = without_rounding(diagonal_with(response, element, 0.0), response)[kept]
         return rigid / without_rounding(diagonal_with(response, element, 1.0 / factors), response)[kept]
@@ -363,8 +369,9 @@ def _together(machine: Machine, path: str) -> str:
     return field if len({here[leaf] for leaf in whole.leaves}) == 1 else path
 
 
-def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Move]:
+def with_signs(state: MachineState, grid: Points, moves: Sequence[Move]) -> list[Move]:
     """Add to each move at which share of the poses of a grid it stiffens and softens each direction."""
+    machine = state.machine
     leaves = {p.path: p.leaves for p in parameters(machine.family)}
     paths = [leaf for move in moves for leaf in leaves[move.path]]
     names = [f"compliance_{name}" for name in machine.family.component_names]
@@ -372,7 +379,7 @@ def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Mo
     good = answer.status == Status.OK
     if not good.any():
         return list(moves)
-    length, here, kinds = float(state_of(machine).configuration.length), values(machine), _kinds(machine)
+    length, here, kinds = float(state.configuration.length), values(machine), _kinds(machine)
     signed = []
     for move in moves:
         rows = [paths.index(leaf) for leaf in leaves[move.path]]

@@ -4,36 +4,48 @@ All that is decided here follows from the file and from where the legs are, so t
 """
 
 import difflib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.cut import cut_machine
-from kinetostat.equilibrium.state import state_of
-from kinetostat.kinematics.closure import legs_at_pose
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.parameters import Parameter
+from kinetostat.machine.parameters import Parameter, with_values
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
 ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
+LOADING_KINDS = ("force", "acceleration", "density", "linear density", "temperature difference", "thermal expansion")
+"""Kinds of parameters that may bring in a load which an answer to first order leaves out."""
 
 
-def uncounted_loads(machine: Machine, names: Collection[str]) -> str:
+def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterable[tuple[Parameter, Array]] = ()) -> str:
     """Say which loads of a file do not count in quantities of a machine; empty if they all do.
 
     Quantities of the machine at rest under its loads count all of them, the others only those of which
     `MachineState.left_out` does not speak.
 
     Args:
-        machine: with its loads.
+        state: of the machine with its loads.
         names: of quantities; none for an answer about the free machine.
+        varied: parameters that vary, with their values, SI: each may bring in a load that the file does not have.
     """
-    return "" if names and all(QUANTITIES[name].loaded for name in names) else state_of(machine).left_out
+    if names and all(QUANTITIES[name].loaded for name in names):
+        return ""
+    bringing = [(parameter, row) for parameter, row in varied if parameter.quantity.kind in LOADING_KINDS]
+    brought = {leaf: float(row[np.abs(row).argmax()]) for parameter, row in bringing for leaf in parameter.leaves}
+    try:
+        return (state_of(with_values(state.machine, brought)) if brought else state).left_out
+    except InputError:  # links are warmer, but nothing says how they grow: nobody can leave that out
+        return state.left_out
 
 
 def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
@@ -117,25 +129,26 @@ def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] 
         )
 
 
-def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:
+def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:
     """Refuse quantities that have no value for a machine, whatever its pose.
 
     Args:
-        machine: as its file has it.
+        state: of the machine as its file has it.
         names: of quantities.
         varied: parameters that take other values than the file's.
 
     Raises:
         InputError: names the quantity, and what the machine lacks or its file must say.
     """
+    machine = state.machine
     weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal]
     if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
-        refuse_unknown_mass(machine, weighing[0], legs_at_pose(machine))
+        refuse_unknown_mass(machine, weighing[0], state.configuration)
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
     wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
         return
-    placed = legs_at_pose(machine)
+    placed = state.configuration
     driven = [(spring, 0.0) for spring in springs(placed) if spring.actuated and not is_zero(spring.stiffness)]
     parts = Parts(placed.legs, placed.platform.rotation.z, machine.family.planar, actuators=driven)
     for name in wanted:

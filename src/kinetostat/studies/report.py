@@ -172,24 +172,24 @@ class ReportQuestion:
 
 
 REPORT_QUESTIONS = (
-    ReportQuestion("requirements", lambda known: requirements(known.machine)),
+    ReportQuestion("requirements", lambda known: requirements(known.state)),
     ReportQuestion("under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded),
-    ReportQuestion("budget", lambda known: budget(known.machine), lambda known: bool(known.machine.tolerances)),
+    ReportQuestion("budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances)),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
     ReportQuestion(
         "maps",
-        lambda known: evaluate_grid(known.machine, known.ranges, _compliances(known.machine)),
+        lambda known: evaluate_grid(known.state, known.ranges, _compliances(known.machine)),
         lambda known: bool(known.ranges),
         "maps",
     ),
     ReportQuestion(
         "frequencies",
-        lambda known: evaluate_grid(known.machine, known.ranges, [_first_frequency(known.machine)]),
+        lambda known: evaluate_grid(known.state, known.ranges, [_first_frequency(known.machine)]),
         lambda known: bool(known.ranges and known.of("vibration") and known.of("vibration").modes),
         "maps",
     ),
     ReportQuestion("sensitivity", lambda known: sensitivity(known.state), part="sensitivity"),
-    ReportQuestion("guidelines", lambda known: _advice(known.machine, known.ranges), part="guidelines"),
+    ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
 )
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
 error budget where the file has tolerances, vibrations where it has masses, and frequencies over the poses of the maps
@@ -249,10 +249,10 @@ def _first_frequency(machine: Machine) -> str:
     return "loaded_frequency_1" if machine.loaded else "frequency_1"
 
 
-def _advice(machine: Machine, over: Sequence[str]) -> Guidelines:
+def _advice(state: MachineState, over: Sequence[str]) -> Guidelines:
     """Guidelines, over a grid of those ranges that are coordinates of the pose."""
-    fields = {text: find(machine.family, parse_range(text).field).path for text in over}
-    return guidelines(machine, coarser([text for text in over if fields[text].startswith("pose.")], GUIDELINE_POINTS))
+    fields = {text: find(state.machine.family, parse_range(text).field).path for text in over}
+    return guidelines(state, coarser([text for text in over if fields[text].startswith("pose.")], GUIDELINE_POINTS))
 
 
 def _compliances(machine: Machine) -> list[str]:

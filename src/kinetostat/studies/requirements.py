@@ -4,17 +4,18 @@ A pose that has no result fails its requirement: a machine that cannot get there
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.display import Display
-from kinetostat.engine.batch import evaluate
+from kinetostat.engine.batch import Evaluation, evaluate
 from kinetostat.engine.points import Points, PointTable
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
 from kinetostat.spec.arguments import checked
@@ -90,31 +91,31 @@ class Verdict(Immutable):
 
 
 @checked
-def requirements(machine: Machine) -> tuple[Verdict, ...]:
+def requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     """Judge the requirements of a machine's file, condition by condition.
 
     Args:
-        machine: with its pose and its requirements.
+        machine: with its pose and its requirements, or its state, as `state_of` returns it.
 
     Raises:
         InputError: names the requirement and what is wrong with it: an unknown quantity or field, a bad range or value.
     """
-    judged: list[Verdict] = []
-    for name, requirement in machine.requirements.items():
+    state, judged = state_of(machine), list[Verdict]()
+    for name, requirement in state.machine.requirements.items():
         try:
-            judged += _judged(machine, name, requirement)
+            judged += _judged(state, name, requirement)
         except InputError as error:
             raise InputError(f"requirements.{name}: {error}") from None
     return tuple(judged)
 
 
-def _judged(machine: Machine, name: str, requirement: Requirement) -> list[Verdict]:
-    show = machine.display.show
+def _judged(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
+    machine, show = state.machine, state.machine.display.show
     conditions = [parse_condition(text, machine.family.component_names) for text in requirement.demand]
     points, varied, where = _poses(machine, requirement)
     names = list(dict.fromkeys(condition.quantity for condition in conditions))
-    refuse_absent(machine, names, varied)
-    answer = evaluate(machine, points, names)
+    refuse_absent(state, names, varied)
+    answer = evaluate(machine, points, names) if varied or needs_state(machine, names) else _at_the_pose(state, names)
     judged = []
     for condition in conditions:
         amounts = answer.values[condition.quantity]
@@ -131,6 +132,13 @@ def _judged(machine: Machine, name: str, requirement: Requirement) -> list[Verdi
             )
         )  # fmt: skip
     return judged
+
+
+def _at_the_pose(state: MachineState, names: Sequence[str]) -> Evaluation:
+    """Quantities of the free machine at its pose [1], which the state knows."""
+    status = state.free.status
+    amounts = {name: float(QUANTITIES[name].value(state.free)) if status == Status.OK else math.nan for name in names}
+    return Evaluation({name: np.array([amount]) for name, amount in amounts.items()}, np.array([int(status)]))
 
 
 def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Parameter], str]:

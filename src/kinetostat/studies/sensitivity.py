@@ -145,6 +145,7 @@ class Sensitivity(Immutable):
         parameters: those that have an influence, the greatest first.
         without_influence: paths of those that have none.
         without_derivative: paths of those without a derivative, and why.
+        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
     machine: Machine
@@ -156,11 +157,7 @@ class Sensitivity(Immutable):
     parameters: tuple[Influence, ...] = ()
     without_influence: tuple[str, ...] = ()
     without_derivative: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def loads_left_out(self) -> str:
-        """A sentence on the loads of the file that do not count; empty where all do."""
-        return uncounted_loads(self.machine, self.quantities)
+    loads_left_out: str = ""
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table of pandas, SI: for each parameter its value, and derivative and percent of each index."""
@@ -193,10 +190,11 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
     refuse_loaded(machine, names)
-    refuse_absent(machine, names)
+    refuse_absent(state, names)
+    uncounted = uncounted_loads(state, names)
     response = state.response
     if int(response.status) == Status.JOINT_LIMIT:
-        return Sensitivity(machine, Status.JOINT_LIMIT, state.refusal)
+        return Sensitivity(machine, Status.JOINT_LIMIT, state.refusal, loads_left_out=uncounted)
     here = values(machine)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
@@ -205,7 +203,8 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     answer = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
-        return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal)
+        why = FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal
+        return Sensitivity(machine, status, why, loads_left_out=uncounted)
     length = float(response.configuration.length)
     indices = tuple(
         _without_round_off(machine, name, value, response)
@@ -219,7 +218,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     shown = tuple(influences[place] for place, _ in order)
     quiet = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
     skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
-    return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped)
+    return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped, uncounted)
 
 
 def _without_round_off(machine: Machine, name: str, value: float, response: Response) -> float:

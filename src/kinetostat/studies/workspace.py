@@ -16,6 +16,7 @@ import xarray as xr
 from kinetostat.arrays import Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PER_CELL, Cells
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
@@ -133,6 +134,7 @@ class Workspace(Immutable):
         conditions: that poses had to meet.
         singularities_divide: whether they divide pose space and the file's pose has an aspect to stay in.
         limits: names of the limits that the machine's file sets.
+        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
     machine: Machine
@@ -146,15 +148,11 @@ class Workspace(Immutable):
     conditions: tuple[PoseCondition, ...]
     singularities_divide: bool
     limits: tuple[str, ...]
+    loads_left_out: str = ""
 
     def __repr__(self) -> str:
         of = sum(self.nodes.values())
         return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
-
-    @property
-    def loads_left_out(self) -> str:
-        """A sentence on the loads of the file that do not count; empty where all do."""
-        return str(self.dataset.attrs.get(LOADS_LEFT_OUT, ""))
 
     @property
     def exists(self) -> bool:
@@ -164,7 +162,11 @@ class Workspace(Immutable):
 
 @checked
 def workspace(
-    machine: Machine, ranges: Sequence[str], conditions: Sequence[str] = (), progress: Progress = silent, seed: int = 0
+    machine: Machine | MachineState,
+    ranges: Sequence[str],
+    conditions: Sequence[str] = (),
+    progress: Progress = silent,
+    seed: int = 0,
 ) -> Workspace:
     """Determine the region of pose space where a machine can work.
 
@@ -173,7 +175,8 @@ def workspace(
     (`machine.loaded`), or a condition is about these, it must also come to rest there.
 
     Args:
-        machine: with its limits; its pose gives the coordinates that do not vary.
+        machine: with its limits, or its state, as `state_of` returns it; its pose gives the coordinates that do not
+            vary.
         ranges: "FIELD=from:to:count", two to six coordinates of the pose.
         conditions: "QUANTITY > VALUE".
         progress: receives how far the work is.
@@ -184,9 +187,11 @@ def workspace(
     """
     if seed < 0:
         raise InputError(f"seed is {seed}; give a whole number from 0.")
-    judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
+    state = state_of(machine)
+    machine = state.machine
+    judge = Judge(state, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
     question = grid_question(
-        machine, ranges, [*dict.fromkeys(["singularity_margin", COLOURING_QUANTITY, *judge.quantities])]
+        state, ranges, [*dict.fromkeys(["singularity_margin", COLOURING_QUANTITY, *judge.quantities])]
     )
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size
@@ -211,6 +216,7 @@ def workspace(
         judge.conditions,
         judge.aspect != 0.0,
         tuple(judge.limits),
+        nodes.attrs.get(LOADS_LEFT_OUT, ""),
     )
 
 

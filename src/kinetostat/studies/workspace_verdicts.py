@@ -16,10 +16,10 @@ import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.engine.batch import first_limit_passed, limits_used
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
@@ -132,17 +132,22 @@ class Judge:
     """The rule by which a pose belongs to the workspace.
 
     Attributes:
-        machine: with its limits, at the file's pose.
+        state: of the machine with its limits, at the file's pose.
         conditions: that the pose has to meet.
     """
 
-    machine: Machine
+    state: MachineState
     conditions: tuple[PoseCondition, ...]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine with its limits."""
+        return self.state.machine
 
     @cached_property
     def aspect(self) -> float:
         """Aspect of the file's pose; 0 if no singular surface divides poses, or this pose has no answer."""
-        response = respond(self.machine)
+        response = self.state.free
         placed = (
             Status(int(response.status)) in (Status.OK, Status.JOINT_LIMIT) and response.singularity_margin > SINGULAR
         )

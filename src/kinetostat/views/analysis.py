@@ -12,6 +12,7 @@ from typing import Any
 from rich.table import Table
 
 from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -45,9 +46,10 @@ def analyze_in_state(
     Raises:
         InputError: axes or directions of a machine that is meant under its loads.
     """
-    verdicts = requirements(machine) if machine.requirements else ()
+    state = state_of(machine)
+    verdicts = requirements(state) if machine.requirements else ()
     if not machine.loaded:
-        analysis = analyze(machine, axes)
+        analysis = analyze(state, axes)
         directions = tuple(map(analysis.along, along)) if analysis.status is Status.OK else ()
         return replace(analysis, directions=directions, requirements=verdicts)
     if along or axes != "base":
@@ -55,7 +57,7 @@ def analyze_in_state(
             '--loaded or state = "loaded" in [load] gives results in base axes only; leave '
             "--along and --axes out, or add --set load.state=free."
         )
-    return replace(under_load(machine), requirements=verdicts)
+    return replace(under_load(state), requirements=verdicts)
 
 
 def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:

@@ -177,7 +177,7 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
     factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
     scale = guidelines.machine.display.scale(element.unit)
     present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0) * scale.factor
-    stiff = stiffening(guidelines.machine, element, factors)
+    stiff = stiffening(guidelines.state, element, factors)
     for colour, dash, curve, limit in zip(COLOURS, DASHES, stiff, limits, strict=False):
         if limit == math.inf:
             continue

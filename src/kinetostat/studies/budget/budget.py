@@ -17,7 +17,7 @@ from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
-from kinetostat.equilibrium.state import state_of
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import Machine
@@ -95,6 +95,7 @@ class Budget(Immutable):
         exact: machines solved exactly, if they were asked for.
         allocation: tolerances of least cost, if they were asked for.
         message: what is the case, in sentences.
+        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
     machine: Machine
@@ -115,14 +116,10 @@ class Budget(Immutable):
     exact: ExactSample | None
     allocation: Allocation | None
     message: str
+    loads_left_out: str = ""
 
     def __repr__(self) -> str:
         return f"<Budget of {self.machine.name!r}: {len(self.parts)} tolerances, {len(self.status)} poses>"
-
-    @property
-    def loads_left_out(self) -> str:
-        """A sentence on the loads of the file that do not count; empty where all do."""
-        return state_of(self.machine).left_out
 
     @property
     def settled(self) -> Mask:
@@ -188,21 +185,22 @@ class PossibleErrors:
     errors: tuple[MachineError, ...]
 
 
-def possible_errors(machine: Machine) -> PossibleErrors:
+def possible_errors(machine: Machine | MachineState) -> PossibleErrors:
     """List every number of a machine that may be off.
 
     Args:
-        machine: as drawn, with or without tolerances.
+        machine: as drawn, with or without tolerances; or its state, as `state_of` returns it.
 
     Raises:
         InputError: it has no place at its pose.
     """
-    return PossibleErrors(machine, error_model(machine, {}, 1).errors)
+    state = state_of(machine)
+    return PossibleErrors(state.machine, error_model(state, {}, 1).errors)
 
 
 @checked
 def budget(
-    machine: Machine,
+    machine: Machine | MachineState,
     poses: Any = None,
     ranges: Sequence[str] = (),
     tolerances: Mapping[str, Any] | None = None,
@@ -220,7 +218,8 @@ def budget(
     that of the tool point and of the platform's orientation, to first order in the tolerances.
 
     Args:
-        machine: as drawn, with the tolerances of its file; its pose is the one that counts, if no poses are given.
+        machine: as drawn, with the tolerances of its file, or its state, as `state_of` returns it; its pose is the one
+            that counts, if no poses are given.
         poses: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV file, as for `evaluate`.
         ranges: instead of poses, a grid: one axis each, "x=-2 cm:2 cm:11", coordinates of the pose only.
         tolerances: further lines as in the table [tolerances], after those of the file: {"joints": "0.05 mm"}.
@@ -239,16 +238,16 @@ def budget(
             read or of which none has a place.
     """
     _check(poses, ranges, samples, exact, by, seed)
+    state = state_of(machine)
+    machine = state.machine
     lines = joined(machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
-    question = grid_question(machine, ranges, ["singularity_margin"]) if ranges else None
+    question = grid_question(state, ranges, ["singularity_margin"]) if ranges else None
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = _points(question, columns)
     if count > MOST_BUDGET_POSES:
         raise InputError(f"there are {count:,} poses; at most {MOST_BUDGET_POSES:,} are computed: lower their number.")
     direction = np.array(unit_direction(along, "along")) if len(along) else None
-    work = _Work(
-        machine, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1
-    )
+    work = _Work(state, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1)
     status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
     step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
     for start in range(0, count, step):
@@ -286,9 +285,15 @@ class _Work:
     """Adds up the answer, some poses at a time; every pose has the same machines."""
 
     def __init__(
-        self, machine: Machine, lines: Mapping[str, Tolerance], along: Array | None, samples: int, seed: int, many: bool
+        self,
+        state: MachineState,
+        lines: Mapping[str, Tolerance],
+        along: Array | None,
+        samples: int,
+        seed: int,
+        many: bool,
     ) -> None:
-        self.machine, self.lines, self.along, self.samples, self.seed = machine, lines, along, samples, seed
+        self.state, self.lines, self.along, self.samples, self.seed = state, lines, along, samples, seed
         self.parts: tuple[TolerancedPart, ...] = ()
         self.many, self.pressed = many, list[Mask]()
         self.measures: Measures | None = None
@@ -299,9 +304,14 @@ class _Work:
         self.largest: Array | float = -np.inf
         self.squares: Array | float = 0.0
 
+    @property
+    def machine(self) -> Machine:
+        """The machine as drawn."""
+        return self.state.machine
+
     def add(self, columns: Mapping[str, Array], count: int) -> Codes:
         """Add some poses; return their `Status` codes."""
-        model = error_model(self.machine, columns, count)
+        model = error_model(self.state, columns, count)
         if not self.parts:
             self.parts = toleranced_parts(self.machine, model.errors, self.lines)
         settled = np.asarray(model.drawn.status == Status.OK)
@@ -310,7 +320,7 @@ class _Work:
         return model.drawn.status
 
     def _spread(self, model: ErrorModel) -> Spread:
-        length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
+        length = float(self.state.configuration.length)
         rates = _clean(model.rates(), length)
         inputs = random_inputs(
             self.parts, rates, model.drawn.load, length, others=self.many and loads_platform(self.machine)
@@ -332,11 +342,6 @@ def _clean(rates: Array, length: float) -> Array:
     """Rates without components that are round-off [n x 6 x errors], so that none of them counts as a motion."""
     sizes = np.abs(rates * np.array([length] * 3 + [1.0] * 3)[:, None])
     return np.where(sizes > NO_EFFECT * sizes.max(axis=1, keepdims=True), rates, 0.0)
-
-
-def _joints(machine: Machine) -> int:
-    """Number of joint coordinates by which its family is placed."""
-    return machine.chains().size if machine.family.chains else 0
 
 
 def _answer(
@@ -377,6 +382,7 @@ def _answer(
         exact_sample(work.machine, inputs, measures, _power(exact), work.seed) if exact else None,
         None,
         "",
+        work.state.left_out,
     )
     if allocate is not None:
         wanted = positive(allocate, "length", "allocate, the wanted error,")

@@ -14,6 +14,7 @@ from typing import Any, Literal, Protocol, TypeAlias
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Mask
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -290,7 +291,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
     if name == VOLUME:
         return _volume(poses, where)
     if name == STROKE:
-        refuse_absent(machine, StrokeTerm.names)
+        refuse_absent(state_of(machine), StrokeTerm.names)
         return StrokeTerm()
     over = parse_aggregate(table.over, f"{where}.over")
     label = name if poses.count == 1 else f"{name} ({over.text})"
@@ -301,7 +302,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         matrix, first, inverse, unit = ALONG[name]
         weights = _direction_weights(machine, matrix, first, table.direction, where)
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
-    refuse_absent(machine, [name])
+    refuse_absent(state_of(machine), [name])
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
 
