@@ -49,6 +49,10 @@ SAME_CENTRE = 1e-9
 LEAST_NORM_DAMPING = 1e-15
 """Damping as a share of the trace of the squared rates: far below what a regular direction weighs, enough for a joint
 coordinate that moves nothing."""
+IDLE_FREEDOM = 1e-9
+"""Relative singular value below which joints of closed legs move without changing any gap."""
+NEAREST_POSTURE = 1e-13
+"""Slope of half the squared distance of joints from home along idle motions at which nothing but round-off is left."""
 NO_ANGLE_RATES = 1e-9
 """Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
 ROUNDED_ORIENTATION = 1e-3

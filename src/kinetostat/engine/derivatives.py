@@ -30,11 +30,12 @@ from kinetostat.engine.kernel import PROGRAMS_KEPT, Fill, closes_inside, falling
 from kinetostat.engine.loaded import StatePrograms
 from kinetostat.engine.points import Points, Population
 from kinetostat.engine.trace import Runnable
+from kinetostat.kinematics.closing import units_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
+from kinetostat.tolerances import IDLE_COORDINATES, IDLE_FREEDOM, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
 from kinetostat.vibration.reduced import reducible
 from kinetostat.vibration.slopes import EQUALS, mode_columns
 
@@ -42,6 +43,9 @@ MACHINE_CODE_FROM = 20_000
 """Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
 SMALL_SLAB = 512
 """Points in a slab for NumPy and for linear systems: some thousand arrays of this length are in memory at once."""
+BESIDE = 1e-5
+"""Displacement of joints, rad or in units of the machine's length, whose differences are second derivatives: squares of
+it and round-off over it are equally small."""
 TRIAL_DISTANCE, TRIAL_POINTS = 0.03, 5
 """Closed forms are tried at this share of the machine's numbers away from them, and at so many points."""
 
@@ -231,10 +235,42 @@ class _Routes:
     def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
         given = program_columns(self._machine, self._form, columns, len(status))
-        rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
+        rates = self._equations(given, len(status))
         given += self._state(given, len(status), closed=False) + self._known_modes(columns, len(status))
         objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
+
+    def _equations(self, given: Sequence[Array], count: int) -> Array:
+        """Derivatives of the closing equations, and of those by which idle freedoms stand nearest to home, theory (34).
+
+        The latter need the second derivatives of the closing equations along the idle motions: central differences of
+        the first ones.
+
+        Returns:
+            [equations x inputs x points]; inputs are the parameters and then the joint coordinates.
+        """
+
+        def rates_at(joints: Array) -> tuple[Array, Array]:
+            columns = [*given[: len(given) - len(joints) - 1], *joints, given[-1]]
+            values, rates = self._program(()).slopes(self._fixed, columns, np.empty(count, dtype=np.int8))
+            return values[-1], rates
+
+        chains = self._machine.chains()
+        joints, first = np.stack(given[-chains.size - 1 : -1]), len(self._differentiated)
+        length, rates = rates_at(joints)
+        rates, longer = rates[:-1], rates[-1]
+        units = units_of(chains, length).T
+        slid = (joints - units_of(chains, np.zeros(count)).T * joints) / units
+        idle = _IdleMotions.of(np.moveaxis(rates[:, first:] * units, 2, 0), (joints / units).T)
+        rows = []
+        for motion in np.moveaxis(idle.motions, 1, 0):
+            aside = BESIDE * motion.T * units
+            change = (rates_at(joints + aside)[1] - rates_at(joints - aside)[1])[:-1] / (2.0 * BESIDE)
+            row = -np.einsum("np,pin->in", idle.pulls, change)
+            row[first:] += motion.T / units
+            row[:first] -= 2.0 * (motion.T * slid).sum(axis=0) * longer[:first] / length
+            rows.append(row * length)
+        return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 
     def _state(self, given: Sequence[Array], count: int, closed: bool) -> list[Array]:
         """Coordinates of the states of rest, if any objective is about the machine under load."""
@@ -270,6 +306,36 @@ def _at_ends(machine: Machine) -> dict[str, float]:
     stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
     ends = {0.0: math.nan, math.inf: 0.0}
     return {path: ends[value] for path, value in values(machine).items() if path in stiff and value in ends}
+
+
+@dataclass(frozen=True)
+class _IdleMotions:
+    """Motions of joints that change no equation, at n points.
+
+    Attributes:
+        motions: independent ones, of length 1, rad or in units of the machine's length [n x motions x joints]; 0 where
+            a point has fewer.
+        pulls: Lagrange's multipliers: how strongly each equation keeps the joints from home [n x equations].
+    """
+
+    motions: Array
+    pulls: Array
+
+    @classmethod
+    def of(cls, rates: Array, joints: Array) -> "_IdleMotions":
+        """Find them from the rates of equations [n x equations x joints] and joint coordinates [n x joints]."""
+        sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(joints).all(axis=1)
+        motions, pulls = np.zeros((len(rates), 0, joints.shape[1])), np.zeros(rates.shape[:2])
+        left, sizes, right = np.linalg.svd(rates[sound])
+        ranks = (sizes > IDLE_FREEDOM * sizes[:, :1]).sum(axis=1)
+        if sound.any() and ranks.min() < joints.shape[1]:
+            kept = np.arange(joints.shape[1]) < ranks[:, None]
+            motions = np.zeros((len(rates), joints.shape[1] - int(ranks.min()), joints.shape[1]))
+            motions[sound] = np.where(kept[:, :, None], 0.0, right)[:, ranks.min() :]
+            inverse = np.divide(1.0, sizes, where=kept[:, : sizes.shape[1]], out=np.zeros_like(sizes))
+            along = np.einsum("nkj,nj->nk", right[:, : sizes.shape[1]], joints[sound])
+            pulls[sound] = np.einsum("nek,nk->ne", left[:, :, : sizes.shape[1]], inverse * along)
+        return cls(motions, pulls)
 
 
 def _following(slopes: Array, rates: Array, count: int) -> Array:

@@ -225,7 +225,9 @@ def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
 
 
 def equations_of(kind: Specimen, form: Form, paths: Sequence[str]) -> TracedFormula:
-    """Trace the closing equations of a machine written leg by leg; columns are those of objectives that are not closed.
+    """Trace the closing equations of a machine written leg by leg, and its length, m, after them.
+
+    Columns are those of objectives that are not closed.
 
     Args:
         kind: of the machine.
@@ -234,7 +236,8 @@ def equations_of(kind: Specimen, form: Form, paths: Sequence[str]) -> TracedForm
     """
     given = traced_machine(kind, form)
     _, columns = _joints(given, closed=False)
-    results = [_number(gap) for gap in closing_equations(given.machine.chains(), columns[:-1])]
+    chains = given.machine.chains()
+    results = [_number(result) for result in (*closing_equations(chains, columns[:-1]), chains.length)]
     return _formula(given, columns, results, 0.0, paths)
 
 

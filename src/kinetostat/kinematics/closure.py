@@ -16,6 +16,7 @@ from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
+from kinetostat.kinematics.posture import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked
@@ -213,6 +214,8 @@ def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> 
         tried = np.flatnonzero(status[whole.poses] == Status.OK)
         problems, there = whole.take(tried), some(everywhere, tried)
         unknowns, codes = follow(problems, there)
+        reached = np.flatnonzero(codes == Status.OK)
+        unknowns[reached] = nearest_home(problems.take(reached), unknowns[reached], some(there, reached))
         if free:
             closed = np.flatnonzero(codes == Status.OK)
             loose = undetermined(problems.take(closed), unknowns[closed], some(there, closed))

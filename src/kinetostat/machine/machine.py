@@ -150,7 +150,7 @@ class Chains:
         legs: their elements in order.
         home: placement of the platform.
         pose: values of the coordinates that the pose gives, by name: x, y, z (m, base frame), roll, pitch, yaw (rad).
-        length: a characteristic length, m.
+        length: a characteristic length, m; the posture of idle freedoms with slides depends on it.
         inverses: closed form of each leg's joint coordinates, None where it has none.
     """
 

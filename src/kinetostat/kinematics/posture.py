@@ -1,0 +1,110 @@
+"""The posture of legs with idle freedoms: motions of joints that move the leg alone, such as the spin of a strut.
+
+The platform's pose leaves such freedoms open. Of all postures that close the legs, the one is taken whose joints stand
+nearest to their home positions, so that it depends neither on the way to the pose nor on axes or units of the file.
+
+Source: theory section 6.
+"""
+
+import numpy as np
+
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, some
+from kinetostat.numerics.iteration import Steps, largest, newton
+from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, NEAREST_POSTURE, NEWTON_SETTLED
+
+MOST_STEPS, MOST_CORRECTIONS = 40, 8
+"""Towards the nearest posture; and of Newton's method, which closes the legs again after each of them."""
+LONGEST_STEP = 0.3
+"""Change of an unknown in one step, rad or in units of the machine's length, so that it stays in the valley where it
+starts."""
+SURE_STEP = 1e-5
+"""Size of a step, in the same units, from which the next one is its square."""
+SHORTEST_STEP = 1e-6
+"""Share of a step below which no shorter one is tried."""
+BESIDE = 1e-6
+"""Displacement of the unknowns, in the same units, whose rates show how idle motions are curved."""
+
+
+def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:
+    """Move idle freedoms to where the sum of squares of all unknowns is least, with the legs closed.
+
+    Each step is Newton's along the idle motions. Curvatures count without their sign, so that every step leads nearer.
+
+    Args:
+        problems: problems that have been solved.
+        unknowns: their solutions [problems x unknowns], rad or in units of the machine's length.
+        goal: coordinates of the platform in each of them.
+
+    Returns:
+        Solutions [problems x unknowns]; those without idle freedoms as they were.
+    """
+    best = unknowns.copy()
+    if not len(best):
+        return best
+    rows = np.flatnonzero(_idle_freedoms(problems.gaps(best, goal)[1]))
+    share, before = np.ones(len(rows)), np.full(len(rows), np.inf)
+    for _ in range(MOST_STEPS):
+        if not rows.size:
+            break
+        part, there = problems.take(rows), some(goal, rows)
+        step, far = _steps(part, best[rows], there)
+        end, closed = _closed(part, best[rows] + share[:, None] * step, there)
+        # Sums of squares tell steps apart down to half of the digits; shorter ones are Newton's last and taken whole.
+        short = largest(step) <= SURE_STEP
+        nearer = closed & (short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
+        best[rows[nearer]] = end[nearer]
+        share = np.where(nearer, 1.0, 0.25 * share)
+        settled = short & ((far <= NEAREST_POSTURE) | (far > 0.5 * before))
+        going = ~settled & (share >= SHORTEST_STEP)
+        rows, share, before = rows[going], share[going], far[going]
+    return best
+
+
+def _idle_freedoms(rates: Array) -> Array:
+    """Number of independent motions that change no gap, problem by problem [n]; rates are [n x rows x unknowns]."""
+    sizes = np.linalg.svd(rates, compute_uv=False)
+    return np.asarray(rates.shape[2] - (sizes > IDLE_FREEDOM * sizes[:, :1]).sum(axis=1))
+
+
+def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
+    """Newton's steps along the idle motions [n x unknowns], and the slopes along these that are left [n]."""
+    rates = problems.gaps(unknowns, goal)[1]
+    left, sizes, right = np.linalg.svd(rates)
+    idle = _idle_freedoms(rates)
+    steps, far = np.zeros_like(unknowns), np.zeros(len(unknowns))
+    for count in np.unique(idle[idle > 0]):
+        rows = np.flatnonzero(idle == count)
+        kept = rates.shape[2] - count
+        motions = right[rows, kept:]
+        slopes = np.einsum("nic,nc->ni", motions, unknowns[rows])
+        # Lagrange's multipliers: how strongly each gap keeps the joints from their home positions.
+        pulls = np.einsum("nkc,nc->nk", right[rows, :kept], unknowns[rows]) / sizes[rows, :kept]
+        loads = np.einsum("nrk,nk->nr", left[rows, :, :kept], pulls)
+        curvature = np.broadcast_to(np.eye(count), (len(rows), count, count)).copy()
+        for k in range(count):
+            part, there, aside = problems.take(rows), some(goal, rows), BESIDE * motions[:, k]
+            change = part.gaps(unknowns[rows] + aside, there)[1] - part.gaps(unknowns[rows] - aside, there)[1]
+            curvature[:, k] -= np.einsum("nr,nrc,nic->ni", loads, change, motions) / (2.0 * BESIDE)
+        bends, turn = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
+        along = np.einsum("nij,ni->nj", turn, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
+        step = -np.einsum("nij,nj,nic->nc", turn, along, motions)
+        steps[rows] = step * np.minimum(1.0, LONGEST_STEP / np.maximum(largest(step), 1e-30))[:, None]
+        far[rows] = largest(slopes)
+    return steps, far
+
+
+def _closed(problems: Problems, start: Array, goal: Coordinates) -> tuple[Array, Mask]:
+    """Close the legs again after a step, by least motions; return unknowns and whether that closes them."""
+
+    def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:
+        left, rates = problems.take(rows).gaps(values, some(goal, rows))
+        return largest(left), lambda going: _least_motion(rates[going], left[going])
+
+    end = newton(equations, start, len(start), most_steps=MOST_CORRECTIONS, closed=NEWTON_SETTLED, contraction=1.0)
+    return end.value, end.residual <= CLOSED
+
+
+def _least_motion(rates: Array, left: Array) -> Array:
+    """Least motions that close gaps, without any part along idle motions [n x unknowns]."""
+    return np.asarray(np.einsum("ncr,nr->nc", np.linalg.pinv(rates, rcond=IDLE_FREEDOM), left))
