@@ -6,9 +6,9 @@ Only units and digits change here; files and JSON stay SI, and what people write
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
+from kinetostat.frozen import dataclass
 from kinetostat.units import UnitError, measured
 
 SI = "si"

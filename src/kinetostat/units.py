@@ -6,12 +6,14 @@ A bare number is SI. What a number may mean (its kind) is fixed by the field tha
 import math
 import re
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from functools import cache
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from kinetostat.frozen import dataclass
 
 if TYPE_CHECKING:
     from pint import UnitRegistry

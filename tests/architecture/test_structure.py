@@ -8,6 +8,7 @@ from graphlib import TopologicalSorter
 from source import PACKAGE, ROOT, imports, modules, wrong_in
 
 LAYERS = [
+    "frozen",
     "arrays",
     "tolerances",
     "units",
@@ -78,8 +79,8 @@ def test_there_is_no_import_cycle():
 
 
 def test_algebra_needs_only_the_standard_library_and_tolerances():
-    """Its scalars bring their own functions."""
-    allowed = {"kinetostat.tolerances"}
+    """Its scalars bring their own functions; `frozen` is the standard library's decorator, compiled later."""
+    allowed = {"kinetostat.tolerances", "kinetostat.frozen"}
 
     def outside(module):
         others = {name for name in imports(module) if not f"{name}.".startswith("kinetostat.algebra.")} - allowed
@@ -102,6 +103,24 @@ def test_an_analysis_starts_without_jax():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_frozen_classes_are_compiled_late():
+    """The standard decorator compiles six methods of a class when its module is imported; most runs never call them."""
+
+    def by_the_standard_library(module):
+        names = {
+            f"{node.module}.{alias.name}"
+            for node in ast.walk(modules()[module])
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        options = {
+            word.arg for node in ast.walk(modules()[module]) if isinstance(node, ast.Call) for word in node.keywords
+        }
+        return {"dataclasses.dataclass"} & names if "frozen" in options else set()
+
+    assert not wrong_in(by_the_standard_library, set(modules()) - {"kinetostat.frozen"})
 
 
 def test_no_star_import():

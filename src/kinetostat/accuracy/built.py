@@ -7,7 +7,7 @@ Source: theory (45).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from kinetostat.accuracy.rows import LegRow
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinetostatics.response import compliance_at

@@ -10,13 +10,14 @@ Source: theory (45) to (48).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from kinetostat.accuracy.rows import HomeRows, LegRow, random_coordinates
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import Steps, largest, newton, with_rows
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm

@@ -14,7 +14,6 @@ Source: theory (45) and (49).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from kinetostat.accuracy.closing import Screws, at_points, free_screws, in_lengt
 from kinetostat.accuracy.rows import HomeRows, LegRow, Unit, home_rows, random_coordinates
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine

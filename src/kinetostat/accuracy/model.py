@@ -8,7 +8,7 @@ Source: theory (45) to (49); compliances, theory (10).
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_erro
 from kinetostat.accuracy.rows import HomeRows, LegRow, home_rows, random_coordinates
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response

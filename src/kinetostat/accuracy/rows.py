@@ -7,8 +7,9 @@ as rigid.
 Source: theory (35) and (45).
 """
 
+import dataclasses
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain, bar_turns
 from kinetostat.machine.actuators import actuators_of, joint_actuators, senses_of
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
@@ -72,7 +74,7 @@ class Unit:
     bars: Parallelogram | None = None
 
 
-@dataclass
+@dataclasses.dataclass
 class LegRow:
     """A leg at its home place as a row of screw motions.
 

@@ -6,11 +6,11 @@ Source: theory (28); Murray, Li and Sastry, A Mathematical Introduction to Robot
 and 2.5. Axes are whatever the caller's are; every function names the point at which its screw is.
 """
 
-from dataclasses import dataclass
 from typing import Self
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Rotation, Vector
+from kinetostat.frozen import dataclass
 
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 """Names of the six components, in order, in every array, table, file and axis label."""

@@ -8,9 +8,9 @@ Source: theory (1), (6), (7) and (9); G. H. Golub and C. F. Van Loan, Matrix Com
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, weighted, where
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import CLOSING_ROUND_OFF, SURELY_MORE, ZERO_PIVOT
 
 Row = list[Scalar]

@@ -8,11 +8,11 @@ nearly equal, and needs an arc.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 from kinetostat.algebra.scalar import Scalar, sqrt, steady, total, weighted, where
 from kinetostat.algebra.screw import Screw
+from kinetostat.frozen import dataclass
 
 SIZE = 6
 POSITIONS = [(i, j) for i in range(SIZE) for j in range(i, SIZE)]

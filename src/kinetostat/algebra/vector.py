@@ -6,9 +6,9 @@ Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Rob
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, cos, is_one, sin, sqrt
+from kinetostat.frozen import dataclass
 
 
 @dataclass(frozen=True)

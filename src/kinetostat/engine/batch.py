@@ -7,7 +7,6 @@ same functions.
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 
@@ -19,6 +18,7 @@ from kinetostat.engine.loaded import Way, loaded_fill, way_of
 from kinetostat.engine.points import ConsecutivePoints, Points, Population
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.equilibrium.state import states_at
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state, rest_numbers

@@ -9,7 +9,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
 from itertools import islice
@@ -17,6 +16,7 @@ from typing import Any
 
 from kinetostat.engine.batch import NATIVE_SLAB, Evaluation, evaluate
 from kinetostat.engine.points import Points
+from kinetostat.frozen import dataclass
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import parse

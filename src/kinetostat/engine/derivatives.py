@@ -9,7 +9,6 @@ Source: theory (34).
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -30,6 +29,7 @@ from kinetostat.engine.kernel import PROGRAMS_KEPT, Fill, closes_inside, falling
 from kinetostat.engine.loaded import StatePrograms
 from kinetostat.engine.points import Points, Population
 from kinetostat.engine.trace import Runnable
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import units_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers

@@ -5,7 +5,7 @@ Nothing is compiled or evaluated here, and nothing depends on a machine's number
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +15,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import CLOSED_FORMS, Joints
 from kinetostat.kinematics.status import Status

@@ -4,7 +4,6 @@ Nothing is evaluated here. Points are computed from their numbers, so that a lar
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import prod
 from typing import Protocol
@@ -12,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 
 
 class Points(Protocol):

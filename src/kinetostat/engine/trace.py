@@ -6,11 +6,11 @@ computed. Every rewriting is exact in IEEE arithmetic, infinities and NaN includ
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, NoReturn, Protocol, TypeAlias
 
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.trigonometry import cos_and_sin
+from kinetostat.frozen import dataclass
 
 Operand: TypeAlias = "Node | float"
 Bounds: TypeAlias = tuple[float, float]

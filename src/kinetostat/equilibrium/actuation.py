@@ -8,7 +8,7 @@ choice. The free lengths of all springs follow: with them, the loaded machine is
 Source: theory (41) and (42). Units, axes and origin are those of `mechanism`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Equilibria, at_rest
 from kinetostat.equilibrium.tangent import solve
+from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import BALANCED, COMMANDED, UNRESISTED

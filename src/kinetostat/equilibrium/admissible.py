@@ -7,13 +7,13 @@ Source: theory (38) and (39). Units, axes and origin are those of `mechanism`; a
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT, OPEN_BY_STEP, UNRESISTED
 
 

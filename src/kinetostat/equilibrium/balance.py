@@ -8,13 +8,13 @@ Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import largest, with_rows
 from kinetostat.numerics.motions import (

@@ -5,14 +5,16 @@ Nothing is solved here. Units, axes and origin are those of `mechanism`.
 Source: theory (35).
 """
 
+import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain, bar_turns
 from kinetostat.machine.column import plain
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
@@ -214,7 +216,7 @@ class Units:
         return of_scalars([load], self.count)[:, 0] * (1.0 / unit)
 
 
-@dataclass
+@dataclasses.dataclass
 class Given:
     """Motions of given amounts that have been counted so far.
 
@@ -239,7 +241,7 @@ class Given:
         return self.most + len(self.growth) - 1
 
 
-@dataclass
+@dataclasses.dataclass
 class _Row:
     """The motions of a leg from base to platform as they come, see `Chain`.
 

@@ -8,7 +8,7 @@ Source: theory (44). Units, axes and origin are those of `mechanism`.
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import ElasticLeg, masses_of_one_body
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.state import state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine

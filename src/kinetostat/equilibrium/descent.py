@@ -9,7 +9,6 @@ potential falls without end.
 Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -26,6 +25,7 @@ from kinetostat.equilibrium.admissible import (
 )
 from kinetostat.equilibrium.balance import Balance, State, balance, potential, state_after
 from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 

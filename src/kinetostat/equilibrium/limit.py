@@ -4,7 +4,7 @@ Preloads are there from the beginning. The state is followed in steps, each from
 other one is nearby, where it is not stable, or where the next one is a leap away: the mechanism has snapped over.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from kinetostat.equilibrium.balance import Balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import FEW_STEPS, are_near, at_rest, states_near, with_share
 from kinetostat.equilibrium.tangent import Stability, stabilities, stability
+from kinetostat.frozen import dataclass
 
 STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them

@@ -10,7 +10,6 @@ Source: theory (35) and (43).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram

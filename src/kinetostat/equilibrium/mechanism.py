@@ -9,7 +9,7 @@ times it. Arrays have the poses first [n]. The origin is the tool point of the f
 Source: theory (35).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import ElasticLeg, Given, Masses, Units, Weight, elastic_leg
 from kinetostat.equilibrium.drives import with_drives
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor

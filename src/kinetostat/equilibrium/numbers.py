@@ -4,7 +4,6 @@ Source: theory section 12.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.state import HELD_BY_LOADS, MachineState, actuator_loads_at_rest
 from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS

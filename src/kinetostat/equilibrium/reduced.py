@@ -8,7 +8,6 @@ Source: theory (44). Units, axes and origin are those of `mechanism`.
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.equilibrium.state import HELD_BY_LOADS
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response

@@ -3,7 +3,7 @@
 Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from functools import cached_property, partial
 from typing import Any
@@ -15,6 +15,7 @@ from kinetostat.equilibrium.balance import Balance, State, balance, free_state, 
 from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.tangent import solve, stabilities
+from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import AT_REST, ZERO_PIVOT

@@ -6,7 +6,7 @@ answers solve for the same joints. What is not about a pose, and what an answer 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from kinetostat.equilibrium.links import Strut, struts
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import at_rest, with_share
 from kinetostat.equilibrium.tangent import Stability, stability
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.mobility import Mobility

@@ -9,7 +9,6 @@ Source: theory (39) and (40). M. Zefran and V. Kumar, "A geometrical approach to
 matrix", J. Mechanical Design 124(1), 2002. Units, axes and origin are those of `mechanism`.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +25,7 @@ from kinetostat.equilibrium.admissible import (
     within,
 )
 from kinetostat.equilibrium.balance import Balance, balance
+from kinetostat.frozen import dataclass
 from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, STIFFEST_LEG, UNRESISTED
 

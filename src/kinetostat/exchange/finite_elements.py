@@ -4,7 +4,6 @@ All three get the machine as one linear elastic element at a node; K itself come
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.exchange.formats import ascii_line
 from kinetostat.exchange.results import reference_point
+from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text

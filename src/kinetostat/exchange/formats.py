@@ -4,10 +4,10 @@ A format is added here as one row of `KNOWN`. Its writer is imported only when i
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked

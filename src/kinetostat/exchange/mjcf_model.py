@@ -4,14 +4,16 @@ It is built from points, axes and springs (`validation.pieces`); `mjcf` writes t
 All frames are parallel to the base frame, so that every axis is written as it is.
 """
 
+import dataclasses
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
@@ -41,7 +43,7 @@ class Freedom:
     actuated: bool = False
 
 
-@dataclass
+@dataclasses.dataclass
 class Body:
     """A rigid body.
 
@@ -90,7 +92,7 @@ class Thread:
     pitch: float
 
 
-@dataclass
+@dataclasses.dataclass
 class Model:
     """A machine in bodies.
 

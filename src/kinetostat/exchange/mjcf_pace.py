@@ -13,13 +13,13 @@ Source: MuJoCo documentation, Computation, section on the constraint model (impe
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.exchange.results import reference_point
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.loads import PLATFORM, Mass, located_members

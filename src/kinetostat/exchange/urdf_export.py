@@ -12,7 +12,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations_with_replacement, groupby
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,6 +25,7 @@ from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring

@@ -7,13 +7,13 @@ size and counts are bounded. What a machine makes of the data is decided in `urd
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import is_tensor_of_body
 from kinetostat.machine.parameters import TENSOR
 from kinetostat.spec.document import LARGEST_FILE

@@ -8,13 +8,14 @@ Source: theory (35), (38) and (45). Screws are at one origin, in axes of the bas
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.numerics.motions import Motions, each_about, each_along, each_twist, exponential, logarithm, still

@@ -8,7 +8,6 @@ placements are in the base frame.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step

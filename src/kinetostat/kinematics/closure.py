@@ -7,12 +7,11 @@ Nothing here knows stiffness.
 Source: theory (22) for Newton's method, (23) for closed forms.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array, Codes, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined

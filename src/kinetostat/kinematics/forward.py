@@ -10,13 +10,14 @@ Source: theory section 6, (19) for legs that close. In the base frame.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, gaps_at, leg_ends, pose_of, squared_distance, units_of
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status

@@ -7,7 +7,7 @@ Source: theory (19)-(21); placements are in the base frame.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
 from kinetostat.machine.column import column, plain, stacked
 from kinetostat.machine.leg import Joint

@@ -7,10 +7,10 @@ Source: the definitions on the documentation's page on limits and workspace.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import Display
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import LIMITS, About, Limit, Parts, limits_set
 from kinetostat.machine.machine import Chains, Configuration, Machine

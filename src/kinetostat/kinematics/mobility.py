@@ -7,7 +7,6 @@ Source: theory (3), (24)-(27) and sections 2 and 8; screws are at one reference 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS, Screw, Wrench
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Leg, LegScrews, Spring
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.renamed import former_names

@@ -3,11 +3,10 @@
 Source: theory section 6.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT
 from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, least_norm, problems_of
 from kinetostat.machine.machine import Machine

@@ -7,13 +7,13 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, larger, reciprocal, total, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNFELT, UNREACHED_COMPONENT

@@ -4,7 +4,6 @@ Source: theory (31) and (32).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from math import isinf
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.loading import deflection, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring

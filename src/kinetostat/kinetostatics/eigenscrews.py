@@ -9,11 +9,11 @@ and J. M. Schimmels, "The eigenscrew decomposition of spatial stiffness matrices
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.indices import Matrix, finite
 from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import PURE_COUPLE, ZERO_EIGENSCREW

@@ -7,13 +7,14 @@ Source: theory (10) and (33), eqs. 33-38. C and K are at the response's referenc
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import compliance_of, stiffness_coefficients, weighted_sum
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring

@@ -12,7 +12,6 @@ Source: theory section 10.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 

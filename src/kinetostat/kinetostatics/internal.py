@@ -8,12 +8,12 @@ Source: theory (9) and theory section 7.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.screw import Wrench
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES

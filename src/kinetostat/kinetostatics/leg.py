@@ -5,13 +5,14 @@ Source: theory (3), (7), (8) and (11). Screws are at one reference point, in bas
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from kinetostat.algebra.scalar import Scalar, is_one, reciprocal, smaller, sqrt, total, weighted, where
 from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
 

@@ -4,12 +4,13 @@ Source: theory (28) and (29). Wrenches and twists are in base axes, at the point
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from kinetostat.algebra.scalar import Scalar, total, weighted
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix
 from kinetostat.kinetostatics.leg import INFINITE
 from kinetostat.kinetostatics.response import Response

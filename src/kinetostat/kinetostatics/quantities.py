@@ -5,13 +5,13 @@ Source: theory section 10. At the tool point, base axes.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, where
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
     TRANSLATIONS,

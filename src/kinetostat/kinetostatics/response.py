@@ -7,13 +7,13 @@ Source: theory sections 2 to 9, in their order; loads of actuators, theory (29).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import within_reach
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, within

@@ -6,12 +6,13 @@ Nothing is solved here. Points and axes are in the base frame.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.machine import Chains, Configuration
 from kinetostat.machine.rods import rods

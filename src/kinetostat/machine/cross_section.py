@@ -7,13 +7,13 @@ G J or E I a table may stand: { shape = "tube", outer_diameter = "40 mm", inner_
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, smaller
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.link import Rigidity
 from kinetostat.machine.links import OF_CROSS_SECTIONS

@@ -8,13 +8,14 @@ Source: theory (1) and (2), eqs. 1-4. In the base frame.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import CLOSING_ROUND_OFF, SAME_CENTRE
 
 RIGID = float("inf")
@@ -22,10 +23,7 @@ RIGID = float("inf")
 
 
 class PartName(str):
-    """Name of a joint or link, e.g. "leg 1 actuator", that knows which leg it is in and what it is there.
-
-    Its `kind`, "actuator", is alike in legs that are alike.
-    """
+    """Name of a joint or link, "leg 1 actuator", with its leg and its kind, "actuator", alike in like legs."""
 
     leg: str
     kind: str

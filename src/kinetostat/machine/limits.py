@@ -7,7 +7,6 @@ Source: the definitions on the documentation's page on limits and workspace. Poi
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property, partial
 from itertools import combinations
@@ -16,6 +15,7 @@ from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.scalar import Scalar, cos
 from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.display import ENGINEERING
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.spec.errors import InputError

@@ -7,7 +7,7 @@ Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Po
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ from kinetostat.algebra.vector import (
     rotation_along,
 )
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Joint, Spring
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLEMENT
 

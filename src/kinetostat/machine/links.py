@@ -6,12 +6,12 @@ Points are in the base frame.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.spec.errors import InputError

@@ -6,7 +6,7 @@ on legs and have their place in `equilibrium`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, total, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.vector import ZERO, Displacement, Vector, rotation_along
+from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.links import LINK_TABLES, growth_of

@@ -6,7 +6,7 @@ Points and axes are in the base frame.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
+from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.links import LinkKind, link_tables

@@ -6,11 +6,12 @@ Numbers that are hardly what was meant are pointed out here too (`doubts`); what
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Protocol, TypeVar
 
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.frozen import dataclass
 from kinetostat.machine.column import column
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities

@@ -8,11 +8,11 @@ Points and axes are in the base frame.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, Line, PartName, Spring, series
 from kinetostat.machine.link import Parallelogram, link_axes
 from kinetostat.spec.fields import Quantity, table

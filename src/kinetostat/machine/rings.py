@@ -7,12 +7,12 @@ Source: theory (13)-(15) for the cranks.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from kinetostat.algebra.lines import crank_end, crank_range
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import AXES, Z_AXIS, Displacement, Vector, polar, ring, rotation_z
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import (
     RIGID,
     Element,

@@ -4,11 +4,11 @@ They are read from the chains of the legs at a pose. Points are in the base fram
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 

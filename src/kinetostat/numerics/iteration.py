@@ -9,7 +9,6 @@ D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 from operator import add
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -17,6 +16,7 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 
 SHRINKING = 0.1
 """Ratio of a step to the one before it below which steps shrink fast, as those of Newton's method near a solution."""

@@ -8,13 +8,13 @@ and appendix A; theory section 12.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
 from kinetostat.algebra.vector import Vector, rotation_along
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.machine.column import stacked
 from kinetostat.numerics.iteration import with_rows
 

@@ -6,7 +6,7 @@ the validation, the JSON Schema, the field paths and the messages; no family wri
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
@@ -14,6 +14,7 @@ from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
+from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written
 

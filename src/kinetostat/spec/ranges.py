@@ -1,10 +1,9 @@
 """Ranges as people write them, FIELD=from:to:count[:log], to SI values. Which field is meant is decided elsewhere."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS, UnitError, write

@@ -6,9 +6,9 @@ Which numbers a line is about depends on the machine, and is looked up in `studi
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from kinetostat.frozen import dataclass
 from kinetostat.spec.document import Document, setting_value, toml_key, toml_value
 from kinetostat.spec.errors import PRINTABLE, InputError, several, shorten
 from kinetostat.spec.tolerance_classes import GRADES, within_class, within_grade

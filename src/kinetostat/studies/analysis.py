@@ -6,7 +6,7 @@ end of the file gives the analysis as plain data.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.mobility import (
     Mobility,
     actuator_jacobian,

@@ -5,10 +5,11 @@ The equations are solved in `kinematics.forward`; the command is `forward`.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, stand, system_of, undriven
 from kinetostat.kinematics.status import Status

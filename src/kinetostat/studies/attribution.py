@@ -5,10 +5,10 @@ The formulas are in `kinetostatics.assembly`; tables and bars of the contributio
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.indices import PrincipalStiffness

@@ -5,7 +5,6 @@ Source: theory section 12.
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked

@@ -5,7 +5,7 @@ Poses are solved in slabs, each as one array. The equations are in `equilibrium.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.actuation import commanded_state
 from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, states_at
 from kinetostat.equilibrium.tangent import stabilities
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.forward import leg_names

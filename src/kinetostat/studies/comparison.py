@@ -7,7 +7,7 @@ printed or drawn is in `views`.
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS

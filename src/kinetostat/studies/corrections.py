@@ -10,7 +10,7 @@ law is exact, and polynomials of ever higher degree are fitted until one is good
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.points import Axis, Grid
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked

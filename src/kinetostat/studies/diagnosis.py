@@ -7,13 +7,13 @@ and libraries are imported only when their turn comes.
 import os
 import platform
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kinetostat.frozen import dataclass
 from kinetostat.spec.installation import adding, installing
 from kinetostat.spec.renamed import with_former_keys
 

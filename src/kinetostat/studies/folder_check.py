@@ -1,9 +1,9 @@
 """A folder against the checksums of what was written into it: is all of it still there, bit for bit? Mends nothing."""
 
-from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
+from kinetostat.frozen import dataclass
 from kinetostat.studies.optimisation.log import ROWS
 from kinetostat.studies.result_file import RowFile, frame_is_whole
 from kinetostat.studies.storage import LIST, differing, is_damaged, read_list

@@ -1,7 +1,6 @@
 """Sweeps and maps: quantities of a machine over a grid of any of its parameters, as a labelled dataset."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, in_chunks, in_this_process
 from kinetostat.engine.points import Grid
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, dimension

@@ -5,12 +5,12 @@ One kind of statement is one function, in the order of the paper's section 4.2. 
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.display import number
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines import Guidelines, Move, Roles

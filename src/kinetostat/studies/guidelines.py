@@ -7,7 +7,7 @@ Sentences and plain data are in `guideline_sentences`; what is printed or drawn 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from kinetostat.engine.batch import Progress, responses, silent
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Points
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
     Element,

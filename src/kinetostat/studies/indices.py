@@ -5,10 +5,10 @@ The formulas are in `kinetostatics`.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.centres import (
     Point,
     centre_of_compliance,

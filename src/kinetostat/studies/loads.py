@@ -4,11 +4,12 @@ The formulas are in `kinetostatics.loading`.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import Rotation
 from kinetostat.display import ENGINEERING
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.loading import JointReaction, deflection, held_compliance, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response

@@ -6,7 +6,7 @@ machine is meant so. A part that has no answer says why.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.limits import is_set

@@ -5,7 +5,6 @@ A pose that has no result fails its requirement: a machine that cannot get there
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from kinetostat.display import Display
 from kinetostat.engine.batch import Evaluation, evaluate
 from kinetostat.engine.points import Points, PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state
 from kinetostat.machine.machine import Machine

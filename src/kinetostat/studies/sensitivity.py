@@ -5,7 +5,6 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response

@@ -4,12 +4,12 @@ The matrices are `vibration.state_space`; files of them are written by `exchange
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice

@@ -5,7 +5,6 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
 from kinetostat.kinematics.mobility import describe
 from kinetostat.kinematics.status import PLACELESS, Status

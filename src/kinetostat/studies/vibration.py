@@ -5,7 +5,7 @@ The equations are in `vibration`; the command is `modes`.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.links import loaded_links
 from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection
 from kinetostat.kinetostatics.response import Response

@@ -8,7 +8,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.engine.batch import first_limit_passed, limits_used
 from kinetostat.equilibrium.state import MachineState
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES

@@ -6,7 +6,7 @@ The formulas are elsewhere.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.mobility import free_twist
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import QUANTITIES

@@ -5,8 +5,9 @@ Positions of a slider become SI values and back; the sliders themselves are elem
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import AXES, VECTORS, Parameter, parameters, values

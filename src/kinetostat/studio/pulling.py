@@ -6,13 +6,13 @@ the part at all; nothing is known here of what they mean, and nothing of the pag
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Configuration, Machine

@@ -10,10 +10,11 @@ session directly.
 import base64
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from urllib.parse import quote, urlencode
 
 from kinetostat.equilibrium.state import state_of
+from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import STATES
 from kinetostat.machine.loading import as_toml, build, bundled, changed, load, read_again, related
 from kinetostat.machine.machine import Machine

@@ -5,12 +5,12 @@ Messages are those of `kinetostat`; what a field means comes from the same annot
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from html import escape
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from kinetostat.frozen import dataclass
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts

@@ -4,8 +4,8 @@ The text is read by the rules below and never run as a program.
 """
 
 import re
-from dataclasses import dataclass
 
+from kinetostat.frozen import dataclass
 from kinetostat.units import KINDS, UNIT, UnitError, parse
 
 LONGEST = 64

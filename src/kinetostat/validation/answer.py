@@ -1,10 +1,9 @@
 """The compliance that an independent engine returns, and the difference of two compliances. Knows no engine."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import RIGID_BLOCK_OF_ENGINE
 
 ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)

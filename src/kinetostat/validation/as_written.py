@@ -9,13 +9,13 @@ with pairs of bars, are those of the family. Points and axes are in the base fra
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.vector import AXES, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn

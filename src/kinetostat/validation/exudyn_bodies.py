@@ -5,13 +5,13 @@ Every body's frame is the base frame moved to a point, so that all rotations are
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 
 TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
 """Places of Exudyn's x y z rx ry rz in kinetostat's rx ry rz x y z, and the other way round."""

@@ -5,13 +5,13 @@ Knows no engine, and no mass matrix: it reads masses, centres, inertias and ends
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.validation.pieces import array, bodies_before, columns
 

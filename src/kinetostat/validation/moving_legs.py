@@ -6,13 +6,14 @@ or `kinematics` is used. Points and axes are in the base frame, placements are m
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Member

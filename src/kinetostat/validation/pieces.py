@@ -7,12 +7,13 @@ this keeps the comparison independent.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Plane

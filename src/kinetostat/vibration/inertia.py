@@ -9,13 +9,13 @@ eigenvalues are in 1/s².
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import ElasticLeg, Masses
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.numerics.motions import Motions, cross, skew_of
 

@@ -10,7 +10,6 @@ Source: theory (58) and (59). Units are those of `equilibrium.mechanism`; mu is 
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, NO_MOMENTUM, UNRESISTED

@@ -6,13 +6,12 @@ compliance.
 Source: theory (59) and (60); the limit of a cut, J. Tlusty and M. Polacek (1963). At the tool point, base axes, SI.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.state import MachineState
+from kinetostat.frozen import dataclass
 from kinetostat.machine.column import stacked
 from kinetostat.vibration.modes import Modes, damping_matrix, modes
 

@@ -8,7 +8,7 @@ Source: theory (58) and what follows (63). Units are those of `equilibrium.mecha
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.equilibrium.state import MachineState
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine

@@ -6,11 +6,10 @@ state. So the response at every frequency is that of `receptance`, to round-off.
 Source: theory (61) and (62). SI, base axes, at the tool point.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import Damper

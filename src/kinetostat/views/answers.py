@@ -6,11 +6,12 @@ something of this kind is shown, so that the list costs nothing.
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kinetostat.frozen import dataclass
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text

@@ -4,13 +4,13 @@ Colours are chosen in `figures`; here are only numbers.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.views.usual_values import WIDE, usual_range
 
 LEVELS = 12

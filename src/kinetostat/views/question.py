@@ -6,10 +6,12 @@ sentences, tables and figures once. Surfaces are made of both elsewhere: `data_f
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import import_module
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
+
+from kinetostat.frozen import dataclass
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

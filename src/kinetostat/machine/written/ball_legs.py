@@ -12,10 +12,10 @@ Source: theory (73)-(75); R. M. Murray, Z. Li and S. S. Sastry, A Mathematical I
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, where
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Closure, Step
 from kinetostat.tolerances import NO_LINK, SAME_CENTRE

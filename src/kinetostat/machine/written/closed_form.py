@@ -5,12 +5,12 @@ closed by Newton's method (`kinematics.closure`), and so are these where the pla
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Closure, Inverse, Step

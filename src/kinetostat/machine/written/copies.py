@@ -6,7 +6,7 @@ matrices are in the base frame at the home pose.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.written.plan import Copies, JointPlan, LegPlan, Matrix
 from kinetostat.spec.errors import InputError, shorten

@@ -5,11 +5,12 @@ are joined to legs is `family`'s business. Points and axes are in the base frame
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import AXES, Z_AXIS, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, revolutes
 from kinetostat.machine.link import Parallelogram, any_up
 from kinetostat.spec.errors import choice

@@ -1,9 +1,9 @@
 """The plan of a machine written leg by leg, which is all but its numbers: legs, joints, links and their models."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Inverse
 from kinetostat.spec.immutable import Immutable
 

@@ -6,12 +6,13 @@ in the base frame.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.cross_section import rigidity_of
 from kinetostat.machine.leg import Element, Joint, PartName, Spring
 from kinetostat.machine.machine import Step

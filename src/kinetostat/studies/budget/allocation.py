@@ -7,12 +7,12 @@ Source: theory (54).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.budget.spread import Measures
 from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart

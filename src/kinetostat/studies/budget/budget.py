@@ -7,7 +7,7 @@ Source: theory (50)-(54).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import Machine

@@ -8,13 +8,13 @@ Source: theory (48), (50), (52) and (53).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError

@@ -13,7 +13,6 @@ Source: theory (50) and (51).
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri
@@ -21,6 +20,7 @@ from scipy.stats import qmc
 
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError

@@ -9,12 +9,12 @@ Reconstruction*, 1987.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED
 
 Tell = Callable[[int, int, str], None]

@@ -1,7 +1,6 @@
 """Identify a machine as built: from measurements to its most likely numbers, their sureness, and what is not seen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array
 from kinetostat.display import number
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten

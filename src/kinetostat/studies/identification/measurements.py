@@ -5,12 +5,12 @@ commanded; `measured.x` and so on what was measured, `deflection.x` what a wrenc
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import poses_at, system_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE

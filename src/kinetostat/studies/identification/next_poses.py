@@ -10,7 +10,6 @@ Source: theory (67) and (68).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from kinetostat.accuracy.model import PLACED, error_model
 from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine

@@ -7,13 +7,13 @@ Source: theory (64); exact places and rates are those of theory (46) and (48).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import PLACED, ErrorModel
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
 from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, TURNED, Measurements

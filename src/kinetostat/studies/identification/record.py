@@ -5,13 +5,13 @@ Nothing is fitted here, and nothing of the file is trusted before its form has b
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 

@@ -7,7 +7,6 @@ Source: theory (66).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from kinetostat.accuracy.errors import Insertion, MachineError, effects
 from kinetostat.accuracy.rows import random_coordinates
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.numerics.motions import cross
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, Observation

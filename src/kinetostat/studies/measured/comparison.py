@@ -8,7 +8,6 @@ and Heat Transfer*, sections 1 and 6.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from kinetostat.accuracy.built import compliances_as_built
 from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.column import stacked

@@ -4,12 +4,12 @@ A file of entries has the columns entry, value and sigma; one of deflections is 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten

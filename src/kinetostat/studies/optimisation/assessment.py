@@ -5,7 +5,6 @@ machines made within the tolerances from one design tell how its objectives scat
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
 
@@ -14,6 +13,7 @@ import numpy as np
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.batch import Evaluator
 from kinetostat.engine.points import Population
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem

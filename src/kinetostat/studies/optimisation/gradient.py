@@ -8,8 +8,9 @@ the order at hand.
 Source: Kraft, A software package for sequential quadratic programming, DFVLR-FB 88-28 (1988), as in scipy.
 """
 
+import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
@@ -100,7 +102,7 @@ class Gradient:
         return [new, int(old)] if (violation, value) < before else [int(old), new]
 
 
-@dataclass
+@dataclasses.dataclass
 class _Descent:
     """One descent: genes of continuous variables, all else held."""
 

@@ -5,13 +5,14 @@ step, and ends as if it had never been stopped.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.studies.optimisation.assessment import Outcome, join_outcomes
 from kinetostat.studies.optimisation.problem import Problem
 

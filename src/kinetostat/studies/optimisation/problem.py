@@ -3,11 +3,12 @@
 import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from kinetostat.display import Display
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine

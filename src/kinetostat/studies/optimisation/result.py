@@ -4,7 +4,7 @@ It is written here as plain data, as a table of all designs, and as files; what 
 """
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import xarray as xr
 from kinetostat.arrays import Array, Integers
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values

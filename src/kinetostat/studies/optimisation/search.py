@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from kinetostat.display import ENGINEERING
+from kinetostat.frozen import dataclass
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked

@@ -8,13 +8,13 @@ the objective changes.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.derivatives import differentiate
 from kinetostat.engine.points import Population
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.assessment import deviations
 from kinetostat.studies.optimisation.problem import Problem

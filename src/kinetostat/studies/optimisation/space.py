@@ -6,7 +6,6 @@ machine's own, a list, a grid, or the workspace in a grid.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import prod
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten

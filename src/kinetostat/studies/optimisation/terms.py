@@ -8,13 +8,13 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Mask
 from kinetostat.equilibrium.state import state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice, shorten

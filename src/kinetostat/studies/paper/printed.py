@@ -7,7 +7,6 @@ Source: `CITATION`.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 
@@ -16,6 +15,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.arrays import AnyArray, Array
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.elements import elements
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES

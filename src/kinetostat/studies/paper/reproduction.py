@@ -7,7 +7,7 @@ threshold open, the one that is taken here is named as such.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import StrEnum
 from itertools import pairwise
 from typing import Any
@@ -18,6 +18,7 @@ import xarray as xr
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import AnyArray, Array
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.elements import elements, rigid_from, with_links_together
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load

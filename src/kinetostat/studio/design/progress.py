@@ -4,12 +4,13 @@ Only what is new since the last look is read. Nothing of a page is known here.
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of

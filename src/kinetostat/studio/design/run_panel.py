@@ -5,12 +5,12 @@ A design is named by its place in the front, sorted by the first objective.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kinetostat.display import Scale
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError

@@ -11,10 +11,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Hashable
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import write_result

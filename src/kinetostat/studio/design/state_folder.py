@@ -5,9 +5,10 @@ Searches are kept in the same folder, by `runs`.
 
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
+from kinetostat.frozen import dataclass
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file

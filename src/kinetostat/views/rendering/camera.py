@@ -5,11 +5,11 @@ Nothing here knows solids, light or colours.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 
 VIEWPOINTS = {
     "iso": (1.0, -1.35, 0.75),

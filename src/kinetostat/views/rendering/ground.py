@@ -1,12 +1,12 @@
 """The ground below a machine: its shadow and a faint grid, laid as a veil over any background."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from kinetostat.arrays import Array, Float32s
+from kinetostat.frozen import dataclass
 from kinetostat.views.rendering.camera import Camera
 from kinetostat.views.rendering.light import Light, smooth_step
 

@@ -7,7 +7,6 @@ threads of its own in each of the threads here.
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Float32s, Integers, Mask
 from kinetostat.engine.batch import available_cores
+from kinetostat.frozen import dataclass
 from kinetostat.views.rendering.camera import axes_towards
 from kinetostat.views.rendering.visibility import Triangles, nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear

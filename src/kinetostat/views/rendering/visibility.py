@@ -4,11 +4,11 @@ Nothing here knows light or colours. The same rasteriser serves the camera and t
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.arrays import Array, Float32s, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.views.rendering.camera import Camera
 from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import LOOKS, Solid

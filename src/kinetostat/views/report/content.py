@@ -5,8 +5,10 @@ and tables; file formats are known only to them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
+
+from kinetostat.frozen import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ import gzip
 import json
 from base64 import b64encode
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure as Drawing
 
+from kinetostat.frozen import dataclass
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.vibration import Vibration
 from kinetostat.views.figures import as_svg

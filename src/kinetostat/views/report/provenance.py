@@ -5,9 +5,9 @@ Nothing is computed here.
 
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 
+from kinetostat.frozen import dataclass
 from kinetostat.studies.paper.printed import CITATION
 from kinetostat.views.report.content import Formula, Listing, Paragraph, Section, Table
 

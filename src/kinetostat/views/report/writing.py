@@ -6,12 +6,12 @@ Sections are written in the modules beside this one; only the order of the work 
 import json
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file

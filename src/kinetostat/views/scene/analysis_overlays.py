@@ -5,12 +5,12 @@ The symbols themselves are drawn in `overlays`; here the machine's answer is tur
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.deflected import Deflection, deflected_links
 from kinetostat.kinetostatics.indices import Principal
 from kinetostat.kinetostatics.loading import deflection

@@ -4,11 +4,12 @@ Nothing is drawn here.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, TypeAlias
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import AXES, ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.parts import Arm

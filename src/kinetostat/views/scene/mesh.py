@@ -6,13 +6,13 @@ normal; points that coincide have equal coordinates, bit by bit.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import NO_CIRCLE
 from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, inset_outline
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned

@@ -1,11 +1,11 @@
 """Base and platform as plates behind the joints of the legs, joined to them by pedestals. No leg is drawn here."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.polygon import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Solid, unit, upright

@@ -5,10 +5,10 @@ Cross-sections and limits of the file decide; without them the parts are drawn i
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.views.scene.anatomy import anatomy

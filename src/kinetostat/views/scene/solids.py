@@ -4,11 +4,12 @@ No machine and no renderer is known here. Lengths are in m; `mesh` makes triangl
 """
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Rotation, Vector
+from kinetostat.frozen import dataclass
 from kinetostat.tolerances import NO_DIRECTION
 
 Point2: TypeAlias = tuple[float, float]
