@@ -23,6 +23,7 @@ _HOMES = {
     "carrying_legs": "kinetostat.studies.carrying",
     "command": "kinetostat.studies.commanding",
     "correction_table": "kinetostat.studies.corrections",
+    "compile": "kinetostat.studies.compiled",
     "evaluate": "kinetostat.studies.datasets",
     "evaluate_grid": "kinetostat.studies.grid",
     "workspace": "kinetostat.studies.workspace",
@@ -59,9 +60,10 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "carrying_legs", "changed", "command",
-    "compare", "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines", "identify", "load",
-    "load_problem", "machine_picture", "modes", "optimize", "plot", "register", "report", "reproduce", "requirements",
-    "save", "sensitivity", "state_of", "state_space", "under_load", "validate", "validate_measured", "workspace",
+    "compare", "compile", "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines",
+    "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot", "register", "report",
+    "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "under_load", "validate",
+    "validate_measured", "workspace",
 ]  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from kinetostat.studies.budget.budget import budget as budget
 from kinetostat.studies.carrying import carrying_legs as carrying_legs
 from kinetostat.studies.commanding import command as command
 from kinetostat.studies.comparison import compare as compare
+from kinetostat.studies.compiled import compile as compile  # noqa: A004
 from kinetostat.studies.corrections import correction_table as correction_table
 from kinetostat.studies.datasets import evaluate as evaluate
 from kinetostat.studies.grid import evaluate_grid as evaluate_grid

@@ -16,12 +16,13 @@ from grown_legs import LENGTH
 from same_machines import in_other_units, quarter, reordered, turned, with_matrices
 
 from kinetostat.arrays import Array
-from kinetostat.engine.batch import evaluate
+from kinetostat.engine.batch import Evaluation, evaluate, responses
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
@@ -317,7 +318,8 @@ def grid(case: Case) -> str | None:
         "singularity_margin",
         *(f"{m}_{name}" for m in ("compliance", "stiffness") for name in case.machine.family.component_names),
     ]
-    answers = evaluate(case.machine, PointTable({path: poses}), names, repeated=compiled)
+    points = PointTable({path: poses})
+    answers = evaluate(case.machine, points, names) if compiled else in_arrays(case.machine, points, names)
     for i, pose in enumerate(poses.tolist()):
         machine = with_values(case.machine, {path: pose})
         response, where = response_of(machine), f"{path} = {pose!r}, {'compiled' if compiled else 'in arrays'}"
@@ -334,6 +336,14 @@ def grid(case: Case) -> str | None:
             if not np.allclose(answers.values[name][i], number, rtol=ONE_PROGRAM, atol=0.0):
                 return f"{where}: {name} {answers.values[name][i]}, alone {number}"
     return None
+
+
+def in_arrays(machine: Machine, points: PointTable, names: list[str]) -> Evaluation:
+    """The formulas over NumPy arrays, which no program of the engine runs."""
+    response = responses(machine, points)
+    with np.errstate(all="ignore"):
+        found = {name: np.broadcast_to(QUANTITIES[name].value(response), points.size) for name in names}
+    return Evaluation(found, np.broadcast_to(response.status, points.size))
 
 
 def inner_laws(case: Case) -> str | None:

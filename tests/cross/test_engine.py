@@ -12,8 +12,9 @@ from kinetostat.algebra.scalar import cos, reciprocal, smaller, sqrt, where
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import by_free_springs, evaluate
-from kinetostat.engine.kernel import quantity_program, slab_fill
-from kinetostat.engine.native import Body, Program, host_lanes
+from kinetostat.engine.kernel import program_of, slab_fill
+from kinetostat.engine.machine_code import Program, machine_code_of
+from kinetostat.engine.native import Body, host_lanes
 from kinetostat.engine.points import Axis, Grid, PointTable
 from kinetostat.engine.trace import Graph, Traced, needed
 from kinetostat.engine.trigonometry import cos_and_sin
@@ -256,9 +257,9 @@ def test_a_program_serves_all_machines_of_one_form() -> None:
     changed = {"geometry.base_radius": 0.3, "geometry.base_angle": 0.2, "stiffness.actuator.1": 4e4}
     machine, other = with_values(machine, {"stiffness.actuator.1": 3e4}), with_values(machine, changed)
     slab_fill(machine, tuple(columns), NAMES)
-    made = quantity_program.cache_info().misses
+    made = program_of.cache_info().misses
     slab_fill(other, tuple(columns), NAMES)
-    assert quantity_program.cache_info().misses == made
+    assert program_of.cache_info().misses == made
     assert_same(native(other, columns), by_floats(other, columns))
 
 
@@ -296,7 +297,8 @@ def test_results_that_nothing_varies() -> None:
 
 def run_one(graph: Graph, x: Traced, result: object, at: Array) -> Array:
     found = np.empty((1, len(at)))
-    Program(Body([], [x], [result], 0.0)).run(np.empty(0), [at], found, np.empty(len(at), dtype=np.int8))
+    program = Program(machine_code_of(Body([], [x], [result], 0.0)))
+    program.run(np.empty(0), [at], found, np.empty(len(at), dtype=np.int8))
     return found[0]
 
 

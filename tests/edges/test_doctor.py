@@ -114,8 +114,7 @@ def one_digit_off():
 def slightly_wrong(evaluate):
     def found(*given, **options):
         answer = evaluate(*given, **options)
-        if options.get("repeated"):
-            answer.values["stiffness_z"] *= 1.0 + 1e-6
+        answer.values["stiffness_z"] *= 1.0 + 1e-6
         return answer
 
     return found

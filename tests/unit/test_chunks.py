@@ -19,7 +19,6 @@ NAMES = ("compliance_x", "stiffness_x", "singularity_margin")
 
 @pytest.fixture
 def small_slabs(monkeypatch):
-    monkeypatch.setattr(batch, "NATIVE_FROM", 2 * SLAB)
     monkeypatch.setattr(batch, "NATIVE_SLAB", SLAB)
     monkeypatch.setattr(chunks, "NATIVE_SLAB", SLAB)
 

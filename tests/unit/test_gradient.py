@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.algebra.scalar import cos, sin, smaller, sqrt, where
 from kinetostat.engine.gradient import Interpreted, gradient, share_of, with_gradients
-from kinetostat.engine.native import Program
+from kinetostat.engine.machine_code import Program, machine_code_of
 from kinetostat.engine.trace import Body, Graph, needed
 
 RULES = {
@@ -78,7 +78,7 @@ def test_every_rule_is_that_of_calculus(name):
     body, inputs = bodies(RULES[name])
     x, y = points()
     expected = differences(RULES[name], x, y)
-    for runnable in (Program(with_gradients(body, inputs)), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
         value, *slopes = run(runnable, [], [x, y])
         assert value == pytest.approx(RULES[name](x, y) + 0 * x, rel=EXACT)
         assert np.array(slopes) == pytest.approx(expected.astype(float), rel=EXACT, abs=EXACT)
@@ -89,7 +89,7 @@ def test_an_input_may_be_the_same_at_all_points(name):
     body, inputs = bodies(RULES[name], fixed=True)
     y = points()[1]
     expected = differences(RULES[name], 0.3 + 0 * y, y)
-    for runnable in (Program(with_gradients(body, inputs)), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
         assert run(runnable, [0.3], [y])[1:] == pytest.approx(expected.astype(float), rel=EXACT, abs=EXACT)
 
 
@@ -105,7 +105,7 @@ def test_a_cosine_is_differentiated_as_such_and_not_as_its_series():
     """By its series, the derivative at many turns would be that of the remainder: wrong at every quarter turn."""
     body, inputs = bodies(lambda x, y: cos(x) + y)
     x = np.concatenate([np.arange(-8, 9) * np.pi / 4, [1e5, -3e5]])
-    for runnable in (Program(with_gradients(body, inputs)), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
         assert run(runnable, [], [x, x])[1] == pytest.approx(-np.sin(x), rel=1e-15, abs=1e-15)
 
 
@@ -140,7 +140,7 @@ def test_inputs_may_be_nodes_on_the_way():
 def test_a_branch_not_taken_leaves_nothing_behind():
     body, inputs = bodies(lambda x, y: where(x > 0.0, 1.0 / where(x > 0.0, x, 1.0), 0.0) + y)
     x = np.array([-1.0, 0.0, 2.0, -3.0, 4.0, 0.0, 1.0, 1.0])
-    for runnable in (Program(with_gradients(body, inputs)), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
         by_x = run(runnable, [], [x, x])[1]
         assert by_x == pytest.approx(np.where(x > 0, -1.0 / np.where(x > 0, x, 1.0) ** 2, 0.0), rel=1e-15)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.engine.batch import NATIVE_FROM, evaluate
+from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.closure import solve_joints
@@ -176,14 +176,13 @@ class TestVerdicts:
         assert abs(other.volume.value - found.volume.value) < ERRORS * 1.5 * found.volume.standard_error
 
 
-def test_machine_code_and_arrays_agree_on_the_workspace():
-    """The same grid, once alone and once as a part of one that is large enough for machine code."""
+def test_a_grid_has_the_verdicts_that_it_has_within_a_larger_one():
+    """The same grid, once alone and once as a part of one of several slabs."""
     settings = (*TestVerdicts.SETTINGS, "limits.leg_diameter=20 mm", "limits.platform_joint_angle=54 deg")
     machine = load("hexapod", settings)
     ranges = ["x=-6 cm:6 cm:41", "z=6 cm:22 cm:41"]
     small = workspace(machine, ranges, TestVerdicts.WHERE)
     large = workspace(machine, [*ranges, "y=0:1 mm:40"], TestVerdicts.WHERE)
-    assert large.dataset["verdict"].size > NATIVE_FROM > small.dataset["verdict"].size
     assert np.array_equal(large.dataset["verdict"].values[:, :, 0], small.dataset["verdict"].values)
     assert len(np.unique(small.dataset["verdict"])) >= 5
 

@@ -1,35 +1,36 @@
-"""Evaluates a machine at many points: chooses the arithmetic, the slab size and the threads. No formula lives here.
+"""Evaluates a machine at any number of points: its function, slab by slab, in threads. No formula lives here.
 
-Small batches run through NumPy, because that starts at once; large ones run through machine code. Both evaluate the
-same functions.
+A `Function` gives the numbers of a machine as functions of some of its parameters, in machine code whatever the number
+of points, so that one pose has the digits that it has among many. The last functions are kept by the machine itself,
+not by what is in it: who asks for one again has it without a look at the machine's numbers.
 """
 
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from functools import lru_cache, partial
 from itertools import islice
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.engine.kernel import Fill, fill_some, slab_fill
+from kinetostat.engine.kernel import FallingBack, Fill, Identical, ProgramFill, fill_some, slab_fill
 from kinetostat.engine.loaded import Way, loaded_fill, way_of
 from kinetostat.engine.points import ConsecutivePoints, Points, Population
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.equilibrium.state import states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, load_checks
-from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state, rest_numbers
+from kinetostat.kinetostatics.quantities import needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
 
-NATIVE_FROM = 20_000
-"""Points from which loading LLVM and compiling (0.1 to 0.3 s) pays: NumPy does 30 to 200 thousand poses/s."""
 NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
+FUNCTIONS_KEPT = 64
+"""Functions kept in memory with their machines."""
 NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt takes effect soon."""
 
@@ -75,29 +76,80 @@ def evaluate(
             whole batch bit for bit, because the size of the whole decides the arithmetic, and the slabs are the same.
         threads: number of slabs computed at the same time; by default the number of processors.
         repeated: whether the same quantities will be needed many times at other numbers, as behind a slider. Then it
-            pays to compile for few points as well: a thousand poses take a millisecond from then on.
+            pays to compile states of rest and vibrations for few points as well.
     """
-    method, slab, most = _method_for(machine, points.paths, quantities, points.size, repeated)
-    fill = by_free_springs(machine, points.paths, quantities, method)
+    function = function_of(machine, points.paths, quantities, math.inf if repeated else points.size)
     served = points if part is None else ConsecutivePoints(points, part.start, part.stop)
-    results, status = in_slabs(served, fill, len(quantities), slab, min(threads or most, most), progress)
+    results, status = function.at(served, progress, threads)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
+
+
+@dataclass(frozen=True)
+class Function:
+    """Numbers of a machine as functions of some of its parameters. Threads may share it.
+
+    Attributes:
+        fill: evaluates slabs.
+        paths: leaf paths of the parameters.
+        rows: how many numbers there are for each point.
+        slab: points of a slab; None for the number that suits machine code.
+    """
+
+    fill: Fill
+    paths: tuple[str, ...]
+    rows: int
+    slab: int | None = None
+
+    def at(self, points: Points, progress: Progress = silent, threads: int | None = None) -> tuple[Array, Codes]:
+        """Compute numbers [rows x points] and status codes.
+
+        Args:
+            points: values of the parameters.
+            progress: called after each slab.
+            threads: number of slabs computed at the same time; by default the number of processors.
+        """
+        most = available_cores()
+        return in_slabs(points, self.fill, self.rows, self.slab or NATIVE_SLAB, min(threads or most, most), progress)
+
+    @property
+    def direct(self) -> ProgramFill | None:
+        """The single program that evaluates the function at nearly all points, where nothing is computed before it."""
+        fill = self.fill.first if isinstance(self.fill, FallingBack) else self.fill
+        return fill if isinstance(fill, ProgramFill) and fill.alone else None
+
+
+def function_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: float = math.inf) -> Function:
+    """Return quantities of a machine as a function of some of its parameters, compiled.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        paths: leaf paths of those that do.
+        quantities: names from `kinetostatics.quantities.QUANTITIES`.
+        count: points at which it will be evaluated; of few, states of rest and vibrations are not found in machine
+            code, which takes seconds to compile.
+    """
+    same, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)
+    if not _needs_state(same, quantities):
+        return _function(same, paths, quantities)
+    return _function(same, paths, quantities, way_of(machine, paths, quantities, count))
+
+
+@lru_cache(FUNCTIONS_KEPT)
+def _needs_state(machine: Identical, quantities: tuple[str, ...]) -> bool:
+    return needs_state(machine.value, quantities)
+
+
+@lru_cache(FUNCTIONS_KEPT)
+def _function(
+    machine: Identical, paths: tuple[str, ...], quantities: tuple[str, ...], way: Way | None = None
+) -> Function:
+    method = slab_fill if way is None else partial(loaded_fill, way=way)
+    fill = by_free_springs(machine.value, paths, quantities, method)
+    return Function(fill, paths, len(quantities), way.slab if way else None)
 
 
 Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
 """A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
-
-
-def _method_for(
-    machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: int, repeated: bool
-) -> tuple[Method, int, int]:
-    """Choose how to evaluate so many points: the method, the points of a slab, and the slabs computed at a time."""
-    if needs_state(machine, quantities):
-        way = way_of(machine, paths, quantities, count, repeated)
-        return partial(loaded_fill, way=way), way.slab, available_cores()
-    if repeated or count >= NATIVE_FROM:
-        return slab_fill, NATIVE_SLAB, available_cores()
-    return _numpy_fill, NUMPY_SLAB, 1
 
 
 def in_slabs(
@@ -150,18 +202,6 @@ def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence
             others = {path: values for path, values in columns.items() if path not in fixed}
             part = method(with_values(machine, fixed), [*others], quantities) if fixed else ordinary
             fill_some(chosen, part, others, results, status)
-
-    return fill
-
-
-def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[str]) -> Fill:
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        with np.errstate(all="ignore"):
-            response = respond(with_values(machine, columns))
-            status[:] = response.status
-            for row, name in zip(results, quantities, strict=True):
-                row[:] = QUANTITIES[name].value(response)
-        results[:, status != Status.OK] = np.nan
 
     return fill
 
@@ -221,14 +261,11 @@ class Evaluator:
             paths: leaf paths of those that do: of designs, then of poses.
             quantities: names from `kinetostatics.quantities.QUANTITIES`.
         """
-        self._names = tuple(quantities)
-        method, self._slab, self._threads = _method_for(machine, paths, self._names, NATIVE_SLAB, repeated=True)
-        self._fill = by_free_springs(machine, paths, self._names, method)
+        self._names, self._function = tuple(quantities), function_of(machine, paths, quantities)
 
     def __call__(self, population: Population) -> PopulationResults:
         """Evaluate a population; its size alone decides how it is cut, so that equal ones give equal bits."""
-        results, status = in_slabs(population, self._fill, len(self._names), self._slab, self._threads)
-        return PopulationResults.of(population, self._names, results, status)
+        return PopulationResults.of(population, self._names, *self._function.at(population))
 
 
 def responses(machine: Machine, points: Points) -> Response:

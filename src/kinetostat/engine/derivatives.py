@@ -16,16 +16,24 @@ import numpy as np
 
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import (
-    NATIVE_SLAB,
+    FUNCTIONS_KEPT,
+    Function,
     PopulationResults,
     Progress,
-    available_cores,
     by_free_springs,
-    in_slabs,
     silent,
 )
-from kinetostat.engine.form import Form, Specimen, Weights, equations_of, form_of, objectives_of
-from kinetostat.engine.kernel import PROGRAMS_KEPT, Fill, closes_inside, falling_back, program_columns, runnable
+from kinetostat.engine.form import Specimen, Weights, equations_of, form_of, objectives_of
+from kinetostat.engine.kernel import (
+    PROGRAMS_KEPT,
+    FallingBack,
+    Fill,
+    Identical,
+    Recipe,
+    closes_inside,
+    program_columns,
+    program_of,
+)
 from kinetostat.engine.loaded import StatePrograms
 from kinetostat.engine.points import Points, Population
 from kinetostat.engine.trace import Runnable
@@ -92,20 +100,29 @@ def evaluate_gradient(
     """
     several = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
-    modes = _modes_to_know(machine, weights, (*points.paths, *paths))
-    native = (repeated or points.size >= MACHINE_CODE_FROM) and not modes
-    slab, threads = (NATIVE_SLAB, available_cores()) if native else (SMALL_SLAB, 1)
-
-    def method(part: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
-        return _fill(part, tuple(varying), weights, tuple(paths), native, modes)
-
-    fill = by_free_springs(machine, points.paths, (), method)
-    count, rows = len(weights), len(weights) * (1 + len(paths))
-    results, status = in_slabs(points, fill, rows, slab, threads, progress)
+    native = repeated or points.size >= MACHINE_CODE_FROM
+    function = _function(Identical(machine), tuple(points.paths), weights, tuple(paths), native)
+    results, status = function.at(points, progress, 1 if function.slab else None)
+    count = len(weights)
     values, slopes = results[:count], results[count:].reshape(count, len(paths), points.size)
     for value, slope in zip(values, slopes, strict=True):
         slope[:, ~np.isfinite(value)] = math.nan
     return Gradients(values, slopes, status)
+
+
+@lru_cache(FUNCTIONS_KEPT)
+def _function(
+    machine: Identical, varying: tuple[str, ...], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
+) -> Function:
+    """The objectives and then their derivatives by each path as a function of what varies."""
+    modes = _modes_to_know(machine.value, weights, (*varying, *paths))
+    native = native and not modes
+
+    def method(part: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
+        return _fill(part, tuple(varying), weights, paths, native, modes)
+
+    fill = by_free_springs(machine.value, varying, (), method)
+    return Function(fill, varying, len(weights) * (1 + len(paths)), None if native else SMALL_SLAB)
 
 
 def differentiate(
@@ -149,7 +166,7 @@ def _fill(
     if machine.family.chains is None:
         return routes.direct()
     if native and _closed_forms_hold(Specimen(machine), tuple(values(machine).items()), varying, weights, paths):
-        return falling_back(routes.direct(closed=True), lambda: routes.by_equations)
+        return FallingBack(routes.direct(closed=True), lambda: routes.by_equations)
     return routes.by_equations
 
 
@@ -213,7 +230,7 @@ class _Routes:
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
         self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
-        self._modes = modes
+        self._modes, self._joints = modes, machine.chains().size if machine.family.chains else 0
         self._loaded = bool(
             rest_numbers(machine, [name for objective in weights for name, _ in objective], limited=False)
         )
@@ -226,9 +243,9 @@ class _Routes:
             given = program_columns(self._machine, self._form, columns, len(status), closed)
             given += self._state(given, len(status), closed) + self._known_modes(columns, len(status))
             if self._known_slopes:
-                self._spread(*program.slopes(self._fixed, given, status), results)
+                self._spread(*self._slopes(self._weights, given, status, closed), results)
             else:
-                program.runnable.run(self._fixed, given, results, status)
+                program.run(self._fixed, given, results, status)
 
         return fill
 
@@ -237,7 +254,7 @@ class _Routes:
         given = program_columns(self._machine, self._form, columns, len(status))
         rates = self._equations(given, len(status))
         given += self._state(given, len(status), closed=False) + self._known_modes(columns, len(status))
-        objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
+        objectives, partial = self._slopes(self._weights, given, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
 
     def _equations(self, given: Sequence[Array], count: int) -> Array:
@@ -252,7 +269,7 @@ class _Routes:
 
         def rates_at(joints: Array) -> tuple[Array, Array]:
             columns = [*given[: len(given) - len(joints) - 1], *joints, given[-1]]
-            values, rates = self._program(()).slopes(self._fixed, columns, np.empty(count, dtype=np.int8))
+            values, rates = self._slopes((), columns, np.empty(count, dtype=np.int8))
             return values[-1], rates
 
         chains = self._machine.chains()
@@ -293,9 +310,25 @@ class _Routes:
                 self._known_slopes[path] if path in self._known_slopes else slopes[:, self._differentiated.index(path)]
             )
 
-    def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
-        form = (Specimen(self._machine), self._form, weights, self._differentiated, self._native, closed)
-        return _program(*form, self._modes if weights else 0)
+    def _slopes(
+        self, weights: tuple[Weights, ...], given: Sequence[Array], codes: Codes, closed: bool = False
+    ) -> tuple[Array, Array]:
+        """Results [results x points] of a program and their derivatives [results x inputs x points], codes in place."""
+        program = self._program(weights, closed)
+        rows, inputs = np.empty((program.rows, len(codes))), len(self._differentiated) + (0 if closed else self._joints)
+        program.run(self._fixed, given, rows, codes)
+        count = program.rows // (1 + inputs)
+        return rows[:count], rows[count:].reshape(count, inputs, len(codes))
+
+    def _program(self, weights: tuple[Weights, ...], closed: bool) -> Runnable:
+        """The program of the objectives and their derivatives, or without weights that of the closing equations."""
+        limited = False
+        trace, arguments = (
+            (objectives_of, (weights, self._differentiated, closed, self._modes, limited))
+            if weights
+            else (equations_of, (self._differentiated,))
+        )
+        return program_of(Recipe(trace, Specimen(self._machine), self._form, arguments), self._native)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:
@@ -382,44 +415,3 @@ def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Arr
     total = slopes[sound] + by_joints[sound] @ motion
     result[sound] = np.where(follows[:, None, :], total, np.nan)
     return result
-
-
-@dataclass(frozen=True)
-class _Program:
-    """A program that computes results and their derivatives by its inputs.
-
-    Attributes:
-        runnable: the program.
-        results: number of results.
-        inputs: number of inputs to differentiate by.
-    """
-
-    runnable: Runnable
-    results: int
-    inputs: int
-
-    def slopes(self, fixed: Array, columns: Sequence[Array], codes: Codes) -> tuple[Array, Array]:
-        """Return results [results x points] and derivatives [results x inputs x points]; codes are filled in place."""
-        rows = np.empty((self.results * (1 + self.inputs), len(codes)))
-        self.runnable.run(fixed, columns, rows, codes)
-        return rows[: self.results], rows[self.results :].reshape(self.results, self.inputs, len(codes))
-
-
-@lru_cache(PROGRAMS_KEPT)
-def _program(
-    kind: Specimen,
-    form: Form,
-    weights: tuple[Weights, ...],
-    paths: tuple[str, ...],
-    native: bool,
-    closed: bool,
-    modes: int,
-) -> _Program:
-    """Return the program of the objectives and their derivatives, or without weights that of the closing equations."""
-    formula = (
-        objectives_of(kind, form, weights, paths, closed, modes, limited=False)
-        if weights
-        else equations_of(kind, form, paths)
-    )
-    count, inputs = len(formula.body.results), len(formula.inputs)
-    return _Program(runnable(formula.body, native, formula.inputs), count, inputs)

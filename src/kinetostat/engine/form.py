@@ -47,7 +47,7 @@ class Form:
     inputs: tuple[bool, ...]
     uses: tuple[tuple[str, int, bool], ...]
     varying: tuple[str, ...]
-    turning: frozenset[str]
+    turning: tuple[str, ...]
 
 
 def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()) -> tuple[Form, Array]:
@@ -80,7 +80,7 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
             numbers.append(value if alone else abs(value))
         uses.append((path, place, value < 0.0 and not alone))
     ordinary = tuple(ORDINARY_PARAMETER[0] < number < ORDINARY_PARAMETER[1] for number in numbers)
-    turning = angles.intersection(varying)
+    turning = tuple(path for path in varying if path in angles)
     return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
 
 
@@ -157,7 +157,7 @@ def objectives_of(
     kind: Specimen,
     form: Form,
     objectives: Sequence[Weights],
-    paths: Sequence[str] = (),
+    paths: Sequence[str] | None = None,
     closed: bool = False,
     modes: int = 0,
     limited: bool = True,
@@ -168,7 +168,7 @@ def objectives_of(
         kind: of the machine.
         form: how its parameters enter.
         objectives: weighted sums of quantities.
-        paths: leaf paths of the parameters to differentiate by.
+        paths: leaf paths of the parameters to differentiate by, beside the joint coordinates; None for no derivatives.
         closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
             status are further columns, unless the family places the joints itself. If quantities are about the machine
             under load, coordinates of its state follow, see `step_of`.
@@ -201,7 +201,7 @@ def objectives_of(
     return _formula(given, columns, results, _number(response.status), paths, coordinates)
 
 
-def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Body:
+def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:
     """Trace a step of Newton's method towards rest: from coordinates of the state, which are the last columns, to them.
 
     The last result is the square of the step's size.
@@ -218,7 +218,7 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Bo
     coordinates = () if first else _inputs(given.graph, equations.size)
     stepped, square = equations.step(equations.start() if first else [*coordinates])
     results = [_number(value) for value in (*stepped, square)]
-    return Body(given.fixed, [*given.columns.values(), *columns, *coordinates], results, 0.0)
+    return _formula(given, columns, results, 0.0, coordinates=coordinates)
 
 
 def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
@@ -247,11 +247,12 @@ def _formula(
     joints: Sequence[Traced],
     results: Sequence[Operand],
     code: Operand,
-    paths: Sequence[str],
+    paths: Sequence[str] | None = None,
     coordinates: Sequence[Traced] = (),
 ) -> TracedFormula:
     body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
-    return TracedFormula(body, (*(given.parameters[path] for path in paths), *joints[:-1]))
+    inputs = () if paths is None else (*(given.parameters[path] for path in paths), *joints[:-1])
+    return TracedFormula(body, inputs)
 
 
 def _joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:

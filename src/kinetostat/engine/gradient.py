@@ -149,6 +149,7 @@ class Interpreted:
 
     def __init__(self, body: Body, inputs: Sequence[Traced]) -> None:
         self._body, self._inputs = body, inputs
+        self.rows = len(body.results) * (1 + len(inputs))
         self._active = active_nodes((result for result in body.results if isinstance(result, Node)), inputs)
         rates = [operand for node in self._active for operand in rule(node)[1]]
         self._lines = [node for node in needed([*body.results, body.code, *rates]) if node.operation != "input"]

@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, form_of, objectives_of, reduced_angles
+from kinetostat.engine.form import Form, Specimen, TracedFormula, form_of, objectives_of, reduced_angles
 from kinetostat.engine.gradient import Interpreted, with_gradients
-from kinetostat.engine.trace import Body, Runnable, Traced
+from kinetostat.engine.machine_code import Program, machine_code_of
+from kinetostat.engine.trace import Runnable
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import solve_joints, solver_of, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 
-PROGRAMS_KEPT = 64
-"""Programs of one kind kept in memory, of some 20 kB each."""
+PROGRAMS_KEPT = 128
+"""Programs kept in memory, of some 20 kB each."""
 
 Fill = Callable[[Mapping[str, Array], Array, Codes], None]
 """From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
@@ -41,20 +43,23 @@ def fill_some(chosen: Any, fill: Fill, columns: Mapping[str, Array], results: Ar
     results[:, chosen], status[chosen] = part, codes
 
 
-def falling_back(first: Fill, other: Callable[[], Fill]) -> Fill:
-    """Compose two fills: the other takes the points at which the first finds no joints (NOT_CONVERGED).
+@dataclass(frozen=True)
+class FallingBack:
+    """Two fills: the other takes the points at which the first finds no joints (NOT_CONVERGED).
 
     Closed forms inside a program and the equations outside it are so composed; the other fill is made when the first
     point needs it, because it costs a compilation.
     """
 
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        first(columns, results, status)
+    first: Fill
+    other: Callable[[], Fill]
+
+    def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Evaluate a slab, see `Fill`."""
+        self.first(columns, results, status)
         left = np.flatnonzero(status == Status.NOT_CONVERGED)
         if left.size:
-            fill_some(left, other(), columns, results, status)
-
-    return fill
+            fill_some(left, self.other(), columns, results, status)
 
 
 Further = Callable[[Array, Sequence[Array], int], Sequence[Array]]
@@ -66,8 +71,80 @@ def nothing_further(_fixed: Array, _columns: Sequence[Array], _count: int) -> Se
     return ()
 
 
+class Identical:
+    """A key of caches that equals another only if both hold the very same object: neither has to be gone through."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Identical) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that decides what a program is, before anything is traced: programs of equal recipes are the same.
+
+    Attributes:
+        trace: the function of `form` that traces it.
+        kind: of the machine.
+        form: how its parameters enter.
+        arguments: of the function, after these two.
+    """
+
+    trace: Callable[..., TracedFormula]
+    kind: Specimen
+    form: Form
+    arguments: tuple[Any, ...]
+
+
+@lru_cache(PROGRAMS_KEPT)
+def program_of(recipe: Recipe, native: bool = True) -> Runnable:
+    """Return the program of a recipe, compiled or run node by node in NumPy; derivatives come after all results."""
+    formula = recipe.trace(recipe.kind, recipe.form, *recipe.arguments)
+    if not native:
+        return Interpreted(formula.body, formula.inputs)
+    return Program(machine_code_of(with_gradients(formula.body, formula.inputs)))
+
+
+@dataclass(frozen=True)
+class ProgramFill:
+    """The fill by a single program.
+
+    Attributes:
+        machine: its family, and all parameters that do not vary.
+        form: of it.
+        fixed: values of the program's fixed inputs.
+        program: the program.
+        closed: whether the program computes joint coordinates itself, in closed form. Otherwise they are found slab by
+            slab and are further columns, unless the family places the joints.
+        further: gives the columns after those, as coordinates of states of rest.
+    """
+
+    machine: Machine
+    form: Form
+    fixed: Array
+    program: Runnable
+    closed: bool
+    further: Further = nothing_further
+
+    @property
+    def alone(self) -> bool:
+        """Whether the program needs no columns beside the parameters that vary."""
+        return self.further is nothing_further and (self.closed or self.machine.family.chains is None)
+
+    def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Evaluate a slab, see `Fill`."""
+        given = program_columns(self.machine, self.form, columns, len(status), self.closed)
+        given = [*given, *self.further(self.fixed, given, len(status))]
+        self.program.run(self.fixed, given, results, status)
+
+
 def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Fill:
-    """Return the fill in machine code of quantities of unloaded machines; 0.1 s unless such a program is there already.
+    """Return the fill of quantities of unloaded machines; 0.1 s unless such a program is there already.
 
     Args:
         machine: its family, and all parameters that do not vary.
@@ -77,7 +154,7 @@ def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str
     if not closes_inside(machine):
         return program_fill(machine, varying, quantities, closed=False)
     inside = program_fill(machine, varying, quantities, closed=True)
-    return falling_back(inside, lambda: program_fill(machine, varying, quantities, closed=False))
+    return FallingBack(inside, lambda: program_fill(machine, varying, quantities, closed=False))
 
 
 def program_fill(
@@ -87,24 +164,18 @@ def program_fill(
     closed: bool,
     native: bool = True,
     further: Further = nothing_further,
-) -> Fill:
-    """Return the fill by a single program.
+) -> ProgramFill:
+    """Return the fill of quantities by a single program, see `ProgramFill`.
 
     Args:
         machine, varying, quantities: as for `slab_fill`.
-        closed: whether the program computes joint coordinates itself, in closed form. Otherwise they are found slab by
-            slab and are further columns, unless the family places the joints.
+        closed, further: see `ProgramFill`.
         native: whether it is compiled; otherwise it runs node by node in NumPy.
-        further: gives the columns after those, as coordinates of states of rest.
     """
     form, fixed = form_of(machine, varying)
-    program = quantity_program(Specimen(machine), form, tuple(quantities), closed, native)
-
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        given = program_columns(machine, form, columns, len(status), closed)
-        program.run(fixed, [*given, *further(fixed, given, len(status))], results, status)
-
-    return fill
+    objectives = tuple(((name, 1.0),) for name in quantities)
+    program = program_of(Recipe(objectives_of, Specimen(machine), form, (objectives, None, closed)), native)
+    return ProgramFill(machine, form, fixed, program, closed, further)
 
 
 def program_columns(
@@ -136,18 +207,3 @@ def program_columns(
 def closes_inside(machine: Machine) -> bool:
     """Tell whether a program for a machine can compute its joint coordinates itself."""
     return machine.family.chains is not None and solver_of(task_of(machine), traced=True).traceable
-
-
-@lru_cache(PROGRAMS_KEPT)
-def quantity_program(kind: Specimen, form: Form, quantities: tuple[str, ...], closed: bool, native: bool) -> Runnable:
-    """Return the program of some quantities, one for all machines of a kind and form."""
-    return runnable(objectives_of(kind, form, [((name, 1.0),) for name in quantities], closed=closed).body, native)
-
-
-def runnable(body: Body, native: bool, inputs: Sequence[Traced] = ()) -> Runnable:
-    """Return a body that machine code or NumPy evaluates, with the derivatives of its results by some inputs."""
-    if not native:
-        return Interpreted(body, inputs)
-    from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
-
-    return Program(with_gradients(body, inputs) if inputs else body)

@@ -17,12 +17,13 @@ from kinetostat.arrays import Array, Codes
 from kinetostat.engine.form import Form, Specimen, form_of, step_of
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
+    FallingBack,
     Fill,
+    Recipe,
     closes_inside,
-    falling_back,
     nothing_further,
     program_fill,
-    runnable,
+    program_of,
 )
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cut import cut_machine
@@ -70,22 +71,21 @@ COLUMNS_TO = 30_000
 """Points up to which the vibrations of a platform alone take less time than compiling."""
 
 
-def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: int, repeated: bool) -> Way:
+def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: float) -> Way:
     """Choose how to find the loaded states of a machine, and its natural vibrations.
 
     Args:
         machine: with its loads; gives all parameters that do not vary.
         paths: leaf paths of those that vary.
         quantities: names from `QUANTITIES`.
-        count: of points.
-        repeated: whether the same will be asked many times, so that compiling pays for few points too.
+        count: of points; infinity if the same will be asked many times, so that compiling pays for few points too.
     """
     loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
-    if not loaded and count < COLUMNS_TO and not repeated and platform_alone(machine, paths):
+    if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
-    if (count < NUMPY_FROM and not repeated) or not _over_scalars(machine, tuple(paths), quantities):
+    if count < NUMPY_FROM or not _over_scalars(machine, tuple(paths), quantities):
         return Way.ANY_MACHINE if loaded else Way.MODES
-    return Way.NATIVE if repeated or count >= NATIVE_FROM else Way.NUMPY
+    return Way.NATIVE if count >= NATIVE_FROM else Way.NUMPY
 
 
 def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
@@ -122,7 +122,7 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
         StatePrograms(machine, form_of(machine, paths)[0], closed, native).rest_coordinates if cut else nothing_further
     )
     directly = program_fill(machine, paths, quantities, closed, native, further)
-    every = falling_back(directly, lambda: solved)
+    every = FallingBack(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         if cut:
@@ -178,12 +178,14 @@ class StatePrograms:
             closed: whether joints are closed inside the programs.
             native: whether to compile.
         """
-        self._key, self._making = (Specimen(machine), form, closed, native), Lock()
-        self._first, self._size = self._step(first=True)
+        self._kind, self._form, self._closed, self._native = Specimen(machine), form, closed, native
+        self._making = Lock()
+        self._first = self._step(first=True)
+        self._size = self._first.rows - 1  # the last result is how long the step is
 
-    def _step(self, first: bool) -> tuple[Runnable, int]:
+    def _step(self, first: bool) -> Runnable:
         with self._making:  # threads that need a program at the same time wait until it is there
-            return _step(*self._key, first)
+            return program_of(Recipe(step_of, self._kind, self._form, (self._closed, first)), self._native)
 
     def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
         """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.
@@ -200,7 +202,7 @@ class StatePrograms:
             rows = np.flatnonzero(moving)
             if not len(rows):
                 break
-            step, _ = self._step(first=False)
+            step = self._step(first=False)
             most = 2 * len(rows) > count  # then picking them out would take longer than computing the others as well
             at = [*given, *result[:-1]] if most else [part[rows] for part in (*given, *result[:-1])]
             stepped = np.empty((self._size + 1, len(at[0])))
@@ -227,10 +229,3 @@ def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence
         at_rest = not leaves_plane(machine, machine_cut)
     rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
     return at_rest and rings
-
-
-@lru_cache(PROGRAMS_KEPT)
-def _step(kind: Specimen, form: Form, closed: bool, native: bool, first: bool) -> tuple[Runnable, int]:
-    """The program of a step, or of the first ones, and how many coordinates it has."""
-    body = step_of(kind, form, closed, first)
-    return runnable(body, native), len(body.results) - 1

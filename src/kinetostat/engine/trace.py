@@ -216,6 +216,10 @@ class Body:
 class Runnable(Protocol):
     """A body that can be evaluated."""
 
+    @property
+    def rows(self) -> int:
+        """Number of results, derivatives included."""
+
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
         """Evaluate points.
 

@@ -77,7 +77,7 @@ WORDS = {
     "author": "a text",
     "date": 'a text, e.g. "2026-05-31"',
     "to": 'the name of a format, e.g. "mjcf"',
-    "inputs": 'what pushes as texts, e.g. ["x", "z"]',
+    "inputs": 'names as texts, e.g. ["x", "z"]',
     "outputs": 'what moves as texts, e.g. ["x", "z"]',
     "data": "the path of a CSV file of measured poses",
     "fit": 'groups or paths of parameters as texts, e.g. ["geometry", "zeros"]',

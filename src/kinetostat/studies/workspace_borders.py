@@ -10,7 +10,8 @@ from functools import partial
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Codes, Float32s, Integers, Mask
-from kinetostat.engine.batch import NATIVE_FROM, evaluate
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.loaded import NATIVE_FROM
 from kinetostat.engine.points import Axis, PointTable
 from kinetostat.studies.grid import GridQuestion
 from kinetostat.studies.workspace_verdicts import Judge, Poses

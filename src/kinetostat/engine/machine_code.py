@@ -1,0 +1,168 @@
+"""Machine code as bytes: linked so that it runs wherever it lies, mapped into memory, and called. No compiler is known.
+
+LLVM leaves an object file. On Linux with an x86-64 processor its few sections are put behind one another here, and the
+distances between them filled in, after which the bytes need neither LLVM nor a linker: mapped into memory they run.
+Elsewhere the object file itself is kept, and LLVM loads it.
+
+A page of memory is written first and made executable then; it is never both. Bytes are not checked here, only run.
+
+Source: System V ABI, AMD64 supplement, chapter 4.
+"""
+
+import ctypes
+import mmap
+import platform
+import struct
+import sys
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from kinetostat.arrays import AnyArray, Array, Codes
+from kinetostat.engine.trace import Body
+from kinetostat.frozen import dataclass
+
+SELF_LINKED = sys.platform == "linux" and platform.machine() == "x86_64"
+"""Whether objects are linked here; elsewhere LLVM loads them."""
+
+
+@dataclass(frozen=True)
+class MachineCode:
+    """A compiled program.
+
+    Attributes:
+        image: its bytes: linked, or an object file.
+        entry: where in linked bytes the function begins; -1 of an object file.
+        lanes: points of a vector.
+        rows: number of results.
+    """
+
+    image: bytes
+    entry: int
+    lanes: int
+    rows: int
+
+
+def machine_code_of(body: Body) -> MachineCode:
+    """Compile a body for this processor, and link it where that is done here."""
+    from kinetostat.engine.native import host_lanes, object_file_of  # LLVM takes 0.1 s to load: only where it pays
+
+    file = object_file_of(body)
+    image, entry = _image(file) if SELF_LINKED else (file, -1)
+    return MachineCode(image, entry, host_lanes(), len(body.results))
+
+
+SECTION, SYMBOL, RELOCATION = struct.Struct("<IIQQQQIIQQ"), struct.Struct("<IBBHQQ"), struct.Struct("<QQq")
+PROGBITS, SYMBOL_TABLE, RELOCATIONS = 1, 2, 4
+"""Types of sections: contents, symbols, and places to be filled in with what has to be added."""
+ALLOCATED = 2
+"""Flag of sections that lie in memory when the program runs."""
+RELATIVE = (2, 4)
+"""Types of relocations that say how far away something is, in 32 bits: R_X86_64_PC32 and R_X86_64_PLT32."""
+GLOBAL_FUNCTION = 0x12
+
+
+def _image(file: bytes) -> tuple[bytes, int]:
+    """Put the sections of an object file that are needed at run time behind one another, and find the function."""
+    (first,), (size, count) = struct.unpack_from("<Q", file, 40), struct.unpack_from("<HH", file, 58)
+    sections = [SECTION.unpack_from(file, first + size * k) for k in range(count)]
+    image, places = bytearray(), dict[int, int]()
+    for k, (_, kind, flags, _, offset, length, _, _, align, _) in enumerate(sections):
+        if kind == PROGBITS and flags & ALLOCATED:
+            image += bytes(-len(image) % align)
+            places[k] = len(image)
+            image += file[offset : offset + length]
+    (_, _, _, _, offset, length, *_), *_ = (section for section in sections if section[1] == SYMBOL_TABLE)
+    symbols = list(SYMBOL.iter_unpack(file[offset : offset + length]))
+    for _, kind, _, _, offset, length, _, target, _, _ in sections:
+        if kind == RELOCATIONS and target in places:
+            for at, what, added in RELOCATION.iter_unpack(file[offset : offset + length]):
+                _, _, _, home, value, _ = symbols[what >> 32]
+                if what & 0xFFFFFFFF not in RELATIVE or home not in places:
+                    raise ValueError("an object file refers to something that is not in it")
+                here = places[target] + at
+                struct.pack_into("<i", image, here, places[home] + value + added - here)
+    (entry,) = (places[home] + value for _, info, _, home, value, _ in symbols if info == GLOBAL_FUNCTION)
+    return bytes(image), entry
+
+
+class Program:
+    """Machine code, with the memory that holds it."""
+
+    def __init__(self, code: MachineCode) -> None:
+        self.rows, self.lanes = code.rows, code.lanes
+        if code.entry >= 0:
+            address, self._memory = _map(code)
+        else:
+            from kinetostat.engine.native import load_object  # as above
+
+            address, self._memory = load_object(code.image)
+        self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, ctypes.c_int64)(address)
+
+    def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
+        """Evaluate points; the interpreter is released, so that other threads can run.
+
+        Args:
+            fixed: values of the fixed inputs.
+            columns: values of the others [points], each contiguous.
+            results: where results go [results x points]; rows may lie apart, the points of a row may not.
+            codes: where the codes go [points].
+        """
+        count = len(codes)
+        if count < self.lanes:
+            self._run_few(fixed, columns, results, codes)
+            return
+        self.call_on(fixed, columns, results, codes)()
+
+    def call_on(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> Callable[[], None]:
+        """Return a function without arguments that evaluates what lies in these arrays; `run` says what they are.
+
+        There are at least as many points as lanes.
+        """
+        count = len(codes)
+        arrays: list[AnyArray] = [*columns, results, codes]
+        if any(array.strides[-1] != array.itemsize or array.shape[-1] != count for array in arrays):
+            raise ValueError("columns, rows of results and codes must be contiguous and of one length")
+        starts = np.array([_address(column) for column in columns], dtype=np.uintp)
+        rows = _address(results) + results.strides[0] * np.arange(len(results), dtype=np.uintp)
+        addresses = [ctypes.c_void_p(_address(array)) for array in (fixed, starts, rows, codes)]
+        call, given = self._call, (*addresses, ctypes.c_int64(count))
+
+        def evaluate(_kept: Any = (self, fixed, arrays, starts, rows)) -> None:
+            call(*given)
+
+        return evaluate
+
+    def _run_few(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
+        """Evaluate fewer points than there are lanes, by repeating the last of them."""
+        count = len(codes)
+        if count:
+            longer = np.empty((len(columns), self.lanes))
+            for row, column in zip(longer, columns, strict=True):
+                row[:count], row[count:] = column, column[-1]
+            padded, all_codes = np.empty((len(results), self.lanes)), np.empty(self.lanes, dtype=np.int8)
+            self.run(fixed, list(longer), padded, all_codes)
+            results[:], codes[:] = padded[:, :count], all_codes[:count]
+
+
+def _address(array: AnyArray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _map(code: MachineCode) -> tuple[int, Any]:
+    """Copy linked code into memory that is executable then; gives the address of the function, and the memory."""
+    memory = mmap.mmap(-1, len(code.image), prot=mmap.PROT_READ | mmap.PROT_WRITE)
+    memory[: len(code.image)] = code.image
+    start = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+    if _protect()(start, len(code.image), mmap.PROT_READ | mmap.PROT_EXEC):
+        raise OSError(ctypes.get_errno(), "the system does not let this process run code that it has compiled")
+    return start + code.entry, memory
+
+
+@cache
+def _protect() -> Any:
+    protect = ctypes.CDLL(None, use_errno=True).mprotect
+    protect.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+    return protect

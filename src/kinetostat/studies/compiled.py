@@ -1,0 +1,187 @@
+"""Quantities of a machine as a function of some of its fields, for programs that call it again and again.
+
+It is the function that `evaluate`, maps and searches evaluate, without tables, units and names around it.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.arrays import Array, Codes
+from kinetostat.engine.batch import Function, function_of
+from kinetostat.engine.buffers import Buffers
+from kinetostat.engine.derivatives import Gradients, evaluate_gradient
+from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter, find, values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, several
+from kinetostat.studies.evaluation import MATRICES, entry_name
+from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
+
+
+@checked
+def compile(  # noqa: A001 - `kinetostat.compile` is what users write
+    machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str]
+) -> "CompiledFunction":
+    """Compile quantities of a machine as a function of some of its fields.
+
+    Args:
+        machine: gives all fields that are not inputs.
+        inputs: names of the fields that vary, in the order in which the function takes them. A field with several
+            entries gives all of them the same value.
+        quantities: a name of a quantity; a list of names and groups; or "K" or "C" for a whole matrix.
+
+    Returns:
+        The function.
+
+    Raises:
+        InputError: an unknown field, or the same one twice; an unknown quantity, or one that the machine cannot have.
+    """
+    return CompiledFunction(machine, tuple(several(inputs)), quantities)
+
+
+class CompiledFunction:
+    """Quantities of a machine as a function of some of its fields, in machine code.
+
+    Called with an array for each input, in SI and of any shapes that broadcast, it returns an array of the shape that
+    they have together: for a list of quantities with an axis in front that counts them, for K and C with two. Values
+    are NaN where the machine has no answer; `status` says why. Inputs are not compared with what a machine file allows.
+
+    Threads may share a function, and it can be pickled: the other process compiles it, or takes it from the cache.
+
+    Attributes:
+        machine: gives all fields that are not inputs.
+        inputs: paths of the inputs.
+        quantities: names of the quantities; of a matrix its entries, row by row.
+        distinct: the same names, each once.
+        shape: of the axes in front: () of one quantity, (n,) of a list, (6, 6) or (3, 3) of a matrix.
+    """
+
+    def __init__(self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str]) -> None:
+        """Compile. Arguments and errors are those of `compile`."""
+        self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities)
+        self._fields = _different([find(machine.family, name) for name in inputs])
+        self.machine, self.inputs = machine, tuple(field.path for field in self._fields)
+        self.quantities, self.shape = _named_quantities(machine, quantities)
+        refuse_absent(state_of(machine), self.quantities, self._fields)
+        self.distinct = tuple(dict.fromkeys(self.quantities))  # a symmetric matrix has most of its entries twice
+        self._rows = [self.distinct.index(name) for name in self.quantities]
+        self._leaves = {leaf: row for row, field in enumerate(self._fields) for leaf in field.leaves}
+        self._numbers = values(machine)
+        self._function: Function = function_of(machine, tuple(self._leaves), self.distinct)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledFunction, self._given
+
+    def __repr__(self) -> str:
+        return f"<{', '.join(self.quantities)} of {self.machine.name!r} by {', '.join(self.inputs)}>"
+
+    def __call__(self, *given: Scalar) -> Array:
+        """Evaluate the quantities.
+
+        Args:
+            given: a number or an array for each input, SI, of shapes that broadcast.
+
+        Returns:
+            [shape of the quantities x shape of the inputs].
+        """
+        points, shape = self._points(given)
+        results, _ = self._function.at(points)
+        return self._arrange(results[self._rows], shape)
+
+    def status(self, *given: Scalar) -> Codes:
+        """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values."""
+        points, shape = self._points(given)
+        return self._function.at(points)[1].reshape(shape)
+
+    def jacobian(self, *given: Scalar) -> Array:
+        """Return the derivatives of the quantities by each input, exact to round-off; the first call compiles them.
+
+        Args:
+            given: as for a call of the function.
+
+        Returns:
+            [shape of the quantities x inputs x shape of the inputs]; of a single quantity this is its gradient.
+
+        Raises:
+            InputError: a quantity has no derivatives that are known.
+        """
+        return self.value_and_jacobian(*given)[1]
+
+    def value_and_jacobian(self, *given: Scalar) -> tuple[Array, Array]:
+        """Return what a call returns and what `jacobian` returns, for little more than one of them.
+
+        Args:
+            given: as for a call of the function.
+
+        Raises:
+            InputError: a quantity has no derivatives that are known.
+        """
+        points, shape = self._points(given)
+        sloped = self._slopes(points)
+        slopes = np.zeros((len(self.distinct), len(self._fields), points.size))
+        for k, row in enumerate(self._leaves.values()):
+            slopes[:, row] += sloped.gradients[:, k]
+        jacobian = self._arrange(slopes[self._rows], (len(self._fields), *shape))
+        return self._arrange(sloped.values[self._rows], shape), jacobian
+
+    def buffers(self, count: int = 1) -> Buffers:
+        """Prepare arrays for so many poses; see `Buffers`. It begins at the numbers of the machine.
+
+        The rows of its results are `distinct`: the quantities, of a matrix each different entry once.
+        """
+        start = [float(self._numbers[field.leaves[0]]) for field in self._fields]
+        return Buffers(self._function, list(self._leaves.values()), start, count)
+
+    @cached_property
+    def _slopes(self) -> Callable[[PointTable], Gradients]:
+        """The function with its derivatives by each leaf; refused where they are not known."""
+        names, leaves = list(self.distinct), tuple(self._leaves)
+        refuse_loaded(self.machine, names, leaves)
+        return lambda points: evaluate_gradient(self.machine, points, names, leaves, repeated=True)
+
+    def _points(self, given: Sequence[Scalar]) -> tuple[PointTable, tuple[int, ...]]:
+        """The points of some inputs in a row, and their shape."""
+        if len(given) != len(self._fields):
+            raise InputError(
+                f"the function has been given {len(given)} arrays; give {len(self._fields)}, one for each of "
+                f"{', '.join(self.inputs)}."
+            )
+        try:
+            arrays = np.broadcast_arrays(*(np.asarray(array, dtype=float) for array in given))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the inputs of the function are not arrays of numbers that fit: {error}.") from None
+        rows = [array.reshape(-1) for array in arrays]
+        return PointTable({leaf: rows[row] for leaf, row in self._leaves.items()}), arrays[0].shape
+
+    def _arrange(self, rows: Array, shape: tuple[int, ...]) -> Array:
+        """Results [rows x ...] as they are returned."""
+        return rows.reshape((*self.shape, *shape))[()]
+
+
+def _different(fields: list[Parameter]) -> list[Parameter]:
+    """The fields, none of which another contains."""
+    if not fields:
+        raise InputError("inputs names no field; name those that vary, e.g. x.")
+    taken = [leaf for field in fields for leaf in field.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is an input twice; name it once.")
+    return fields
+
+
+def _named_quantities(machine: Machine, given: str | Sequence[str]) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """The names of what is asked for, and the shape of the axes that count them."""
+    parts = machine.family.component_names
+    if isinstance(given, str) and given in MATRICES:
+        return tuple(entry_name(given, row, column) for row in parts for column in parts), (len(parts), len(parts))
+    names = [given] if isinstance(given, str) else several(given)
+    if any(name in MATRICES for name in names):
+        raise InputError('quantities has a matrix among others; compile it alone, e.g. quantities="K".')
+    resolved = tuple(resolve_quantities(names, parts))
+    return resolved, () if isinstance(given, str) and len(resolved) == 1 else (len(resolved),)
