@@ -39,11 +39,30 @@ LONGEST_COUNT = 9
 """Digits of the whole numbers that options take."""
 
 
-def add_question(commands: "Commands", word: str) -> None:
-    """Add the command of a question; its options follow when it is used."""
+def add_question(
+    commands: "Commands",
+    word: str,
+    run: "Callable[[Question, argparse.Namespace], int] | None" = None,
+    more: "Callable[[Parser], None]" = lambda _command: None,
+) -> None:
+    """Add the command of a question; its options follow when it is used.
+
+    Args:
+        commands: to which it is added.
+        word: of the question.
+        run: runs it with its options and returns the exit code; `ask` if None.
+        more: adds options that the command alone has.
+    """
     summary, where = QUESTIONS[word]
     command = commands.add_parser(word, help=summary, formatter_class=Help)
-    command.later = partial(_fill, summary=summary, where=where)
+
+    def fill(command: Parser) -> None:
+        question: Question = late(where)
+        _fill(command, summary, question)
+        more(command)
+        command.set_defaults(run=partial(run or ask, question))
+
+    command.later = fill
 
 
 def add_other_questions(commands: "Commands") -> None:
@@ -53,11 +72,9 @@ def add_other_questions(commands: "Commands") -> None:
             add_question(commands, word)
 
 
-def _fill(command: Parser, summary: str, where: str) -> None:
-    question: Question = late(where)
+def _fill(command: Parser, summary: str, question: Question) -> None:
     command.description = f"{summary[0].upper()}{summary[1:]}."
     command.epilog = f"example:\n  {question.example}\n"
-    command.set_defaults(run=partial(ask, question))
     takes_machine(command)
     for option in question.options:
         _add_option(command, option)

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinetostat.spec.installation import as_typed
-from kinetostat.views.options import quantities_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -145,18 +144,6 @@ def takes_ranges(command: Parser, meaning: str, required: bool = False) -> None:
         "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges", required=required,
         help=meaning,
     )  # fmt: skip
-
-
-def takes_quantities(command: Parser, default: str) -> None:
-    """Give a command `--quantity`."""
-    command.add_argument(
-        "--quantity", metavar="NAME", action="append", dest="quantities", help=quantities_option(default).meaning
-    )
-
-
-def quantities_of(options: argparse.Namespace, machine: "Machine", usual: str) -> list[str]:
-    """Return the quantities that the options name; without any the usual one, or how far a loaded machine moves."""
-    return options.quantities or ["displacement" if machine.loaded else usual]
 
 
 def takes_output(command: Parser, what: str) -> None:

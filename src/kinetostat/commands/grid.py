@@ -1,76 +1,49 @@
-"""The commands `sweep` and `map`: grids of poses or parameters, in memory or in a study folder.
+"""The commands `sweep` and `map`, as far as they do more than any question: large grids in a folder, many processes.
 
 No formula lives here.
 """
 
 import argparse
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import (
-    add_command,
-    give,
-    list_written,
-    load_machine,
-    note_damage,
-    progress_bar,
-    quantities_of,
-    stopped,
-    takes_figures,
-    takes_json,
-    takes_loaded,
-    takes_machine,
-    takes_quantities,
-    write_figures,
-)
-from kinetostat.views.options import DISPLACED, VARIED
+from kinetostat.commands.asking import add_question, ask
+from kinetostat.commands.common import list_written, note_damage, stopped
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
-    from kinetostat.commands.common import Commands
-    from kinetostat.engine.chunks import Crew
+    from kinetostat.commands.common import Commands, Parser
+    from kinetostat.engine.batch import Progress
+    from kinetostat.engine.chunks import Compute
+    from kinetostat.machine.machine import Machine
+    from kinetostat.studies.carrying import Carrying
     from kinetostat.studies.grid import GridQuestion
+    from kinetostat.studies.stored_grid import StoredGrid
+    from kinetostat.views.question import Question
 
 MOST_WORKERS = 1024
 
 
 def add_grid_commands(commands: "Commands") -> None:
     """Add `sweep` and `map`."""
-    sweep = add_command(
-        commands, "sweep", _sweep, "compute quantities along one parameter: table, curves and NetCDF",
-        'kinetostat sweep zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log" --quantity compliance',
+    for word in ("sweep", "map"):
+        add_question(commands, word, partial(_ask, word), _takes_workers)
+
+
+def _takes_workers(command: "Parser") -> None:
+    command.add_argument(
+        "--resume", action="store_true",
+        help="for grids of over 5 million points: continue the one in the output folder, and refuse if there "
+        "is none; without this option the command continues or begins",
     )  # fmt: skip
-    sweep.add_argument(
-        "--vary", metavar=VARIED, required=True, action="append", dest="ranges", help="parameter to vary"
-    )
-    sweep.set_defaults(default_quantity="stiffness")
-    mapping = add_command(
-        commands, "map", _map, "compute quantities over two to six parameters: contour maps and NetCDF",
-        'kinetostat map zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps',
-    )  # fmt: skip
-    mapping.add_argument(
-        "--over", metavar=VARIED, required=True, action="append", dest="ranges", help="an axis of the map"
-    )
-    mapping.set_defaults(default_quantity="compliance")
-    mapping.add_argument(
-        "--carrying", action="store_true",
-        help="instead of quantities: which legs carry under load and which are slack, as regions of the map",
-    )  # fmt: skip
-    for command in (sweep, mapping):
-        takes_machine(command)
-        takes_quantities(command, command.get_default("default_quantity"))
-        takes_loaded(command, DISPLACED)
-        takes_figures(command, "NetCDF and figures")
-        command.add_argument(
-            "--resume", action="store_true",
-            help="for grids of over 5 million points: continue the one in the output folder, and refuse if there "
-            "is none; without this option the command continues or begins",
-        )  # fmt: skip
-        where = command.add_mutually_exclusive_group()
-        where.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
-        where.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
-        takes_json(command)
+    where = command.add_mutually_exclusive_group()
+    where.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
+    where.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
 
 
 def _workers(text: str) -> int:
@@ -79,85 +52,47 @@ def _workers(text: str) -> int:
     return int(text)
 
 
-def _sweep(options: argparse.Namespace) -> int:
+def _ask(word: str, question: "Question", options: argparse.Namespace) -> int:
+    """Ask as any question is asked, but compute with a crew, and into the folder what is too large for memory."""
+    with_options = replace(question, answer=partial(_answer, word, question, options))
+    try:
+        return ask(with_options, options)
+    except KeyboardInterrupt:
+        from kinetostat.studies.study_folder import holds_study
+
+        if not options.output or not holds_study(options.output):
+            raise
+        return stopped(f"the results so far are in {options.output}; the same command continues from there.")
+
+
+def _answer(
+    word: str,
+    question: "Question",
+    options: argparse.Namespace,
+    machine: "Machine",
+    ranges: "Sequence[str]",
+    progress: "Progress",
+    quantities: "Sequence[str]" = (),
+    carrying: bool = False,
+) -> "xr.Dataset | Carrying | StoredGrid":
+    """Answer in memory, or into the folder where the grid is too large for that."""
+    from kinetostat.engine.chunks import Crew, compute_with
     from kinetostat.spec.errors import InputError
-
-    if len(options.ranges) > 1:
-        raise InputError("sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`.")
-    return _grid(options, "sweep")
-
-
-def _map(options: argparse.Namespace) -> int:
-    from kinetostat.spec.errors import InputError
-
-    if len(options.ranges) < 2:
-        raise InputError("map needs two --over ranges or more; for one parameter use `kinetostat sweep --vary ...`.")
-    return _carrying(options) if options.carrying else _grid(options, "map")
-
-
-def _carrying(options: argparse.Namespace) -> int:
-    from kinetostat.spec.errors import InputError
-    from kinetostat.studies.carrying import as_dataset, as_json, carrying_legs
-    from kinetostat.studies.storage import write_dataset
-    from kinetostat.views.carrying_views import carrying_figures, print_carrying
-
-    if options.quantities or options.workers or options.cluster or options.resume:
-        raise InputError(
-            "--carrying shows which legs carry, not a quantity, and computes in this process; leave out --quantity, "
-            "--workers, --cluster and --resume."
-        )
-    machine = load_machine(options)
-    with progress_bar("computing") as progress:
-        answer = carrying_legs(machine, options.ranges, progress)
-    written = []
-    if options.output:
-        written.append(options.output / "carrying.nc")
-        write_dataset(written[0], as_dataset(answer))
-        written += write_figures(options, dict(zip(["carrying"], carrying_figures(answer).values(), strict=False)))
-    return give(
-        options, bool(answer.sets), lambda: as_json(answer), lambda console: print_carrying(console, answer), written
-    )
-
-
-def _grid(options: argparse.Namespace, stem: str) -> int:
-    from kinetostat.studies.grid import grid_question
-
-    machine = load_machine(options)
-    quantities = quantities_of(options, machine, options.default_quantity)
-    question = grid_question(machine, options.ranges, quantities)
-    if options.output and not question.fits_memory:
-        return _stored(options, question, stem)
-    return _in_memory(options, question, stem)
-
-
-def _crew(options: argparse.Namespace) -> "Crew":
-    from kinetostat.engine.chunks import Crew
-
-    return Crew(options.workers, options.cluster)
-
-
-def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.chunks import compute_with
     from kinetostat.studies.grid import answer
+    from kinetostat.views.grid import NO_CREW, map_question, sweep_question
 
-    if options.output:
-        _check_folder(options.output, options.resume)
-    with compute_with(_crew(options)) as compute, progress_bar("computing") as progress:
-        dataset = answer(question, progress, compute)
-    written = _write(options, dataset, stem) if options.output else []
-
-    from kinetostat.studies.grid import as_json
-    from kinetostat.views.grid_tables import print_dataset
-
-    names = [str(name) for name in dataset.data_vars if name != "status"]
-    answered = bool((dataset["status"] == 0).any())
-    return give(
-        options,
-        answered,
-        lambda: as_json(dataset),
-        lambda console: print_dataset(console, dataset, names),
-        written,
-    )
+    if carrying:
+        if options.workers or options.cluster or options.resume:
+            raise InputError(NO_CREW)
+        answered: Carrying = question.answer(machine, ranges, progress, quantities, carrying)
+        return answered
+    wanted = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)
+    with compute_with(Crew(options.workers, options.cluster)) as compute:
+        if options.output and not wanted.fits_memory:
+            return _stored(options, wanted, word, progress, compute)
+        if options.output:
+            _check_folder(options.output, options.resume)
+        return answer(wanted, progress, compute)
 
 
 def _check_folder(folder: Path, resume: bool) -> None:
@@ -171,55 +106,15 @@ def _check_folder(folder: Path, resume: bool) -> None:
         raise InputError("a grid that is kept in memory is computed at once and cannot be resumed; leave out --resume.")
 
 
-def _write(options: argparse.Namespace, dataset: "xr.Dataset", stem: str) -> list[Path]:
-    from kinetostat.studies.storage import write_dataset
-
-    written = [options.output / f"{stem}.nc"]
-    write_dataset(written[0], dataset)
-    return written + _draw(options, dataset, stem, dataset.attrs["machine"])
-
-
-def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: str) -> list[Path]:
-    """Draw a grid of one or two dimensions; return the files."""
-    dims = len(dataset["status"].dims)
-    if dims > 2:
-        return []
-    from kinetostat.views.figures import contour_maps, curves
-
-    draw, names = curves if dims == 1 else contour_maps, [str(name) for name in dataset.data_vars if name != "status"]
-    return write_figures(options, {stem: lambda: draw(dataset, names, title)})
-
-
-def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.chunks import compute_with
+def _stored(
+    options: argparse.Namespace, question: "GridQuestion", word: str, progress: "Progress", compute: "Compute"
+) -> "StoredGrid":
     from kinetostat.studies.storage import differing
     from kinetostat.studies.stored_grid import answer_into
+    from kinetostat.studies.study_folder import HISTORY, QUESTION
 
     changed = differing(options.output)
-    try:
-        with compute_with(_crew(options)) as compute, progress_bar("computing") as progress:
-            stored = answer_into(question, options.output, stem, progress, compute, options.resume)
-    except KeyboardInterrupt:
-        return stopped(f"the results so far are in {options.output}; the same command continues from there.")
+    stored = answer_into(question, options.output, word, progress, compute, options.resume)
     note_damage(options.output, stored.repaired, stored.unchecked, changed)
-    from kinetostat.studies.stored_grid import summary_json
-    from kinetostat.studies.study_folder import HISTORY, QUESTION
-    from kinetostat.views.grid_tables import print_stored
-
-    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(options, stored.path)
-    list_written(options.output, [options.output / name for name in (QUESTION, HISTORY)])
-    return give(
-        options,
-        bool(stored.tally.answered),
-        lambda: summary_json(stored),
-        lambda console: print_stored(console, stored),
-        [stored.path, *drawn],
-    )
-
-
-def _draw_thinned(options: argparse.Namespace, path: Path) -> list[Path]:
-    """Draw a large grid of one or two dimensions, thinned to as many points as paper can show."""
-    from kinetostat.studies.result_file import thinned_dataset
-
-    dataset = thinned_dataset(path)
-    return _draw(options, dataset, path.stem, f"{dataset.attrs['machine']} (thinned)")
+    list_written(options.output, [*(options.output / name for name in (QUESTION, HISTORY)), stored.path])
+    return stored

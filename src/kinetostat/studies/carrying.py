@@ -22,7 +22,6 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.datasets import ABOUT_STATUS
-from kinetostat.studies.grid import as_json as of_grid
 from kinetostat.studies.grid import grid_question
 
 
@@ -31,19 +30,21 @@ class Carrying(Immutable):
     """Which legs carry at each point of a grid.
 
     Attributes:
+        machine: with its loads; gives all parameters that do not vary.
         dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
         legs: names of all legs.
         sets: names of the legs that carry together, the most frequent set first.
         points: how many points of the grid have each set.
     """
 
+    machine: Machine
     dataset: xr.Dataset
     legs: tuple[str, ...]
     sets: tuple[tuple[str, ...], ...]
     points: tuple[int, ...]
 
     def __repr__(self) -> str:
-        return f"<Carrying of {self.dataset.attrs['machine']!r}: {len(self.sets)} sets of legs>"
+        return f"<Carrying of {self.machine.name!r}: {len(self.sets)} sets of legs>"
 
     @property
     def is_map(self) -> bool:
@@ -92,7 +93,7 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
         carrying=(question.dims, codes.reshape(shape), about),
         status=(question.dims, status.reshape(shape), ABOUT_STATUS),
     )
-    return Carrying(dataset, tuple(names), sets, tuple(count for _, count in ranked))
+    return Carrying(machine, dataset, tuple(names), sets, tuple(count for _, count in ranked))
 
 
 def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, Any]:
@@ -105,14 +106,3 @@ def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, 
         slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1) for leg, terms in pairs]
         carries[states.rows] = ~np.stack(slack, axis=1)[states.judged.stable]
     return carries, states.status.astype(np.int8)
-
-
-def as_json(carrying: Carrying) -> dict[str, Any]:
-    """The sets of legs that carry, with the share of the points of each, and the grid of places in this list."""
-    points = zip(carrying.sets, carrying.points, strict=True)
-    return {**of_grid(carrying.dataset), "sets": [{"legs": list(legs), "points": count} for legs, count in points]}
-
-
-def as_dataset(answer: Carrying) -> xr.Dataset:
-    """Return what a NetCDF file of the answer holds."""
-    return answer.dataset

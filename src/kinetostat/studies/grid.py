@@ -17,8 +17,7 @@ from kinetostat.machine.parameters import Parameter, dimension
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range
-from kinetostat.studies.datasets import ABOUT_STATUS, LOADS_LEFT_OUT, about_field, about_quantity, origin_of
-from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.datasets import ABOUT_STATUS, about_field, about_quantity, origin_of
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.quantities import refuse_absent, resolve_quantities, uncounted_loads
 
@@ -160,29 +159,3 @@ def failures(dataset: xr.Dataset) -> dict[Status, int]:
     """Count the points of each status other than OK."""
     codes, counts = np.unique(dataset["status"].values, return_counts=True)
     return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
-
-
-def as_json(dataset: xr.Dataset) -> dict[str, Any]:
-    """A grid's dataset as plain data: coordinates, and nested lists with null where there is no finite value."""
-    dims = dataset["status"].dims
-    words = np.array([status.word for status in Status])[dataset["status"].values]
-    variables = {str(name): data for name, data in dataset.data_vars.items() if name != "status"}
-    return as_answer(
-        {
-            "name": dataset.attrs["machine"],
-            LOADS_LEFT_OUT: dataset.attrs.get(LOADS_LEFT_OUT, ""),
-            "coordinates": {
-                field_of(dataset[dim]): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values}
-                for dim in dims
-            },
-            "variables": {
-                name: {"units": data.attrs["units"], "values": data.values} for name, data in variables.items()
-            },
-            "status": words,
-        }
-    )
-
-
-def as_dataset(dataset: xr.Dataset) -> xr.Dataset:
-    """Return what a NetCDF file of a grid holds: the grid itself."""
-    return dataset

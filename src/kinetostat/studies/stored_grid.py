@@ -15,13 +15,11 @@ from kinetostat.engine.batch import Evaluation, Progress, silent
 from kinetostat.engine.chunks import Compute, Work, in_chunks, in_this_process
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.datasets import ABOUT_STATUS, LOADS_LEFT_OUT, about_quantity
+from kinetostat.studies.datasets import ABOUT_STATUS, about_quantity
 from kinetostat.studies.grid import GridQuestion
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.result_file import (
     STATUS,
     UNKNOWN,
@@ -310,31 +308,3 @@ def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:
         return Extremes(np.nan, np.nan, np.nan)
     mean = sum(part["sum"] for part in known) / sum(part["count"] for part in known)
     return Extremes(min(part["least"] for part in known), mean, max(part["largest"] for part in known))
-
-
-def summary_json(stored: StoredGrid) -> dict[str, Any]:
-    """A grid in a file as plain data: where it is, its axes, counts and extremes."""
-    question = stored.question
-    coordinates = {
-        field: {
-            "units": question.labels[dim].attrs["units"],
-            "from": axis.values[0],
-            "to": axis.values[-1],
-            "count": len(axis.values),
-        }
-        for dim, field, axis in zip(question.dims, question.fields, question.grid.axes, strict=True)
-    }
-    return as_answer(
-        {
-            "name": question.machine.name,
-            LOADS_LEFT_OUT: question.labels.attrs.get(LOADS_LEFT_OUT, ""),
-            "file": str(stored.path),
-            "points": question.grid.size,
-            "coordinates": coordinates,
-            "variables": {
-                name: {"units": QUANTITIES[name].unit, **vars(extremes)}
-                for name, extremes in stored.tally.extremes.items()
-            },
-            "status": {status.word: count for status, count in stored.tally.statuses.items()},
-        }
-    )

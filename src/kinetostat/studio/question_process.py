@@ -100,7 +100,7 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
         f'<p class="note"><b>{escape(head)}</b> {escape(sentence)}</p>'
         for head, sentence in description.sentences(answer)
     ]
-    parts += [paragraph(f"Note: {doubt}") for doubt in doubts(answer.machine)]
+    parts += [paragraph(f"Note: {doubt}") for doubt in doubts(description.machine_of(answer))]
     for shown in description.tables(answer, full):
         if isinstance(shown, str):
             parts.append(paragraph(shown))

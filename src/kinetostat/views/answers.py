@@ -92,35 +92,6 @@ KINDS = (
         },
     ),
     Kind(
-        "studies.commanding.Command",
-        files={".csv": "views.command.command_csv"},
-        description="views.command.COMMAND",
-    ),
-    Kind(
-        "studies.corrections.CorrectionTable",
-        files={".csv": "views.command.corrections_csv"},
-        description="views.command.CORRECTIONS",
-    ),
-    Kind(
-        "studies.carrying.Carrying",
-        "views.carrying_views.print_carrying",
-        "views.carrying_views.carrying_figures",
-        "studies.carrying.as_json",
-        {".nc": "studies.carrying.as_dataset"},
-    ),
-    Kind(
-        "xarray.Dataset",
-        "views.grid_tables.print_grid",
-        "views.figures.grid_figures",
-        "studies.grid.as_json",
-        {".nc": "studies.grid.as_dataset"},
-    ),
-    Kind(
-        "studies.budget.budget.Budget",
-        files={".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.budget_dataset"},
-        description="views.budget.BUDGET",
-    ),
-    Kind(
         "studies.optimisation.result.Result",
         "views.optimisation_tables.print_result",
         "views.optimisation_figures.pictures",

@@ -286,10 +286,11 @@ BUDGET = Description(
     lines=_lines,
     tables=_tables,
     figures="views.budget_figures.budget_figures",
+    makers={"csv": contributions_csv, "nc": budget_dataset},
     state=lambda answer: f"error of the tool by {len(answer.parts)} tolerances",
     files={
         "budget.json": "json",
-        "contributions.csv": contributions_csv,
+        "contributions.csv": "csv",
         "poses.csv": poses_csv,
         "budget.nc": _budget_file,
     },

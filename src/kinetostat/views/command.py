@@ -90,6 +90,7 @@ COMMAND = Description(
     tables=_command_tables,
     state=lambda _answer: "commanded under load",
     answered=lambda answer: bool(answer.settled.any()),
+    makers={"csv": command_csv},
 )
 
 
@@ -199,6 +200,7 @@ CORRECTIONS = Description(
     lines=_correction_lines,
     tables=_correction_tables,
     state=_grid_text,
+    makers={"csv": corrections_csv},
 )
 
 
@@ -252,9 +254,8 @@ COMMAND_QUESTION = Question(
         Option(
             "fit",
             "file",
-            "folder of `identify -o` in which MACHINE lies: coordinates are then those that the controller counts, "
-            "with the zeros and gains that were found",
-            metavar="FOLDER",
+            "fit.json of `identify -o`, or its folder, where MACHINE is the machine as built that lies beside it: "
+            "coordinates are then those that the controller counts, with the zeros and gains that were found",
         ),
     ),
     output="write the commands, and the corrections of a table, as CSV",

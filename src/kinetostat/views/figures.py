@@ -3,7 +3,6 @@
 import io
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -25,7 +24,7 @@ from kinetostat.machine.parameters import entry_name, names_entries
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import failures, field_of
 from kinetostat.studies.storage import replacing
-from kinetostat.views.grid_tables import display_of, quantities_of
+from kinetostat.views.grid import display_of
 from kinetostat.views.lettering import letter
 from kinetostat.views.levels import levels_of
 
@@ -347,9 +346,3 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
         panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     else:
         panel.legend(loc="best")
-
-
-def grid_figures(dataset: xr.Dataset) -> Drawings:
-    """Return curves over one field, or contours over two; a grid of more fields has no picture."""
-    draw = {1: curves, 2: contour_maps}.get(dataset["status"].ndim)
-    return {"map": partial(draw, dataset, quantities_of(dataset), dataset.attrs["machine"])} if draw else {}

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from kinetostat.machine.machine import Machine
+
 Take = str | Callable[[Any], Any]
 """How a number is taken from an answer: the name of an attribute, with dots, or a function."""
 Late = str | Callable[..., Any]
@@ -151,7 +153,8 @@ class Description:
         figures: drawings by name, the most telling first.
         makers: functions that make a form of their own, such as the dataset that an answer already holds.
         axes: of the arrays in NetCDF.
-        state: what stands behind the name of the machine in the first line.
+        machine: how the machine is taken from the answer.
+        state: what stands behind its name in the first line.
         answered: whether there is an answer; where there is none, `message` of the answer says why.
         files: name of each file that a folder of results gets, with its form "json", "csv" or "nc", or a function
             that writes its text, dataset or plain data; where this gives None, there is no such file.
@@ -168,6 +171,7 @@ class Description:
     figures: Late | None = None
     makers: Mapping[str, Late] = field(default_factory=dict)
     axes: tuple[Axis, ...] = ()
+    machine: Take = "machine"
     state: Callable[[Any], str] = lambda answer: answer.status.word
     answered: Callable[[Any], bool] = lambda _answer: True
     files: Mapping[str, Late] = field(default_factory=dict)
@@ -187,9 +191,15 @@ class Description:
     def sentences(self, answer: Any) -> Lines:
         """The lines of an answer, with one about the loads of the file that do not count behind the first."""
         first, *others = [*self.lines(answer)] or [("", "")]
-        uncounted = answer.loads_left_out if LOADS_LEFT_OUT in self.fields else ""
+        parts = [part for part in self.fields if isinstance(part, Field) and part.key == LOADS_LEFT_OUT.key]
+        uncounted = parts[0].of(answer) if parts else ""
         lines = [first, ("Loads", uncounted), *others]
         return [(head, sentence) for head, sentence in lines if sentence]
+
+    def machine_of(self, answer: Any) -> "Machine":
+        """The machine that an answer is about."""
+        machine: Machine = Field("machine", self.machine).of(answer)
+        return machine
 
     def drawings(self, answer: Any) -> "dict[str, Drawing]":
         """The figures of an answer by name; none where nothing can be drawn."""

@@ -23,10 +23,11 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
     Args:
         console: on which it is printed.
         description: of answers of this kind.
-        answer: of any kind that has a machine.
+        answer: of the kind that is described.
         full: whether tables show every row.
     """
-    console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
+    machine = description.machine_of(answer)
+    console.print(Text.assemble((machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
     lines = Table.grid(padding=(0, GAP, 0, 0))
     sentences = [*description.sentences(answer)]
     room = console.width - max([HEADS, *(len(head) + GAP for head, _ in sentences)])
@@ -35,8 +36,8 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
         lines.add_row(Text(head, "bold"), "\n".join(textwrap.wrap(sentence, room)))
     console.print(lines)
     if verdicts := getattr(answer, "requirements", ()):
-        print_requirements(console, verdicts, answer.machine.display)
-    print_doubts(console, answer.machine)
+        print_requirements(console, verdicts, machine.display)
+    print_doubts(console, machine)
     for part in description.tables(answer, full):
         if isinstance(part, str):
             console.print(part, highlight=False)

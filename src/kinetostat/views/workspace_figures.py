@@ -43,7 +43,7 @@ from kinetostat.views.figures import (
     set_title,
     slim_bar,
 )
-from kinetostat.views.grid_tables import display_of
+from kinetostat.views.grid import display_of
 from kinetostat.views.question import Drawing
 from kinetostat.views.usual_values import WIDE, usual_range
 

@@ -23,7 +23,7 @@ from kinetostat.views.analysis_tables import (
     stiffness_table,
 )
 from kinetostat.views.figures import axis_values, contour_maps, curves
-from kinetostat.views.grid_tables import display_of
+from kinetostat.views.grid import display_of
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
 from kinetostat.views.report.pictures import PICTURE_WIDTH, MachinePictures, figure_of
 from kinetostat.views.report.provenance import MOTION
