@@ -228,7 +228,7 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _schema(options: argparse.Namespace) -> int:
-    from kinetostat.machine.loading import machine_schema
+    from kinetostat.machine.file_schema import machine_schema
     from kinetostat.spec.study import study_schema
 
     print_json(study_schema() if options.what == "study" else machine_schema())

@@ -13,7 +13,8 @@ from random import Random
 from typing import Any
 
 from kinetostat.exchange.urdf_export import texts_of
-from kinetostat.machine.loading import bundled, load, machine_schema
+from kinetostat.machine.file_schema import machine_schema
+from kinetostat.machine.loading import bundled, load
 from kinetostat.spec.study import study_schema
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.bundled import bundled_studies

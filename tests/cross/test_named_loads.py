@@ -8,8 +8,9 @@ import pytest
 
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.leg import Turn
-from kinetostat.machine.loading import as_toml, build, bundled, load, machine_schema
+from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze

@@ -10,7 +10,8 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import NO_ANSWER
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import build, bundled, load, machine_schema, template
+from kinetostat.machine.file_schema import machine_schema
+from kinetostat.machine.loading import build, bundled, load, template
 from kinetostat.spec import document
 from kinetostat.studies.analysis import analyze
 from refusals import refused

@@ -8,7 +8,8 @@ import pytest
 from kinetostat import build, load, save
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
-from kinetostat.machine.loading import as_toml, machine_schema
+from kinetostat.machine.file_schema import machine_schema
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
 from machines import cable, written
 from refusals import refused

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinetostat import analyze, build, bundled, changed, evaluate
-from kinetostat.machine.loading import machine_schema
+from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.saving import as_file
 from machines import load_without_limits
 from refusals import refused

@@ -6,7 +6,8 @@ import pickle
 import pytest
 
 from kinetostat import InputError, build, load
-from kinetostat.machine.loading import as_toml, machine_schema
+from kinetostat.machine.file_schema import machine_schema
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.tolerance_classes import GRADES, SIZES, within_class, within_grade
 from kinetostat.spec.tolerance_table import SIGMAS, joined, read_tolerances

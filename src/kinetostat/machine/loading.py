@@ -6,16 +6,12 @@ A file for people, which keeps comments and order, is written by `saving`.
 import copy
 import difflib
 import json
-import math
-import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, reduce
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
-
-from pydantic import TypeAdapter
 
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.catalogue import families, family_named
@@ -25,7 +21,7 @@ from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
-from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
+from kinetostat.machine.orientation import form_of, make_room, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
@@ -33,18 +29,17 @@ from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, complete_plan
 from kinetostat.machine.written.document import by_name, check_paths, separate, with_parts
 from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
-from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, several, shorten
-from kinetostat.spec.fields import NO_LIMIT, optional, quantities
+from kinetostat.spec.fields import optional, quantities
 from kinetostat.spec.immutable import FixedDict
-from kinetostat.spec.requirements import TABLE, requirement_lines, requirements_schema, take_requirements
+from kinetostat.spec.requirements import TABLE, requirement_lines, take_requirements
 from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
-from kinetostat.spec.tolerance_table import take_tolerances, tolerance_lines, tolerances_schema
-from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
-from kinetostat.units import RIGID, UnitError
+from kinetostat.spec.tolerance_table import take_tolerances, tolerance_lines
+from kinetostat.spec.validation import SCHEMA_VERSION, validated_tables
+from kinetostat.units import UnitError
 
 SUFFIX = ".toml"
 STUDY = (
@@ -131,7 +126,6 @@ def _whole_path(document: Document, name: str) -> str:
         return name
 
 
-STATE = "what is shown where no quantity is named: the free machine, or the machine at rest under its loads"
 KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
 """Keys of a file at its top beside the tables of its family."""
 INDEPENDENT = ("pose", "tool", "load")
@@ -204,8 +198,8 @@ def _write_out(document: Document, path: str) -> None:
 
 def _validated_machine(family: Family, document: Document, origin: str, display: Display) -> Machine:
     tables = family.every_table
-    data: Any = validate(document, origin, file_model(family.name, tables), tables)
-    machine = Machine(data.name, family, tables_in(data, tables), display)
+    name, instances = validated_tables(document, origin, tables)
+    machine = Machine(name, family, instances, display)
     check_contrast(machine, origin)
     check_inertia(machine.tables, origin)
     return machine
@@ -354,35 +348,3 @@ def template(family: str) -> str:
             f'kinetostat has no example file of the family "{wanted}"; look in the package that registers it.'
         )
     return texts[0]
-
-
-def machine_schema() -> dict[str, Any]:
-    """The JSON Schema of machine files of every family."""
-    models = [file_model(family.name, family.every_table) for family in families().values()]
-    union: Any = reduce(operator.or_, models)
-    schema = TypeAdapter(union).json_schema()
-    schema["anyOf"].append(written_schema(SCHEMA_VERSION))
-    files = [kind for kind in (*schema["$defs"].values(), *schema["anyOf"]) if "family" in kind.get("properties", {})]
-    for kind in files:
-        kind["properties"] |= {TABLE: requirements_schema(), TOLERANCES: tolerances_schema()}
-    for table in schema["$defs"].values():
-        if {*ANGLES} <= table.get("properties", {}).keys():
-            table["properties"] |= orientation_schema()
-        if "gravity" in table.get("properties", {}):
-            table["additionalProperties"] = TypeAdapter(NamedLoad).json_schema()
-            table["properties"]["state"] = {"enum": [*STATES], "default": "free", "description": STATE}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "kinetostat machine file",
-        **_as_written(schema),
-    }
-
-
-def _as_written(schema: Any) -> Any:
-    """A schema whose defaults are as people write them: an infinite stiffness is "rigid", no limit has no default."""
-    if isinstance(schema, dict):
-        unset = NO_LIMIT in str(schema.get("description")) and "default" in schema
-        return {key: _as_written(value) for key, value in schema.items() if not (unset and key == "default")}
-    if isinstance(schema, list | tuple):
-        return [_as_written(value) for value in schema]
-    return RIGID if schema == math.inf else schema

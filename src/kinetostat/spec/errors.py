@@ -3,13 +3,14 @@
 import difflib
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import TypeVar
 
 PRINTABLE = r"^[^\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]*$"
 """Names: no control characters, which would reach terminals, and none that reverse the text after them."""
 LONGEST_WORD = 300
 """Characters without a space in a message: more than paths usually have."""
 _LONG = re.compile(rf"\S{{{LONGEST_WORD},}}")
+M = TypeVar("M")
 SHOWN, WORDED = 5, 100
 """Mistakes of a file that a message shows, and those that are put into words at all: a hostile file has thousands."""
 
@@ -78,8 +79,8 @@ def _next(name: str) -> str | None:
     return f"{stem}{int(name[len(stem) :]) + 1}" if stem != name else None
 
 
-def first_mistakes(mistakes: Sequence[Any], sentence: Callable[[dict[str, Any]], str]) -> str:
+def first_mistakes(mistakes: Sequence[M], sentence: Callable[[M], str]) -> str:
     """Return a sentence for each of the first different mistakes of a file, and how many more there are."""
-    sentences = list(dict.fromkeys(sentence(dict(mistake)) for mistake in mistakes[:WORDED]))
+    sentences = list(dict.fromkeys(sentence(mistake) for mistake in mistakes[:WORDED]))
     left = len(sentences) - SHOWN + max(len(mistakes) - WORDED, 0)
     return " ".join(sentences[:SHOWN]) + (f" (and {left} more)" if left > 0 else "")

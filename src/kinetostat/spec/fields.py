@@ -1,7 +1,8 @@
 """The vocabulary in which a family declares what people may write: quantities with a kind, bounds and a meaning.
 
 A family's tables are plain frozen dataclasses whose fields are annotated with `Quantity`. From those annotations come
-the validation, the JSON Schema, the field paths and the messages; no family writes any of them.
+the validation, the JSON Schema, the field paths and the messages; no family writes any of them. Libraries that check
+data or make schemas must not be imported here: every command reads a machine.
 """
 
 import math
@@ -10,9 +11,6 @@ from dataclasses import MISSING, fields
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
-
-from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import PydanticCustomError, core_schema
 
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError, shorten
@@ -37,7 +35,7 @@ Table = TypeVar("Table")
 def table(cls: type[Table]) -> type[Table]:
     """Declare a table of a machine file: a frozen dataclass that refuses keys it does not have."""
     made = dataclass(frozen=True)(cls)
-    made.__pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[attr-defined]
+    made.__pydantic_config__ = {"extra": "forbid"}  # type: ignore[attr-defined]
     return made
 
 
@@ -81,29 +79,25 @@ class Quantity:
         """Validate what was written: SI value, or a tuple of `count` of them.
 
         Raises:
-            PydanticCustomError: with the sentence for people.
+            UnitError: with the reason.
         """
         if self.count is None:
-            return self._read_one(value)
+            return self.number(value)
         if not isinstance(value, list | tuple):
             if self.apart:
-                raise PydanticCustomError("count", "it must be {entries}", {"entries": self.entries})
-            return (self._read_one(value),) * self.count
+                raise UnitError(f"it must be {self.entries}")
+            return (self.number(value),) * self.count
         if len(value) != self.count:
             alike = "" if self.apart else ", or one value for all"
-            raise PydanticCustomError(
-                "count",
-                "it has {found} entries; give {count}{alike}",
-                {"found": len(value), "count": self.count, "alike": alike},
-            )
-        return tuple(self._read_one(entry, f"entry {i}: ") for i, entry in enumerate(value))
+            raise UnitError(f"it has {len(value)} entries; give {self.count}{alike}")
+        return tuple(self._entry(i, entry) for i, entry in enumerate(value))
 
-    def _read_one(self, value: object, where: str = "") -> float:
+    def _entry(self, i: int, value: object) -> float:
+        """Return an entry of a list in SI; the reason why it cannot be read begins with its place."""
         try:
             return self.number(value)
         except UnitError as error:
-            entry = f"{where}{shorten(value)}: " if where else ""
-            raise PydanticCustomError("quantity", "{said}{reason}", {"said": entry, "reason": str(error)}) from None
+            raise UnitError(f"entry {i}: {shorten(value)}: {error}") from None
 
     def number(self, value: object) -> float:
         """Return the SI value of a number or of text with a unit, within the bounds.
@@ -158,10 +152,8 @@ class Quantity:
         """An SI value of it as people write it in a file, in the unit of what stood there before."""
         return NO_LIMIT if value == self.unset else written(value, self.kind, like)
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
+        """Return the JSON Schema of what may be written; pydantic asks for it in `machine.file_schema`."""
         kind = KINDS[self.kind]
         table = ["object"] if self.stiff else []
         single = {"type": ["number", "string", *table], "examples": [kind.example]}

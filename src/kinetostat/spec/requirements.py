@@ -4,41 +4,38 @@ Which quantities and fields exist depends on the machine and is checked where th
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, TypeAlias
+from dataclasses import field
+from typing import Any, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
-
+from kinetostat.frozen import dataclass
 from kinetostat.spec.document import Document, override, toml_key, toml_value
 from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
-MOST_LISTED = 10_000
+MOST_POSES = 10_000
+MOST_CONDITIONS, MOST_RANGES = 50, 6
+"""Entries of a requirement."""
+LONGEST_NAME = 80
+"""Characters of the name of a requirement."""
 
 
-class Requirement(BaseModel):
-    """Conditions that must hold, and where: at the pose of the file unless `over` or `poses` is given."""
+@dataclass(frozen=True)
+class Requirement:
+    """Conditions that must hold, and where: at the pose of the file unless `over` or `poses` is given.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    Attributes:
+        demand: conditions that must all hold, such as "free_stiffness_z > 50 N/um".
+        over: a box: ranges such as "x=-2 cm:2 cm:11".
+        poses: poses, each with the fields in which it differs.
+    """
 
-    demand: Annotated[list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)] = Field(
-        description='conditions that must all hold, e.g. "free_stiffness_z > 50 N/um"', min_length=1, max_length=50
-    )
-    over: list[str] = Field(default=[], description='a box: ranges as "x=-2 cm:2 cm:11"', max_length=6)
-    poses: list[dict[str, float | str]] = Field(
-        default=[], description="poses, each with the fields in which it differs", max_length=MOST_LISTED
-    )
-
-
-def _whole(given: Any) -> Any:
-    """A condition alone, or a list of conditions, stands for a requirement at the pose of the file."""
-    return {"demand": given} if isinstance(given, str | list) else given
+    demand: list[str]
+    over: list[str] = field(default_factory=list)
+    poses: list[dict[str, float | str]] = field(default_factory=list)
 
 
-Requirements: TypeAlias = dict[
-    Annotated[str, Field(min_length=1, max_length=80)], Annotated[Requirement, BeforeValidator(_whole)]
-]
+Requirements: TypeAlias = dict[str, Requirement]
 """Requirements by the names that people give them."""
-_READER: TypeAdapter[Requirements] = TypeAdapter(Requirements, config=ConfigDict(defer_build=True))
 HOW = (
     'write NAME = "free_stiffness_z > 50 N/um", or NAME = { demand = "...", over = ["x=-2 cm:2 cm:11"] } for a box, or '
     'NAME = { demand = "...", poses = [{ x = "1 cm" }, { x = "2 cm" }] } for a list of poses'
@@ -73,21 +70,81 @@ def read_requirements(written: object, origin: str) -> Requirements:
     Raises:
         InputError: names the requirement that is not one, and how to write it.
     """
-    try:
-        return _READER.validate_python(written)
-    except ValidationError as error:
-        location = error.errors()[0]["loc"]
-        place = ".".join([TABLE, *(str(part) for part in location if str(part) != "[key]")][:3])
-        value = written.get(location[0]) if isinstance(written, dict) and location else written
-        raise InputError(f'"{origin}": {place} is wrong in {shorten(value)}; {HOW}.') from None
+    if not isinstance(written, dict):
+        raise InputError(f'"{origin}": {TABLE} is wrong in {shorten(written)}; {HOW}.')
+    requirements = {}
+    for name, given in written.items():
+        table = {"demand": given} if isinstance(given, str | list) else given
+        wrong = _wrong_part(name, table)
+        if wrong is not None:
+            place = ".".join([TABLE, str(name), *wrong])
+            raise InputError(f'"{origin}": {place} is wrong in {shorten(given)}; {HOW}.')
+        requirements[name] = _requirement_of(**table)
+    return requirements
+
+
+def _wrong_part(name: object, table: Any) -> list[str] | None:
+    """Return the key of the first part of a requirement that is not as it must be; no key where the whole is not."""
+    if not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and isinstance(table, dict)):
+        return []
+    demand, over, poses = table.get("demand"), table.get("over", []), table.get("poses", [])
+    if not (isinstance(demand, str) or (_are_texts(demand, MOST_CONDITIONS) and demand)):
+        return ["demand"]
+    if not _are_texts(over, MOST_RANGES):
+        return ["over"]
+    if not (isinstance(poses, list | tuple) and len(poses) <= MOST_POSES and all(map(_is_pose, poses))):
+        return ["poses"]
+    unknown = [str(key) for key in table if key not in ("demand", "over", "poses")]
+    return unknown[:1] or None
+
+
+def _requirement_of(demand: Any, over: Sequence[str] = (), poses: Sequence[Mapping[str, Any]] = ()) -> Requirement:
+    """Make a requirement of what was written; numbers of poses are SI, and all else of them is text."""
+    listed = [{key: value if isinstance(value, str) else float(value) for key, value in pose.items()} for pose in poses]
+    return Requirement(several(demand), list(over), listed)
+
+
+def _are_texts(given: Any, most: int) -> bool:
+    return isinstance(given, list | tuple) and len(given) <= most and all(isinstance(text, str) for text in given)
+
+
+def _is_pose(given: object) -> bool:
+    """Whether fields are given by name, each as a number or a text."""
+    return isinstance(given, dict) and all(
+        isinstance(key, str) and isinstance(value, int | float | str) for key, value in given.items()
+    )
 
 
 def requirements_schema() -> dict[str, Any]:
     """The JSON Schema of the table, in which one condition or a list of them may stand for a whole requirement."""
     text: dict[str, Any] = {"type": "string", "examples": ["free_stiffness_z > 50 N/um"]}
     several_texts = {"type": "array", "items": text, "minItems": 1}
-    table = Requirement.model_json_schema()
-    table["properties"]["demand"] = {"anyOf": [text, several_texts], "description": "conditions that must all hold"}
+    pose = {"type": "object", "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "string"}]}}
+    lists = {
+        "over": ('a box: ranges as "x=-2 cm:2 cm:11"', {"type": "string"}, MOST_RANGES),
+        "poses": ("poses, each with the fields in which it differs", pose, MOST_POSES),
+    }
+    table = {
+        "additionalProperties": False,
+        "description": str(Requirement.__doc__).partition("\n")[0],
+        "properties": {
+            "demand": {"anyOf": [text, several_texts], "description": "conditions that must all hold"},
+            **{
+                name: {
+                    "default": [],
+                    "description": description,
+                    "items": items,
+                    "maxItems": most,
+                    "title": name.title(),
+                    "type": "array",
+                }
+                for name, (description, items, most) in lists.items()
+            },
+        },
+        "required": ["demand"],
+        "title": "Requirement",
+        "type": "object",
+    }
     return {
         "type": "object",
         "description": "what must hold, by name: at the pose of the file, over a box, or at a list of poses",

@@ -8,11 +8,17 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from kinetostat.spec.document import Document, override, toml_pairs
 from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
-from kinetostat.spec.requirements import Requirements, requirement_lines
+from kinetostat.spec.requirements import (
+    TABLE,
+    Requirements,
+    read_requirements,
+    requirement_lines,
+    requirements_schema,
+)
 
 MOST_POPULATION = 100_000
 MOST_GENERATIONS = 100_000
@@ -152,7 +158,7 @@ class StudyFile(Table):
     poses: PosesTable = Field(default=PosesTable(), description="where the machine is judged")
     optimizer: OptimizerTable = Field(default=OptimizerTable(), description="how to search")
     robustness: RobustnessTable = Field(default=RobustnessTable(), description="tolerances of manufacture")
-    requirements: Requirements = Field(
+    requirements: Annotated[Requirements, WithJsonSchema(requirements_schema())] = Field(
         default={}, description="what the best design must meet, by name; beside those of the machine's file"
     )
 
@@ -169,10 +175,11 @@ def read_study(document: Document, origin: str, settings: Sequence[str] = ()) ->
         InputError: one sentence for each mistake, at most five.
     """
     changed = override(document, settings, {})
+    required = {TABLE: read_requirements(changed[TABLE], origin)} if TABLE in changed else {}
     try:
-        return StudyFile.model_validate(changed)
+        return StudyFile.model_validate({**changed, **required})
     except ValidationError as error:
-        mistakes = first_mistakes(error.errors(), lambda mistake: _sentence(mistake, changed))
+        mistakes = first_mistakes(error.errors(), lambda mistake: _sentence(dict(mistake), changed))
         raise InputError(f'"{origin}": {mistakes}') from None
 
 

@@ -1,23 +1,26 @@
-"""A document against the tables of a family: validated SI data, or one paragraph that says what to mend.
+"""A document against the tables of a family: SI data in these tables, or one paragraph that says what to mend.
 
-The model of a file is made by pydantic from the family's own dataclasses; this module only words its findings.
+The tables are the family's own dataclasses; the JSON Schema of the same tables is made in `machine.file_schema`.
 """
 
 import difflib
-from collections.abc import Mapping
-from functools import lru_cache
-from typing import Any, Literal, get_type_hints
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from kinetostat.display import DIGITS, EXAMPLE, SI
+from kinetostat.frozen import dataclass
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
 from kinetostat.spec.fields import Quantity, optional, quantities
-from kinetostat.units import KINDS
+from kinetostat.units import KINDS, UnitError
 
 SCHEMA_VERSION = 1
-
+LONGEST_NAME = 80
+"""Characters of a machine's name."""
+HEAD = ("schema", "name", "family")
+"""Keys at the top of a file that are no tables."""
+NO_TABLE = "Input should be a valid dictionary or instance of {}"
 
 DISPLAY_SCHEMA: dict[str, Any] = {
     "type": "object",
@@ -33,117 +36,139 @@ DISPLAY_SCHEMA: dict[str, Any] = {
 }
 """The schema of the table [display], which `display.read_display` reads."""
 
-MODELS = 64
-"""Models of files that are kept: making one takes longer than all else that reading a file is."""
+
+@dataclass(frozen=True)
+class Mistake:
+    """Something in a document that its tables do not have, or do not allow.
+
+    Attributes:
+        kind: "missing", "unknown", "no table" or "wrong".
+        place: the keys that lead to it.
+        reason: of what is wrong, what is wrong with it.
+    """
+
+    kind: str
+    place: tuple[object, ...]
+    reason: str = ""
 
 
-def file_model(family: str, tables: Mapping[str, type]) -> type[BaseModel]:
-    """The model of a machine file of one family."""
-    return _file_model(family, tuple(tables.items()))
-
-
-@lru_cache(MODELS)
-def _file_model(family: str, tables: tuple[tuple[str, type], ...]) -> type[BaseModel]:
-    content: dict[str, Any] = {
-        "schema_version": (
-            Literal[1],
-            Field(alias="schema", description="version of the file format", default=SCHEMA_VERSION),
-        ),
-        "name": (
-            str,
-            Field(description="what people call the machine", min_length=1, max_length=80, pattern=PRINTABLE),
-        ),
-        "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
-    }
-    content["display"] = (dict[str, Any], Field(default={}, json_schema_extra=DISPLAY_SCHEMA))
-    return _table_model("MachineFile", dict(tables), content)
-
-
-def _table_model(title: str, tables: Mapping[str, type], content: dict[str, Any]) -> type[BaseModel]:
-    """Make the model of a table from the tables in it by dotted name; tables in tables become models in models."""
-    for i, name in enumerate(dict.fromkeys(path.partition(".")[0] for path in tables)):
-        inner = {path.partition(".")[2]: kind for path, kind in tables.items() if path.partition(".")[0] == name}
-        alone = inner.pop("", None)
-        model = alone if alone and not inner else _table_model(name, inner, _fields(alone) if alone else {})
-        may_miss = model is alone and set(quantities(model)) == optional(model)
-        default: Any = {"default_factory": model} if may_miss else {}
-        about: Any = Field(alias=name, description=f"the machine's {name}", **default)
-        content[f"table_{i}"] = (model, about)
-    return create_model(title, __config__=ConfigDict(extra="forbid"), **content)
-
-
-def _fields(table: type) -> dict[str, Any]:
-    """The fields of a table that holds tables as well, for the model of both."""
-    hints = get_type_hints(table, include_extras=True)
-    return {
-        f"field_{name}": (hints[name], Field(alias=name, **({"default": getattr(table, name)} if may_miss else {})))
-        for name, may_miss in ((name, name in optional(table)) for name in quantities(table))
-    }
-
-
-def tables_in(data: BaseModel, tables: Mapping[str, type]) -> dict[str, Any]:
-    """Return one instance per table, by dotted name, from a validated document."""
-    instances = {}
-    for path, table in tables.items():
-        at: Any = data
-        for key in path.split("."):
-            at = _entries(at)[key]
-        fields = quantities(table)
-        within = {} if isinstance(at, table) else {k: v for k, v in _entries(at).items() if k in fields}
-        instances[path] = table(**within) if within else at
-    return instances
-
-
-def _entries(model: BaseModel) -> dict[str, Any]:
-    """The content of a model, under the names that files have for it."""
-    return {field.alias or name: getattr(model, name) for name, field in type(model).model_fields.items()}
-
-
-def validate(document: Document, origin: str, model: type[BaseModel], tables: Mapping[str, type]) -> BaseModel:
-    """The document as validated data.
+def validated_tables(document: Document, origin: str, tables: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
+    """Read what a machine file says, without its table [display], into the tables of its family.
 
     Args:
-        document: what was written.
+        document: what was written; its family has been looked up.
         origin: name of the file, for messages.
-        model, tables: the model and tables from `file_model` and the family.
+        tables: classes of the tables, by dotted name.
+
+    Returns:
+        The name of the machine, and one instance of each table, by dotted name.
 
     Raises:
         InputError: one sentence for each mistake, at most five.
     """
-    try:
-        return model.model_validate(document)
-    except ValidationError as error:
-        mistakes = first_mistakes(error.errors(), lambda mistake: _sentence(mistake, document, tables))
-        raise InputError(f'"{origin}": {mistakes}') from None
+    reader = _Reader(tables)
+    mistakes = [*_mistakes_in_head(document), *reader.read(document)]
+    if mistakes:
+        sentences = first_mistakes(mistakes, lambda mistake: _sentence(mistake, document, reader))
+        raise InputError(f'"{origin}": {sentences}')
+    return document["name"], {path: reader.instances[path] for path in tables}
 
 
-def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, type]) -> str:
-    path = [str(part) for part in mistake["loc"]]
+def _mistakes_in_head(document: Document) -> Iterator[Mistake]:
+    """Check the version of the format and the name of the machine."""
+    version, name = document.get("schema", SCHEMA_VERSION), document.get("name")
+    if version != SCHEMA_VERSION:
+        yield Mistake("wrong", ("schema",))
+    if "name" not in document:
+        yield Mistake("missing", ("name",))
+    elif not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and re.fullmatch(PRINTABLE, name)):
+        yield Mistake("wrong", ("name",))
+
+
+class _Reader:
+    """Reads a document into instances of tables.
+
+    Attributes:
+        tables: their classes, by dotted name.
+        within: names of the tables that each table holds, by its dotted name, in their order.
+        instances: the tables that have been read.
+    """
+
+    def __init__(self, tables: Mapping[str, type]) -> None:
+        self.tables = tables
+        self.within: dict[str, dict[str, None]] = {}
+        self.instances: dict[str, Any] = {}
+        for path in tables:
+            names = path.split(".")
+            for depth, name in enumerate(names):
+                self.within.setdefault(".".join(names[:depth]), {})[name] = None
+
+    def read(self, given: object, place: tuple[str, ...] = ()) -> Iterator[Mistake]:
+        """Read what was written of a table and of the tables in it; mistakes come in the order of fields.
+
+        A table in which all may be left out may be left out itself, unless it holds others.
+        """
+        path = ".".join(place)
+        table, within = self.tables.get(path), self.within.get(path, {})
+        if not isinstance(given, dict):
+            yield Mistake("no table" if table and not within else "wrong", place, NO_TABLE.format(place[-1]))
+            return
+        known = quantities(table) if table else {}
+        if table:
+            yield from self._read_fields(given, place, table)
+        for name in within:
+            if name in given:
+                yield from self.read(given[name], (*place, name))
+            elif not self._may_miss(".".join([*place, name])):
+                yield Mistake("missing", (*place, name))
+        for key in given:
+            if key not in known and key not in within and (place or key not in HEAD):
+                yield Mistake("unknown", (*place, key))
+
+    def _read_fields(self, given: Document, place: tuple[str, ...], table: type) -> Iterator[Mistake]:
+        """Read the fields of a table; it is made if all of them can be read."""
+        values = {}
+        for name, quantity in quantities(table).items():
+            if name in given:
+                try:
+                    values[name] = quantity.read(given[name])
+                except UnitError as error:
+                    yield Mistake("wrong", (*place, name), str(error))
+            elif name not in optional(table):
+                yield Mistake("missing", (*place, name))
+        if {*quantities(table)} - optional(table) <= values.keys():
+            self.instances[".".join(place)] = table(**values)
+
+    def _may_miss(self, path: str) -> bool:
+        """Whether a table may be left out; it is then as if it were empty."""
+        table = self.tables.get(path)
+        may_miss = table is not None and path not in self.within and optional(table) == set(quantities(table))
+        if table and may_miss:
+            self.instances[path] = table()
+        return may_miss
+
+
+def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
+    path = [str(part) for part in mistake.place]
     name, last = ".".join(cut(part) for part in path), cut(path[-1])
     within = ".".join(path[:-1])
-    known = quantities(tables[within]) if within in tables else {}
-    if mistake["type"] in ("missing", "missing_argument"):
+    known = quantities(reader.tables[within]) if within in reader.tables else {}
+    if mistake.kind == "missing":
         return _missing(within, name, last, known, document.get("family"))
-    if mistake["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        allowed = list(known) or _tables_in(within, tables)
+    if mistake.kind == "unknown":
+        allowed = list(known) or [*([] if within else HEAD), *reader.within.get(within, ())]
         close = difflib.get_close_matches(last, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
         return f"{name} is not known; {hint}"
     value = shorten(_look_up(document, path))
-    if mistake["type"] == "dataclass_type":
+    if mistake.kind == "no table":
         return f"{name} is {value}; it must be a table, written as [{name}] with one line for each value."
     if name == "schema":
         return f"schema is {value}; this version reads schema = {SCHEMA_VERSION}."
     if name == "name":
-        return f'name is {value}; it must be text of 1 to 80 characters that can be printed, e.g. name = "my machine".'
-    return f"{name} is {value}: {mistake['msg']}."
-
-
-def _tables_in(within: str, tables: Mapping[str, type]) -> list[str]:
-    """Names of the tables that a table of tables may hold."""
-    start = f"{within}." if within else ""
-    names = [path.removeprefix(start).partition(".")[0] for path in tables if path.startswith(start)]
-    return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *names]))
+        printable = f"text of 1 to {LONGEST_NAME} characters that can be printed"
+        return f'name is {value}; it must be {printable}, e.g. name = "my machine".'
+    return f"{name} is {value}: {mistake.reason}."
 
 
 def _missing(within: str, name: str, last: str, known: Mapping[str, Quantity], family: object) -> str:
