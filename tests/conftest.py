@@ -12,6 +12,8 @@ import sysconfig
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before anything loads NumPy
 
+os.environ.setdefault("KINETOSTAT_CACHE", "off")  # tests change formulas while they run
+
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 

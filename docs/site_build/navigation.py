@@ -12,6 +12,7 @@ PAGES = {
         "guidelines",
         "workspace",
         "poses",
+        "functions",
         "loads",
         "vibration",
         "budget",

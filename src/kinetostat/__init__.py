@@ -8,6 +8,10 @@ Names load their modules when first used, so that importing the package costs no
 
 import sys
 from importlib import import_module
+from time import time
+
+STARTED = time()
+"""The time at which the package was first imported: sources that were changed later are not those that run."""
 
 _HOMES = {
     "load": "kinetostat.machine.loading",

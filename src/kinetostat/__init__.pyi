@@ -40,4 +40,6 @@ from kinetostat.views.answers import save as save
 from kinetostat.views.picture import machine_picture as machine_picture
 from kinetostat.views.report.writing import report as report
 
+STARTED: float
+
 def load_ipython_extension(shell: Any) -> None: ...

@@ -6,6 +6,7 @@ left out. A new machine of the same form, with other numbers, uses the same prog
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -14,11 +15,13 @@ import numpy as np
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.form import Form, Specimen, TracedFormula, form_of, objectives_of, reduced_angles
 from kinetostat.engine.gradient import Interpreted, with_gradients
-from kinetostat.engine.machine_code import Program, machine_code_of
+from kinetostat.engine.machine_code import MachineCode, Program, machine_code_of, unpack
+from kinetostat.engine.program_files import read_program, write_program
 from kinetostat.engine.trace import Runnable
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closure import solve_joints, solver_of, task_of
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.catalogue import family_text
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 
@@ -100,14 +103,39 @@ class Recipe:
     form: Form
     arguments: tuple[Any, ...]
 
+    @property
+    def text(self) -> str | None:
+        """All of it in a text that is the same in every process; None of families that programs have registered."""
+        machine = self.kind.machine
+        family = family_text(machine.family)
+        return family and repr((self.trace.__name__, family, machine.loaded, self.form, self.arguments))
+
+    def formula(self) -> TracedFormula:
+        """Trace it."""
+        return self.trace(self.kind, self.form, *self.arguments)
+
 
 @lru_cache(PROGRAMS_KEPT)
 def program_of(recipe: Recipe, native: bool = True) -> Runnable:
     """Return the program of a recipe, compiled or run node by node in NumPy; derivatives come after all results."""
-    formula = recipe.trace(recipe.kind, recipe.form, *recipe.arguments)
-    if not native:
-        return Interpreted(formula.body, formula.inputs)
-    return Program(machine_code_of(with_gradients(formula.body, formula.inputs)))
+    if native:
+        with suppress(ModuleNotFoundError):  # without LLVM all runs in NumPy, fifty times as long
+            return Program(_machine_code(recipe))
+    formula = recipe.formula()
+    return Interpreted(formula.body, formula.inputs)
+
+
+def _machine_code(recipe: Recipe) -> MachineCode:
+    """Machine code as an earlier process has left it on disk, or compiled."""
+    text = recipe.text
+    kept = read_program(text) if text else None
+    if kept:
+        return unpack(kept)
+    formula = recipe.formula()
+    code = machine_code_of(with_gradients(formula.body, formula.inputs))
+    if text:
+        write_program(text, code.pack())
+    return code
 
 
 @dataclass(frozen=True)

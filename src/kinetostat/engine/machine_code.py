@@ -28,6 +28,9 @@ SELF_LINKED = sys.platform == "linux" and platform.machine() == "x86_64"
 """Whether objects are linked here; elsewhere LLVM loads them."""
 
 
+HEAD = struct.Struct("<qqq")
+
+
 @dataclass(frozen=True)
 class MachineCode:
     """A compiled program.
@@ -43,6 +46,15 @@ class MachineCode:
     entry: int
     lanes: int
     rows: int
+
+    def pack(self) -> bytes:
+        """All of it in a row."""
+        return HEAD.pack(self.entry, self.lanes, self.rows) + self.image
+
+
+def unpack(data: bytes) -> MachineCode:
+    """Take apart what `MachineCode.pack` put in a row."""
+    return MachineCode(data[HEAD.size :], *HEAD.unpack_from(data))
 
 
 def machine_code_of(body: Body) -> MachineCode:

@@ -49,6 +49,11 @@ def host_lanes() -> int:
     return 4 if features.get("avx") else 2
 
 
+def host_description() -> str:
+    """Return what this processor is called and can do, as LLVM says it."""
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
 VECTOR_SETS = ("sse2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
 """Instruction sets that decide how fast the code is, as LLVM calls them."""
 

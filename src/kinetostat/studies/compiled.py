@@ -97,7 +97,7 @@ class CompiledFunction:
     def status(self, *given: Scalar) -> Codes:
         """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values."""
         points, shape = self._points(given)
-        return self._function.at(points)[1].reshape(shape)
+        return self._function.at(points)[1].reshape(shape)[()]
 
     def jacobian(self, *given: Scalar) -> Array:
         """Return the derivatives of the quantities by each input, exact to round-off; the first call compiles them.

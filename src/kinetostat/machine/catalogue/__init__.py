@@ -18,6 +18,7 @@ from kinetostat.machine.written.plan import NAME
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 
+PACKAGE = __name__.partition(".")[0]
 ENTRY_POINTS = "kinetostat.families"
 """The group in which an installed package names its families, so that the command line knows them as well."""
 
@@ -84,6 +85,17 @@ def register_installed() -> None:
     """Register the families that installed packages name as entry points; asked only where a name is not known."""
     for entry in entry_points(group=ENTRY_POINTS):
         register(entry.load())
+
+
+def family_text(family: Family) -> str | None:
+    """Say which family of kinetostat this is, the same in every process; None of any other, whose code may change."""
+    if family.recipe is None:
+        return family.name if family_named(family.name) is family and family.name not in _REGISTERED else None
+    recipe, given = family.recipe
+    parts = [family_text(part) if isinstance(part, Family) else repr(part) for part in given]
+    if not recipe.__module__.startswith(f"{PACKAGE}.") or None in parts:
+        return None
+    return f"{recipe.__module__}.{recipe.__qualname__}({parts})"
 
 
 def _of_machine(machine: Machine) -> tuple[Any, ...]:

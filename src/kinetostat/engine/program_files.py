@@ -1,0 +1,263 @@
+"""Compiled programs on disk, so that a new process need not trace and compile what an earlier one has compiled.
+
+Machine code cannot be judged by looking at it: who could write such a file, or change a byte of it, would decide what
+the next process does. So nothing is run that this user has not written himself. The folder belongs to the user alone
+(0700) and is opened once, its owner and rights are those of what has been opened, and every name is looked up in it;
+where others may write or read it, it is not used. Each file carries a keyed hash of its content and of its name, by a
+secret that never leaves the folder: a damaged file, a copied one, one of another program is not run but made again.
+
+A file is written under another name and then moved to its own, so that a process that is killed, or two at once, leave
+whole files; whatever the system refuses (no room, no right to write) costs the time of compiling and nothing else.
+
+What a program is made of is said by its maker in a text (`kernel`); what else decides about its bytes is added here:
+the sources of kinetostat, LLVM, Python and the processor.
+"""
+
+import hashlib
+import hmac
+import os
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from kinetostat.engine.machine_code import SELF_LINKED
+
+VARIABLE = "KINETOSTAT_CACHE"
+"""Variable of the environment with another folder for them, or "off"."""
+OFF = "off"
+MOST_BYTES = 64 << 20
+"""Of all files together; programs have some 10 to 300 kB."""
+KEPT_SHARE = 0.75
+"""Share of these bytes that stay when there are more: the files that were used last."""
+DAY, HOUR = 86400.0, 3600.0
+SECRET, SECRET_SIZE, HASH_SIZE = "secret", 32, 32
+PRIVATE = 0o077
+"""Rights of others."""
+
+
+def read_program(text: str) -> bytes | None:
+    """Return what has been stored of a program, as it was given to `write_program`; None where there is nothing sound.
+
+    Args:
+        text: all that the program is made of.
+    """
+    name = _name(text)
+    if name is None:
+        return None
+    with suppress(OSError), _folder() as folder:
+        secret = _secret(folder)
+        data = _read(folder, name)
+        if hmac.compare_digest(data[:HASH_SIZE], _hash(secret, name, data[HASH_SIZE:])):
+            _remember_use(folder, name)
+            return data[HASH_SIZE:]
+        os.unlink(name, dir_fd=folder)
+    return None
+
+
+def write_program(text: str, content: bytes) -> None:
+    """Store a program, where that is possible.
+
+    Args:
+        text: all that the program is made of.
+        content: its bytes.
+    """
+    name = _name(text)
+    if name is None:
+        return
+    with suppress(OSError), _folder(make=True) as folder:
+        secret = _secret(folder, make=True)
+        with _new_file(folder, _hash(secret, name, content) + content) as new:
+            os.rename(new, name, src_dir_fd=folder, dst_dir_fd=folder)
+        _drop_oldest(folder)
+
+
+def usual_folder() -> Path | None:
+    """Return the folder of the programs; None where they are not to be kept on disk, or the system has no owners."""
+    chosen = os.environ.get(VARIABLE, "").strip()
+    if chosen.lower() == OFF or not hasattr(os, "geteuid"):
+        return None
+    if chosen:
+        return Path(chosen).absolute()
+    home = Path(os.path.expanduser("~"))
+    if not home.is_absolute():
+        return None
+    system = home / "Library" / "Caches" if sys.platform == "darwin" else home / ".cache"
+    wished = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(wished) if os.path.isabs(wished) else system) / "kinetostat" / "programs"
+
+
+@contextmanager
+def _folder(make: bool = False) -> Iterator[int]:
+    """Open the folder and give its descriptor.
+
+    Raises:
+        OSError: it is not there and cannot be made, or others may write or read it.
+    """
+    path = usual_folder()
+    if path is None:
+        raise OSError("programs are not kept on disk")
+    if make:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileExistsError):
+            path.mkdir(mode=0o700)
+    folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        if not _is_private(folder):
+            warnings.warn(
+                f'compiled programs are not kept in "{path}", because it belongs to others or they may use it; '
+                f"`chmod 700` it if it is yours, or choose another folder with {VARIABLE}.",
+                stacklevel=2,
+            )
+            raise PermissionError("the folder is not the user's own")
+        yield folder
+    finally:
+        os.close(folder)
+
+
+def _is_private(descriptor: int) -> bool:
+    """Whether what has been opened belongs to this user, and nobody else may use it."""
+    status = os.fstat(descriptor)
+    return status.st_uid == os.geteuid() and not status.st_mode & PRIVATE
+
+
+def _read(folder: int, name: str) -> bytes:
+    """Read a file of this user in the folder.
+
+    Raises:
+        OSError: it is not there, or not the user's own.
+    """
+    descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=folder)
+    with open(descriptor, "rb") as file:
+        if not _is_private(descriptor):
+            raise PermissionError("a file is not the user's own")
+        return file.read(MOST_BYTES)
+
+
+@contextmanager
+def _new_file(folder: int, content: bytes) -> Iterator[str]:
+    """Write a file under a name of no program; it is removed unless it has been moved away."""
+    name = f".{os.getpid()}-{os.urandom(8).hex()}"
+    descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600, dir_fd=folder)
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(content)
+        yield name
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(name, dir_fd=folder)
+
+
+def _secret(folder: int, make: bool = False) -> bytes:
+    """Read the secret of the folder; the first process makes it, and where two begin at once, one of them.
+
+    Raises:
+        OSError: there is none, or none that can be used.
+    """
+    with suppress(FileExistsError):
+        if make and not _exists(folder, SECRET):
+            with _new_file(folder, os.urandom(SECRET_SIZE)) as new:
+                os.link(new, SECRET, src_dir_fd=folder, dst_dir_fd=folder)
+    secret = _read(folder, SECRET)
+    if len(secret) != SECRET_SIZE:
+        os.unlink(SECRET, dir_fd=folder)
+        raise OSError("the secret is damaged; the next process makes another")
+    return secret
+
+
+def _exists(folder: int, name: str) -> bool:
+    try:
+        os.stat(name, dir_fd=folder, follow_symlinks=False)
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _hash(secret: bytes, name: str, content: bytes) -> bytes:
+    return hashlib.blake2b(name.encode() + content, key=secret, digest_size=HASH_SIZE).digest()
+
+
+def _remember_use(folder: int, name: str) -> None:
+    """Note in the time of a file that it has been used today."""
+    with suppress(OSError):
+        if time.time() - os.stat(name, dir_fd=folder).st_mtime > DAY:
+            os.utime(name, dir_fd=folder)
+
+
+def _drop_oldest(folder: int) -> None:
+    """Remove the files that have not been used for longest, if all are too large, and what killed processes left."""
+    with os.scandir(folder) as entries:
+        files = sorted(
+            ((entry.stat(follow_symlinks=False), entry.name) for entry in entries), key=lambda f: f[0].st_mtime
+        )
+    total, now = sum(status.st_size for status, _ in files), time.time()
+    room = MOST_BYTES if total <= MOST_BYTES else KEPT_SHARE * MOST_BYTES
+    for status, name in files:
+        left = name.startswith(".") and now - status.st_mtime > HOUR
+        if left or (total > room and name != SECRET and not name.startswith(".")):
+            with suppress(FileNotFoundError):
+                os.unlink(name, dir_fd=folder)
+            total -= status.st_size
+
+
+def _name(text: str) -> str | None:
+    """The name of a program's file: a digest of all that decides about its bytes; None if that is not known."""
+    surroundings = _surroundings()
+    if surroundings is None:
+        return None
+    return hashlib.blake2b(f"{surroundings}\n{text}".encode(), digest_size=20).hexdigest()
+
+
+ROOMS = ("spec", "algebra", "machine", "numerics", "kinematics", "kinetostatics", "equilibrium", "vibration", "engine")
+"""Folders of kinetostat on which programs depend, beside the files above them."""
+
+
+@cache
+def _surroundings() -> str | None:
+    """All that decides about a program's bytes beside what it is made of.
+
+    None where that is not known: sources have been changed since this process began, and so may not be those that run.
+    """
+    package = Path(__file__).parents[1]
+    try:
+        sources = [source for room in ("", *ROOMS) for source in _sources(str(package / room), deep=bool(room))]
+        compiler = find_spec("llvmlite")
+        version = os.stat(compiler.origin) if compiler and compiler.origin else None
+    except OSError:
+        return None
+    if not sources or max(changed for _, _, changed in sources) > sys.modules[package.name].STARTED * 1e9:
+        return None
+    llvm = (compiler.origin, version.st_size, version.st_mtime_ns) if compiler and version else ()
+    return repr((str(package), sources, sys.version, llvm, _processor()))
+
+
+def _sources(folder: str, deep: bool) -> list[tuple[str, int, int]]:
+    """Name, size and time of the last change (ns) of each Python file of a folder, with those below if `deep`."""
+    sources, below = [], []
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                status = entry.stat()
+                sources.append((entry.path, status.st_size, status.st_mtime_ns))
+            elif deep and entry.is_dir():
+                below.append(entry.path)
+    return sorted(sources) + [source for path in sorted(below) for source in _sources(path, deep)]
+
+
+FEATURES = ("vendor_id", "cpu family", "model", "model name", "stepping", "flags")
+"""Lines on a processor that say what code it can run."""
+
+
+def _processor() -> str:
+    """The processor that code is made for, on Linux as the system says it, because LLVM takes long to load."""
+    if not SELF_LINKED:
+        from kinetostat.engine.native import host_description  # LLVM has to load the code here in any case
+
+        return host_description()
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        lines = iter(lambda: file.readline().partition(":"), ("\n", "", ""))  # of the first processor
+        return repr([(name.strip(), text.strip()) for name, _, text in lines if name.strip() in FEATURES])
