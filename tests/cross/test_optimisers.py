@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pymoo.indicators.hv import HV
 
+from kinetostat.studies.optimisation import slopes
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome
 from kinetostat.studies.optimisation.genetic import Genetic
 from kinetostat.studies.optimisation.log import Log, front_of, knee_of, record_of
@@ -53,7 +54,7 @@ def test_unrelated_optimisers_agree(settings, close):
 def test_derivatives_over_poses_are_those_of_differences(quantity, over):
     direction = ["objectives.0.direction=[1, 0, 2]"] if quantity == "stiffness_along" else []
     study = problem(REGION, *FEW, f"objectives.0.quantity={quantity}", f"objectives.0.over={over}", *direction)
-    assess, survey = Assessor(study), Surveyor(study)
+    assess, survey = Assessor(study), Surveyor(study, searching=True)
     genes, step = np.array([0.31, 0.62, 0.41, 0.27, 0.53, 0.74]), 1e-5
     objective = study.objectives[0]
     value, slope = survey(genes).term(objective.term, objective.sign > 0)
@@ -68,12 +69,33 @@ def test_derivatives_over_poses_are_those_of_differences(quantity, over):
 def test_derivatives_under_tolerances_are_those_of_differences(robust, over):
     settings = (f"robustness.objective={robust}", "robustness.search_samples=7", f"objectives.0.over={over}")
     study = problem(REGION, *FEW, *settings, 'variables.0.tolerance="3 mm"')
-    assess, survey = Assessor(study), Surveyor(study)
+    assess, survey = Assessor(study), Surveyor(study, searching=True)
     genes, step = np.array([0.31, 0.62, 0.41, 0.27, 0.53, 0.74]), 1e-5
     value, slope = survey(genes).term(study.objectives[0].term, True)
     assert value == pytest.approx(assess(genes[None]).objectives[0, 0], rel=1e-12)
     found = assess(np.concatenate([genes + step * np.eye(6), genes - step * np.eye(6)])).objectives.reshape(2, 6)
     np.testing.assert_allclose(slope, (found[0] - found[1]) / (2.0 * step), rtol=1e-5, atol=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize(("searching", "compiled"), [(True, [True] * 3), (False, [False, False, True])])
+def test_derivatives_are_compiled_where_many_are_asked_for(monkeypatch, searching, compiled):
+    """To explain a design a few evaluations do, and a search by derivatives compiles at once; numbers are the same."""
+    monkeypatch.setattr(slopes, "COMPILE_FROM", 2)
+    study = problem(REGION, *FEW)
+    survey, asked = Surveyor(study, searching), []
+    differentiate = slopes.differentiate
+
+    def note(*given):
+        asked.append(given[-1])
+        return differentiate(*given)
+
+    monkeypatch.setattr(slopes, "differentiate", note)
+    genes = np.array([0.31, 0.62, 0.41, 0.27, 0.53, 0.74])
+    answers = [survey(genes) for _ in range(3)]
+    assert asked == compiled
+    for name in study.names:
+        for other in answers[1:]:
+            np.testing.assert_allclose(answers[0].slopes[name], other.slopes[name], rtol=1e-10)
 
 
 def hypervolume(points, reference):

@@ -95,9 +95,16 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
         return optimize(
             problem,
             options.output,
-            lambda done, total, best: update(done, total, "" if best is None else f"(best {best:.8g})"),
+            lambda done, total, best: update(done, total, _words(best) if done < total else EXPLAINING),
             options.resume,
         )
+
+
+EXPLAINING = "is done, the best design is being explained"
+
+
+def _words(best: float | None) -> str:
+    return "" if best is None else f"(best {best:.8g})"
 
 
 def _report(options: argparse.Namespace, result: "Result") -> int:

@@ -126,19 +126,18 @@ def _function(
 
 
 def differentiate(
-    machine: Machine, population: Population, quantities: Sequence[str], by: Sequence[str]
+    machine: Machine, population: Population, quantities: Sequence[str], by: Sequence[str], repeated: bool = True
 ) -> PopulationResults:
     """Compute quantities of a few designs and their exact derivatives by parameters of the design.
-
-    Programs are compiled at the first call.
 
     Args:
         machine: gives all parameters that do not vary.
         population: designs and poses.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         by: leaf paths of what to differentiate by.
+        repeated: whether it pays to compile, see `evaluate_gradient`.
     """
-    sloped = evaluate_gradient(machine, population, quantities, by, repeated=True)
+    sloped = evaluate_gradient(machine, population, quantities, by, repeated=repeated)
     slopes = sloped.gradients.reshape(len(quantities), len(by), *population.shape)
     return PopulationResults.of(population, quantities, sloped.values, sloped.status, slopes)
 

@@ -63,7 +63,7 @@ class Gradient:
 
     @cached_property
     def _survey(self) -> Surveyor:
-        return Surveyor(self.problem)
+        return Surveyor(self.problem, searching=True)
 
     def step(self, number: int, log: Log) -> Step:
         """One descent."""

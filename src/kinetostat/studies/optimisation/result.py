@@ -161,7 +161,8 @@ def _as_it_is(problem: Problem) -> Array:
 def _explain(assess: Assessor, result: Result) -> Result:
     """The result with everything that is asked of its best design."""
     problem = assess.problem
-    survey = Surveyor(problem) if problem.differentiable else None
+    searched = problem.method in ("gradient", "hybrid")  # then the program is there
+    survey = Surveyor(problem, searched) if problem.differentiable else None
     ridges: list[Ridge] = []
     reason = "No ridges are sought, because the objective has no derivatives, or too many poses for them."
     if survey is not None and len(problem.objectives) == 1:

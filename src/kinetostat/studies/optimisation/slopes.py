@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.engine.derivatives import differentiate
+from kinetostat.engine.derivatives import SMALL_SLAB, differentiate
 from kinetostat.engine.points import Population
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -91,11 +91,26 @@ class Local:
         return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
 
 
-class Surveyor:
-    """Computes derivatives for designs of one problem; its program is compiled once."""
+COMPILE_FROM = 30
+"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled: that takes as long as 20 to
+50 of them by NumPy, for small machines and for large ones."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+
+class Surveyor:
+    """Computes derivatives for designs of one problem, compiled where that pays.
+
+    A search by derivatives evaluates hundreds of designs, and compiles at once. To explain a design a single evaluation
+    may do, or ridges may take hundreds: NumPy takes the first ones.
+    """
+
+    def __init__(self, problem: Problem, searching: bool) -> None:
+        """Prepare derivatives.
+
+        Args:
+            problem: the problem.
+            searching: whether many designs will be evaluated for certain.
+        """
+        self.problem, self._evaluations = problem, COMPILE_FROM if searching else 0
         self._free = np.flatnonzero(problem.space.catalogue == 0)
         self._rates = self._chain()
         by = tuple(dict.fromkeys(path for rates in self._rates for path in rates))
@@ -126,7 +141,9 @@ class Surveyor:
         machines = len(next(iter(self._made.values()), (0.0,)))
         columns = problem.space.columns(np.repeat(genes[None], machines, axis=0), self._made)
         population = Population(columns, problem.poses.columns)
-        answers = differentiate(problem.machine, population, problem.names, [*self._by])
+        self._evaluations += -(-population.size // SMALL_SLAB)
+        repeated = self._evaluations > COMPILE_FROM
+        answers = differentiate(problem.machine, population, problem.names, [*self._by], repeated)
         slopes = {}
         with np.errstate(invalid="ignore"):
             for name, by_leaf in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):

@@ -232,7 +232,9 @@ def convergence(progress: Progress) -> dict[str, object]:
 
 def _line(progress: Progress) -> str:
     total = f" of {progress.total}" if progress.total else ""
-    line = f"{progress.run.stage}: {progress.steps}{total} steps, {progress.designs:,} designs"
+    searched = progress.run.stage is Stage.RUNNING and progress.steps == progress.total
+    work = f"{Stage.RUNNING}, explaining the best design" if searched else progress.run.stage
+    line = f"{work}: {progress.steps}{total} steps, {progress.designs:,} designs"
     best = progress.best[-1] if progress.best else None
     return line if best is None else f"{line}, best {progress.exact(progress.problem.objectives[0], best)}"
 
