@@ -267,7 +267,7 @@ def _check_folder(folder: Path) -> int:
 
 def _check_study(options: argparse.Namespace) -> int:
     from kinetostat.studies.optimisation.problem import load_problem
-    from kinetostat.views.optimisation_tables import print_study
+    from kinetostat.views.optimisation import print_study
     from kinetostat.views.tables import terminal
 
     print_study(terminal(), load_problem(options.machine, options.settings))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kinetostat.studies.optimisation.assessment import Assessor
-from kinetostat.studies.optimisation.result import variables_of
 from kinetostat.studies.optimisation.search import optimize
+from kinetostat.views.optimisation import variables_of
 from studies import BEST, PAPER, best, problem, solved
 
 PRINTED = 1.017897

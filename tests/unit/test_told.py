@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinetostat.views.optimisation_tables import times_stiffer
+from kinetostat.views.optimisation import times_stiffer
 from kinetostat.views.paper import in_number
 
 

@@ -187,7 +187,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     if output and description.undrawn:
         raise InputError(description.undrawn)
     if output and (answered or not message):
-        written = (write_files if to_files else write_folder)(options, description, answer)
+        written = (_write_named_files if to_files else write_folder)(options, description, answer)
     code = give(
         options,
         answered,
@@ -211,7 +211,7 @@ def _in_words(question: Question, message: str) -> str:
     return f"{flags.get(first, first)}{space}{rest}"
 
 
-def write_files(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
+def _write_named_files(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
     """Write an answer to files in the form that the suffix of each says; pictures are of its first figure."""
     from kinetostat.views.answers import FIGURE_SUFFIXES, save
 
@@ -224,19 +224,9 @@ def write_files(options: argparse.Namespace, description: "Description", answer:
 
 def write_folder(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
     """Write the files and the figures of an answer into the folder of `--output`; return their paths."""
-    from kinetostat.views.answers import FORMS, write_content, write_form
+    from kinetostat.views.answers import write_files
 
-    written: list[Path] = []
-    for name, form in description.files.items():
-        path = options.output / name
-        if form in FORMS:
-            write_form(description, answer, str(form), path)
-        else:
-            content = late(form)(answer)
-            if content is None:
-                continue
-            write_content(content, path)
-        written.append(path)
+    written = write_files(description, answer, options.output)
     drawings = {
         draw.file or f"{description.figure_prefix}{name}": draw for name, draw in description.drawings(answer).items()
     }

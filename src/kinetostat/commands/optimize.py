@@ -5,13 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
-    NO_ANSWER,
     add_command,
+    give,
     judged,
-    list_written,
-    no_answer,
     note_damage,
-    print_json,
     search_bar,
     takes_figures,
     takes_json,
@@ -21,6 +18,8 @@ from kinetostat.commands.common import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from kinetostat.commands.common import Commands
     from kinetostat.studies.optimisation.result import Result
 
@@ -52,22 +51,11 @@ def add_optimize_commands(commands: "Commands") -> None:
 
 
 def _optimize(options: argparse.Namespace) -> int:
-    result = _search(options)
-    if options.json:
-        from kinetostat.studies.optimisation.result import as_json
-
-        print_json(as_json(result))
-    return _report(options, result)
+    return _show(options, _search(options))
 
 
 def _pareto(options: argparse.Namespace) -> int:
-    result = _search(options, least=2)
-    if options.json:
-        from kinetostat.studies.optimisation.result import as_json
-
-        data = as_json(result)
-        print_json({key: data.get(key) for key in ("name", "status", "message", "evaluations", "front")})
-    return _report(options, result)
+    return _show(options, _search(options, least=2), ("name", "status", "message", "evaluations", "front"))
 
 
 def _search(options: argparse.Namespace, least: int = 1) -> "Result":
@@ -107,29 +95,24 @@ def _words(best: float | None) -> str:
     return "" if best is None else f"(best {best:.8g})"
 
 
-def _report(options: argparse.Namespace, result: "Result") -> int:
-    """Write the files of a result, and print it unless JSON was printed."""
-    from kinetostat.studies.optimisation.result import message, write_result
+def _show(options: argparse.Namespace, result: "Result", keys: "Sequence[str]" = ()) -> int:
+    """Write the files of a result, and print it; of its JSON only some keys where any are named."""
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.optimisation import RESULT, write_result
+    from kinetostat.views.terminal import tell
 
     result = result.in_units(options.units) if options.units else result
+    written = []
     if options.output:
         log = result.log
         repaired = "nothing but its history" if log.cleaned else ""
         repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
         note_damage(options.output, repaired, log.unchecked, options.changed)
-    written = write_result(result, options.output) if options.output else []
-    if result.solved and options.output:
-        from kinetostat.views.optimisation_figures import pictures
+        written = write_result(result, options.output) + write_figures(options, RESULT.drawings(result))
 
-        figures = write_figures(options, pictures(result))
-        list_written(options.output, figures)
-        written += figures
-    if not result.solved:
-        return NO_ANSWER if options.json else no_answer(message(result))
-    if not options.json:
-        from kinetostat.views.optimisation_tables import print_result
-        from kinetostat.views.tables import print_written, terminal
+    def as_data() -> object:
+        data = json_of(RESULT, result)
+        return {key: data.get(key) for key in keys} if keys else data
 
-        print_result(terminal(), result)
-        print_written(terminal(), written)
-    return judged(result.machine, printing=not options.json)
+    code = give(options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message)
+    return judged(result.machine, printing=not options.json) if result.solved else code

@@ -117,7 +117,6 @@ def _add_report_command(commands: "Commands") -> None:
 
 def _report(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.studies.optimisation.result import message
     from kinetostat.studies.report import gather, subject_of
     from kinetostat.views.report.writing import ReportOptions, report_path, write_report
     from kinetostat.views.tables import print_written, terminal
@@ -129,7 +128,7 @@ def _report(options: argparse.Namespace) -> int:
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
-        return no_answer(message(result))
+        return no_answer(result.message)
     result = result.in_units(options.units) if result and options.units else result
     machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:

@@ -5,8 +5,7 @@ something of this kind is shown, so that the list costs nothing.
 """
 
 import sys
-from collections.abc import Callable
-from dataclasses import field
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,27 +21,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from kinetostat.views.figures import Drawings
-
 
 @dataclass(frozen=True)
 class Kind:
-    """How results of one kind are shown; functions and classes are named "module.function", modules in this package.
+    """How results of one kind are shown, by the description of the answer; a machine has no description.
 
     Attributes:
-        type: class of the results.
-        printer: prints a result on a console.
-        drawn: gives the functions that draw its figures, by name, the most telling one first; empty if there are none.
-        plain: gives a result as plain data; empty where it is kept in another way.
-        files: what is in a file of another format, a text, bytes or a dataset, by suffix.
-        description: where the description of these answers lives; everything else then follows from it.
+        type: class of the results, "module.Class".
+        description: where the description lives; empty for a machine.
     """
 
     type: str
-    printer: str = ""
-    drawn: str = ""
-    plain: str = ""
-    files: dict[str, str] = field(default_factory=dict)
     description: str = ""
 
     @property
@@ -55,14 +44,24 @@ class Kind:
         if self.description:
             late("views.terminal.tell")(console, late(self.description), answer)
         else:
-            late(self.printer)(console, answer)
+            late("views.tables.print_machine")(console, answer)
 
-    def figures(self, answer: object) -> "Drawings":
+    def figures(self, answer: object) -> "Mapping[str, Callable[[], Figure]]":
         """Return the functions that draw a result, by name; the most telling one first."""
         if self.description:
-            return {**described(self.description).drawings(answer)}
-        drawings: Drawings = late(self.drawn)(answer) if self.drawn else {}
+            return description_of(answer).drawings(answer)
+        drawings: Mapping[str, Callable[[], Figure]] = late("views.drawing.machine_figures")(answer)
         return drawings
+
+
+KINDS = (Kind("machine.machine.Machine"), *(Kind(name, place) for name, place in ANSWERS.items()))
+"""All kinds of results that Python and notebooks show."""
+FILES_OF_A_MACHINE = {
+    ".toml": "machine.saving.as_file",
+    ".png": "views.picture.machine_picture",
+    ".glb": "views.scene.glb.machine_glb",
+}
+"""Functions that make each file of a machine, a text or bytes."""
 
 
 def description_of(answer: object) -> Description:
@@ -71,35 +70,8 @@ def description_of(answer: object) -> Description:
     Raises:
         InputError: it is not an answer of kinetostat.
     """
-    return described(kind_of(answer).description)
-
-
-def described(path: str) -> Description:
-    """Import the description that a text names."""
-    description: Description = late(path)
+    description: Description = late(kind_of(answer).description)
     return description
-
-
-KINDS = (
-    Kind(
-        "machine.machine.Machine",
-        "views.tables.print_machine",
-        "views.drawing.machine_figures",
-        files={
-            ".toml": "machine.saving.as_file",
-            ".png": "views.picture.machine_picture",
-            ".glb": "views.scene.glb.machine_glb",
-        },
-    ),
-    Kind(
-        "studies.optimisation.result.Result",
-        "views.optimisation_tables.print_result",
-        "views.optimisation_figures.pictures",
-        "studies.optimisation.result.as_json",
-    ),
-    *(Kind(name, description=place) for name, place in ANSWERS.items()),
-)
-"""All kinds of results that Python and notebooks show."""
 
 
 def _is(answer: object, path: str) -> bool:
@@ -126,10 +98,7 @@ def kind_of(answer: object) -> Kind:
 
 def plain_of(answer: object) -> Any:
     """Return an answer as plain data, as JSON has it."""
-    kind = kind_of(answer)
-    if kind.description:
-        return late("views.data_forms.json_of")(described(kind.description), answer)
-    return late(kind.plain)(answer)
+    return late("views.data_forms.json_of")(description_of(answer), answer)
 
 
 @checked
@@ -185,18 +154,16 @@ def _writers(what: object) -> dict[str, Writer]:
         return dict.fromkeys(FIGURE_SUFFIXES, partial(late("views.figures.save_figure"), what))
     if _is(what, "views.picture.Picture"):
         return {".png": partial(write_content, what)}
-    kind = kind_of(what)
-    written: dict[str, Writer] = {}
-    if kind.description:
-        written |= {
-            f".{form}": partial(write_form, described(kind.description), what, form)
-            for form in described(kind.description).forms
-        }
-    if kind.plain:
-        written[".json"] = lambda path: write_json(path, late(kind.plain)(what))
-    for suffix, content in kind.files.items():
-        written[suffix] = lambda path, content=content: write_content(late(content)(what), path)  # type: ignore[misc]
-    return written
+    if not kind_of(what).description:
+        files = FILES_OF_A_MACHINE.items()
+        return {suffix: partial(write_made, late(made), what) for suffix, made in files}
+    description = description_of(what)
+    return {f".{form}": partial(write_form, description, what, form) for form in description.forms}
+
+
+def write_made(made: Callable[[Any], Any], what: object, path: Path) -> None:
+    """Write what a function makes of a machine."""
+    write_content(made(what), path)
 
 
 def write_form(description: Description, answer: object, form: str, path: Path) -> None:
@@ -207,6 +174,20 @@ def write_form(description: Description, answer: object, form: str, path: Path) 
         write_json(path, content)
     else:
         write_content(content, path)
+
+
+def write_files(description: Description, answer: object, folder: Path) -> list[Path]:
+    """Write the files of an answer that a folder of results gets, without figures; return their paths."""
+    written = []
+    for name, form in description.files.items():
+        if form in FORMS:
+            write_form(description, answer, str(form), folder / name)
+        elif (content := late(form)(answer)) is not None:
+            write_content(content, folder / name)
+        else:
+            continue
+        written.append(folder / name)
+    return written
 
 
 def write_content(content: Any, path: Path) -> None:

@@ -14,23 +14,33 @@ from kinetostat.studies.optimisation.assessment import Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.question import Drawing
 
 BINS = 40
+CAPTIONS = {
+    "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
+    "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",
+    "front": "Designs over the objectives; on the front no design is better than another in all objectives.",
+    "tolerances": "Scatter of the objectives over machines made to the tolerances from the best design.",
+}
 CEILING = 99.0
 """Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
 
 
-def pictures(result: Result) -> Drawings:
+def pictures(result: Result) -> dict[str, Drawing]:
     """Return the figures of a solved study, by file name."""
-    drawings: Drawings = {"comparison": partial(comparison, result)}
+    if not result.solved:
+        return {}
+    name = result.problem.study.name
+    draw = {"comparison": partial(comparison, result, title=f"{name}: {result.problem.machine.name}")}
     if len(result.problem.objectives) == 1:
-        drawings["convergence"] = partial(convergence, result.log, result.problem.study.name)
+        draw["convergence"] = partial(convergence, result.log, title=name)
     else:
-        drawings["front"] = partial(front, result)
+        draw["front"] = partial(front, result, title=name)
     if result.robustness:
-        drawings["tolerances"] = partial(tolerances, result)
-    return drawings
+        draw["tolerances"] = partial(tolerances, result, title=f"{name}: under the tolerances")
+    return {key: Drawing(CAPTIONS[key], function) for key, function in draw.items()}
 
 
 def convergence(log: Log, title: str) -> Figure:
@@ -59,14 +69,14 @@ def convergence(log: Log, title: str) -> Figure:
     return figure
 
 
-def comparison(result: Result) -> Figure:
+def comparison(result: Result, title: str) -> Figure:
     """Draw how many times stiffer each direction is, and each variable between its bounds before and after."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _gains(left, result)
         _places(right, result)
-        set_title(figure, f"{result.problem.study.name}: {result.problem.machine.name}")
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 
@@ -121,7 +131,7 @@ def _places(panel: Axes, result: Result) -> None:
     panel.spines[["top", "right", "bottom"]].set_visible(False)
 
 
-def front(result: Result) -> Figure:
+def front(result: Result, title: str) -> Figure:
     """Draw every pair of objectives: all feasible designs, the front, and its knee."""
     problem, outcome = result.problem, result.log.outcome()
     feasible = outcome.objectives[outcome.violation == 0.0]
@@ -148,19 +158,19 @@ def front(result: Result) -> Figure:
             panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
             panel.set_ylim(*_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
         figure.axes[0].legend(loc="best")
-        set_title(figure, problem.study.name)
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 
 
-def tolerances(result: Result) -> Figure:
+def tolerances(result: Result, title: str) -> Figure:
     """Draw how each objective scatters over random machines within the tolerances of the best design."""
     scatters = result.robustness.scatters if result.robustness else ()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
             _histogram(panel, scatter, result.problem.machine.display)
-        set_title(figure, f"{result.problem.study.name}: under the tolerances")
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 

@@ -21,13 +21,13 @@ from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.spec.installation import command, starting
-from kinetostat.studies.optimisation.result import as_dataset
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
 from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
 from kinetostat.studies.storage import write_dataset, write_json, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import Tell, as_svg, contour_maps, curves, save
+from kinetostat.views.optimisation import designs_dataset
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.page import Markup, figure, table, whole_page
 from kinetostat.views.tables import text_table
@@ -66,7 +66,7 @@ def write_all(
         written.append(folder / f"{name}.csv")
         write_text(written[-1], _csv(rows))
     written.append(folder / "figure-6.nc")
-    write_dataset(written[-1], as_dataset(reproduction.search))
+    write_dataset(written[-1], designs_dataset(reproduction.search))
     for name, dataset in (("figure-4", reproduction.curves), ("figure-5", reproduction.maps)):
         written.append(folder / f"{name}.nc")
         write_dataset(written[-1], dataset)

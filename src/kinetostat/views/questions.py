@@ -55,6 +55,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.budget.budget.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
     "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
     "validation.comparison.Validation": "views.validation.VALIDATION",
+    "studies.optimisation.result.Result": "views.optimisation.RESULT",
     "studies.comparison.Comparison": "views.comparison.COMPARISON",
 }
 """Place of the `Description` of each class of answers."""

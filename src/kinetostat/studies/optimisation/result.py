@@ -1,34 +1,29 @@
 """The answer to a study: the best design beside the machine as it was, what holds it there, and what it costs.
 
-It is written here as plain data, as a table of all designs, and as files; what is printed or drawn of it is elsewhere.
+What is printed, drawn and written of it is elsewhere.
 """
 
 from collections import Counter
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.machine.saving import as_file
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict, Outcome, Robustness, robustness_of
-from kinetostat.studies.optimisation.log import ROWS, Log, best_feasible, front_of, knee_of
+from kinetostat.studies.optimisation.log import Log, best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.slopes import Ridge, Surveyor, at_bounds, find_ridges, ridge_sentences
-from kinetostat.studies.plain_data import plain
+from kinetostat.studies.optimisation.slopes import Ridge, Surveyor, at_bounds, find_ridges
+from kinetostat.studies.quantities import uncounted_loads
 from kinetostat.studies.sensitivity import relative_sensitivity
-from kinetostat.studies.storage import list_files, write_dataset, write_json, write_text
-from kinetostat.studies.study_folder import HISTORY, QUESTION
 
 LONGEST_MACHINE_NAME = 80
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
@@ -130,6 +125,22 @@ class Result(Immutable):
         return machine_of_design(self.problem, self.genes)
 
     @property
+    def message(self) -> str:
+        """The outcome of the search in a sentence."""
+        lacking = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in self.counts.items() if verdict)
+        if not self.solved:
+            return INFEASIBLE.format(lacking)
+        feasible = self.counts[DesignVerdict.FEASIBLE]
+        return f"{self.log.count:,} designs judged, {feasible:,} of them feasible" + (
+            f" ({lacking})." if lacking else "."
+        )
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count in the objectives and constraints; empty if all do."""
+        return uncounted_loads(state_of(self.problem.machine), self.problem.names)
+
+    @property
     def counts(self) -> dict[DesignVerdict, int]:
         """Number of designs with each verdict."""
         counts = Counter(self.log.outcome().verdict.tolist())
@@ -208,157 +219,3 @@ def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Variab
         percents = tuple(relative_sensitivity(np.array(slopes), size, np.array(levels)).tolist())
         influences.append(VariableInfluence(variable.name, slopes, percents, bounds[k]))
     return influences
-
-
-def message(result: Result) -> str:
-    """The outcome of the search in a sentence."""
-    lacking = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in result.counts.items() if verdict)
-    if not result.solved:
-        return INFEASIBLE.format(lacking)
-    return f"{result.log.count:,} designs judged, {result.counts[DesignVerdict.FEASIBLE]:,} of them feasible" + (
-        f" ({lacking})." if lacking else "."
-    )
-
-
-def as_json(result: Result) -> dict[str, Any]:
-    """A result as plain data: SI numbers, null where there is no finite one."""
-    problem = result.problem
-    settings = problem.study.optimizer
-    head = {
-        "name": problem.study.name,
-        "machine": problem.machine.name,
-        "status": "ok" if result.solved else "infeasible",
-        "message": message(result),
-        "method": problem.method,
-        "seed": settings.seed,
-        "evaluations": result.log.count,
-        "infeasible": {verdict.name.lower(): count for verdict, count in result.counts.items() if verdict},
-        "poses": {"count": problem.poses.count, "about": problem.poses.description},
-    }
-    initial = {
-        "variables": {variable.name: variable.initial for variable in problem.space.searched},
-        **_numbers_of(problem, result.initial, 0),
-    }
-    if not result.solved:
-        return plain({**head, "objective": None, "variables": {}, "initial": initial})
-    best = _numbers_of(problem, result.outcome, 0)
-    return plain(
-        {
-            **head,
-            "objective": float(result.outcome.objectives[0, 0]) if len(problem.objectives) == 1 else None,
-            "variables": variables_of(problem, result.genes),
-            **best,
-            "initial": initial,
-            "directions": [
-                {"name": item.name, "units": item.unit, "initial": item.before, "best": item.after, "gain": item.gain}
-                for item in result.directions
-            ],
-            "at_bounds": {item.name: item.bound for item in result.influences if item.bound},
-            "sensitivity": {
-                item.name: {"derivatives": list(item.slopes), "percent_per_percent": list(item.percents)}
-                for item in result.influences
-            },
-            "ridges": [
-                {"variables": list(r.names), "from": list(r.start), "to": list(r.end), "relative_change": r.change}
-                for r in result.ridges
-            ],
-            "ridges_text": ridge_sentences(result.ridges, problem) or [result.no_ridges],
-            "robustness": _scatter(result.robustness) if result.robustness else None,
-            "convergence": {
-                key: [step.get(key) for step in result.log.steps] for key in ("designs", "feasible", "best", "mean")
-            },
-            "front": front_rows(result) if len(problem.objectives) > 1 else None,
-        }
-    )
-
-
-def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
-    """The value of every field that the searched variables set, by its path, SI."""
-    columns = problem.space.columns(genes[None])
-    return {
-        field.path: float(columns[field.leaves[0]][0])
-        for variable in problem.space.searched
-        for field in variable.fields
-    }
-
-
-def front_rows(result: Result) -> list[dict[str, Any]]:
-    """The designs of a front, each with its variables, objectives and constraints."""
-    outcome = result.log.outcome(result.front)
-    return [
-        {
-            "knee": k == result.knee,
-            "variables": variables_of(result.problem, genes),
-            **_numbers_of(result.problem, outcome, k),
-        }
-        for k, genes in enumerate(result.log.genes(result.front))
-    ]
-
-
-def _numbers_of(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
-    return {
-        "objectives": {
-            item.term.label: float(value) for item, value in zip(problem.objectives, outcome.objectives[k], strict=True)
-        },
-        "constraints": {
-            item.label: float(value) for item, value in zip(problem.constraints, outcome.constraints[k], strict=True)
-        },
-        "verdict": DesignVerdict(int(outcome.verdict[k])).name.lower(),
-    }
-
-
-def _scatter(robustness: Robustness) -> dict[str, Any]:
-    return {
-        "machines": robustness.machines,
-        "corners": robustness.corners,
-        "failing": robustness.failing,
-        "objectives": {
-            item.label: {
-                "nominal": item.nominal,
-                "mean": item.mean,
-                "standard_deviation": item.deviation,
-                "percentile_95": item.usual,
-                "worst": item.worst,
-            }
-            for item in robustness.scatters
-        },
-    }
-
-
-def as_dataset(result: Result) -> xr.Dataset:
-    """Every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
-    problem, log = result.problem, result.log
-    outcome = log.outcome()
-    steps = np.repeat(np.arange(len(log.steps)), [step["designs"] for step in log.steps])
-    content: dict[str, Any] = {"step": ("design", steps, {"long_name": "step of the search"})}
-    for variable, column in zip(problem.space.searched, problem.space.values(log.genes()).T, strict=True):
-        about = {"units": variable.unit, "long_name": variable.quantity.meaning}
-        if variable.choices is not None:
-            about["choices"] = "; ".join(variable.labels)
-        content[variable.name] = ("design", column, about)
-    for kind, terms, columns in (
-        ("objective", [(o.term.label, o.term.unit) for o in problem.objectives], outcome.objectives),
-        ("constraint", [(c.label, c.term.unit) for c in problem.constraints], outcome.constraints),
-    ):
-        for k, (label, unit) in enumerate(terms):
-            content[f"{kind}_{k}"] = ("design", columns[:, k], {"units": unit, "long_name": label})
-    flags = {
-        "flag_values": [int(v) for v in DesignVerdict],
-        "flag_meanings": " ".join(v.name.lower() for v in DesignVerdict),
-    }
-    content["verdict"] = ("design", outcome.verdict, flags)
-    content["violation"] = ("design", outcome.violation, {"units": "1", "long_name": "0 where feasible"})
-    attributes = {"study": problem.study.name, "machine": problem.machine.name, "method": problem.method}
-    return xr.Dataset(content, attrs=attributes)
-
-
-def write_result(result: Result, folder: Path) -> list[Path]:
-    """Write the result, the table of all designs and the best design as a machine file; returns the paths."""
-    written = [folder / "result.json", folder / "designs.nc"]
-    write_json(written[0], as_json(result))
-    write_dataset(written[1], as_dataset(result))
-    if result.solved:
-        written.append(folder / "best.toml")
-        write_text(written[-1], as_file(result.machine))
-    list_files(folder, [*written, *(folder / name for name in (QUESTION, HISTORY, ROWS))])
-    return written

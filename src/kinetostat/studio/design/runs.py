@@ -17,12 +17,12 @@ from pathlib import Path
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import write_result
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, read_history
 from kinetostat.studio.design.state_folder import RUNS, numbered, slug
 from kinetostat.studio.processes import make_modest
+from kinetostat.views.optimisation import write_result
 
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""

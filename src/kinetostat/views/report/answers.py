@@ -13,7 +13,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.identification.record import FitRecord, RecordedFit
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import Result, message
+from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
@@ -24,8 +24,7 @@ from kinetostat.views.identification import RECORDED_FIT
 from kinetostat.views.identification_figures import FIT_CAPTIONS
 from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
 from kinetostat.views.loaded_tables import displacement_table, spring_table, stability_of, strut_table, tangent_table
-from kinetostat.views.optimisation_figures import pictures
-from kinetostat.views.optimisation_tables import (
+from kinetostat.views.optimisation import (
     aims,
     bounds_table,
     direction_table,
@@ -37,6 +36,7 @@ from kinetostat.views.optimisation_tables import (
     variable_table,
     worth_table,
 )
+from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.question import Description
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section
 from kinetostat.views.report.pictures import figure_of
@@ -176,12 +176,6 @@ METHOD_WORDS = {
     "hybrid": "a genetic algorithm, then descents with exact derivatives",
     "nsga2": "NSGA-II, a genetic algorithm for several objectives",
 }
-STUDY_CAPTIONS = {
-    "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
-    "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",
-    "front": "Designs over the objectives; on the front no design is better than another in all objectives.",
-    "tolerances": "Scatter of the objectives over machines made to the tolerances from the best design.",
-}
 
 
 def study_section(result: Result) -> Section:
@@ -219,9 +213,9 @@ def _study_question(problem: Problem) -> tuple[Block, ...]:
 def _study_search(result: Result) -> tuple[Block, ...]:
     problem, figures = result.problem, pictures(result)
     settings = problem.study.optimizer
-    about = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {message(result)}"
+    about = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {result.message}"
     shown = (name for name in ("convergence", "front") if name in figures)
-    return (Paragraph(typeset(about)), *(figure_of(figures[name](), STUDY_CAPTIONS[name]) for name in shown))
+    return (Paragraph(typeset(about)), *(figure_of(figures[name](), figures[name].caption) for name in shown))
 
 
 def _study_answer(result: Result) -> tuple[Block, ...]:
@@ -234,14 +228,14 @@ def _study_answer(result: Result) -> tuple[Block, ...]:
             f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
         ),
         as_table(direction_table(result), "Compliance before and after, at the worst of all poses."),
-        figure_of(figures["comparison"](), STUDY_CAPTIONS["comparison"]),
+        figure_of(figures["comparison"](), figures["comparison"].caption),
     ]
     if several:
         blocks.append(as_table(front_table(result), "Designs of the front."))
     if result.robustness:
         scatter = scatter_table(result.robustness, result.problem.machine.display)
         blocks.append(as_table(scatter, "Objectives under the tolerances."))
-        blocks.append(figure_of(figures["tolerances"](), STUDY_CAPTIONS["tolerances"]))
+        blocks.append(figure_of(figures["tolerances"](), figures["tolerances"].caption))
         if result.robustness.failing:
             blocks.append(Paragraph(failing(result.robustness)))
     items = tuple((typeset(line), "") for line in remarks(result))

@@ -15,7 +15,6 @@ from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranked
 from kinetostat.studies.guideline_sentences import statements
-from kinetostat.studies.optimisation.result import message
 from kinetostat.studies.report import Answers
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.drawing import three_views
@@ -57,7 +56,7 @@ def _requirements(answers: Answers) -> tuple[Block, ...]:
 
 def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
     if answers.result is not None:
-        yield " ".join([message(answers.result), *gains(answers.result)])
+        yield " ".join([answers.result.message, *gains(answers.result)])
     advice = answers.of("guidelines")
     if advice is not None:
         yield from (statement.text for statement in statements(advice) if statement.topic == "weakest")

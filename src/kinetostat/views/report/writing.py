@@ -17,7 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.optimisation.result import Result, message
+from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.report import REPORT_STEPS, Answers, Texts, gather, texts_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
@@ -107,7 +107,7 @@ def report(
     place, options = report_path(path), ReportOptions(ranges, without, engine, author, date, fit=fit)
     result = about if isinstance(about, Result) else None
     if result is not None and not result.solved:
-        raise InputError(message(result))
+        raise InputError(result.message)
     machine = about.machine if isinstance(about, Result) else about
     answers = gather(machine, ranges, without, result, progress, fit)
     if answers.analysis.status is not Status.OK:

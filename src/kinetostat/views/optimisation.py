@@ -1,21 +1,32 @@
-"""Tables of an optimisation study on a terminal: its question, and its answer beside the initial machine.
+"""An optimisation study: its question on a terminal, and the description of its answer beside the initial machine.
 
 Nothing is computed here but rounding.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+import xarray as xr
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display, number
 from kinetostat.kinetostatics.quantities import spoken
-from kinetostat.studies.optimisation.assessment import Robustness
+from kinetostat.machine.saving import as_file
+from kinetostat.studies.optimisation.assessment import DesignVerdict, Outcome, Robustness
+from kinetostat.studies.optimisation.log import ROWS
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import Result, message
+from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.slopes import ridge_sentences
+from kinetostat.studies.storage import list_files
+from kinetostat.studies.study_folder import HISTORY, QUESTION
+from kinetostat.views.answers import write_files
+from kinetostat.views.question import LOADS_LEFT_OUT, MESSAGE, Description, Field, Lines
 from kinetostat.views.tables import numeric_table
 
 
@@ -66,25 +77,6 @@ LEAST_PERCENT = 1e-4
 """Percent per percent below which a 0 is printed."""
 LEAST_STIFFNESS_LEFT = 0.01
 """Stiffness that is left, as a share, below which the loss is pointed out."""
-
-
-def print_result(console: Console, result: Result) -> None:
-    """Print all tables of a solved study."""
-    problem = result.problem
-    console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
-    evaluated = f"Evaluated at {problem.poses.description}; method {problem.method}."
-    console.print(f"{message(result)} {evaluated}", highlight=False)
-    if len(problem.objectives) > 1:
-        console.print(front_table(result))
-    console.print(worth_table(result))
-    console.print(variable_table(result))
-    console.print(direction_table(result))
-    if result.robustness:
-        console.print(scatter_table(result.robustness, problem.machine.display))
-        if result.robustness.failing:
-            console.print(failing(result.robustness), highlight=False)
-    for line in remarks(result):
-        console.print(line, highlight=False)
 
 
 def worth_table(result: Result) -> Table:
@@ -223,3 +215,207 @@ def _percent_text(value: float) -> str:
     if math.isnan(value):
         return "–"
     return "0" if abs(value) < LEAST_PERCENT else f"{value:.3g}"
+
+
+def _lines(result: Result) -> Lines:
+    yield "Search", result.message
+    yield "Poses", f"Evaluated at {result.problem.poses.description}; method {result.problem.method}."
+
+
+def _tables(result: Result, _full: bool) -> Iterator[Table | str]:
+    if not result.solved:
+        return
+    if len(result.problem.objectives) > 1:
+        yield front_table(result)
+    yield from (worth_table(result), variable_table(result), direction_table(result))
+    if result.robustness:
+        yield scatter_table(result.robustness, result.problem.machine.display)
+        if result.robustness.failing:
+            yield failing(result.robustness)
+    yield from remarks(result)
+
+
+def _of_solved(take: Callable[[Result], Any]) -> Callable[[Result], Any]:
+    """Return what takes a value from a study with a solution, and nothing from another."""
+    return lambda result: take(result) if result.solved else None
+
+
+def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
+    """The value of every field that the searched variables set, by its path, SI."""
+    columns = problem.space.columns(genes[None])
+    return {
+        field.path: float(columns[field.leaves[0]][0])
+        for variable in problem.space.searched
+        for field in variable.fields
+    }
+
+
+def _numbers_of(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
+    """Objectives, constraints and verdict of one design of an outcome."""
+    objectives = zip(problem.objectives, outcome.objectives[k].tolist(), strict=True)
+    constraints = zip(problem.constraints, outcome.constraints[k].tolist(), strict=True)
+    return {
+        "objectives": {objective.term.label: value for objective, value in objectives},
+        "constraints": {constraint.label: value for constraint, value in constraints},
+        "verdict": DesignVerdict(int(outcome.verdict[k])).name.lower(),
+    }
+
+
+def _best(key: str) -> Field:
+    """A field of the best design that `_numbers_of` gives."""
+    return Field(key, _of_solved(lambda result: _numbers_of(result.problem, result.outcome, 0)[key]), optional=True)
+
+
+def _objective(result: Result) -> float | None:
+    single = result.solved and len(result.problem.objectives) == 1
+    return float(result.outcome.objectives[0, 0]) if single else None
+
+
+def _initial(result: Result) -> dict[str, Any]:
+    variables = {variable.name: variable.initial for variable in result.problem.space.searched}
+    return {"variables": variables, **_numbers_of(result.problem, result.initial, 0)}
+
+
+def _directions(result: Result) -> list[dict[str, Any]]:
+    return [
+        {"name": item.name, "units": item.unit, "initial": item.before, "best": item.after, "gain": item.gain}
+        for item in result.directions
+    ]
+
+
+def _sensitivity(result: Result) -> dict[str, Any]:
+    return {
+        item.name: {"derivatives": list(item.slopes), "percent_per_percent": list(item.percents)}
+        for item in result.influences
+    }
+
+
+def _ridges(result: Result) -> list[dict[str, Any]]:
+    return [
+        {"variables": list(r.names), "from": list(r.start), "to": list(r.end), "relative_change": r.change}
+        for r in result.ridges
+    ]
+
+
+def _scatter(result: Result) -> dict[str, Any] | None:
+    robustness = result.robustness
+    if robustness is None:
+        return None
+    objectives = {
+        item.label: {
+            "nominal": item.nominal,
+            "mean": item.mean,
+            "standard_deviation": item.deviation,
+            "percentile_95": item.usual,
+            "worst": item.worst,
+        }
+        for item in robustness.scatters
+    }
+    counts = {"machines": robustness.machines, "corners": robustness.corners, "failing": robustness.failing}
+    return {**counts, "objectives": objectives}
+
+
+def _convergence(result: Result) -> dict[str, Any]:
+    keys = ("designs", "feasible", "best", "mean")
+    return {key: [step.get(key) for step in result.log.steps] for key in keys}
+
+
+def _front(result: Result) -> list[dict[str, Any]] | None:
+    """The designs of a front, each with its variables, objectives and constraints; None of a single objective."""
+    if not result.solved or len(result.problem.objectives) == 1:
+        return None
+    outcome = result.log.outcome(result.front)
+    return [
+        {
+            "knee": k == result.knee,
+            "variables": variables_of(result.problem, genes),
+            **_numbers_of(result.problem, outcome, k),
+        }
+        for k, genes in enumerate(result.log.genes(result.front))
+    ]
+
+
+def designs_dataset(result: Result) -> xr.Dataset:
+    """Every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
+    problem, log = result.problem, result.log
+    outcome = log.outcome()
+    steps = np.repeat(np.arange(len(log.steps)), [step["designs"] for step in log.steps])
+    content: dict[str, Any] = {"step": ("design", steps, {"long_name": "step of the search"})}
+    for variable, column in zip(problem.space.searched, problem.space.values(log.genes()).T, strict=True):
+        about = {"units": variable.unit, "long_name": variable.quantity.meaning}
+        if variable.choices is not None:
+            about["choices"] = "; ".join(variable.labels)
+        content[variable.name] = ("design", column, about)
+    for kind, terms, columns in (
+        ("objective", [(o.term.label, o.term.unit) for o in problem.objectives], outcome.objectives),
+        ("constraint", [(c.label, c.term.unit) for c in problem.constraints], outcome.constraints),
+    ):
+        for k, (label, unit) in enumerate(terms):
+            content[f"{kind}_{k}"] = ("design", columns[:, k], {"units": unit, "long_name": label})
+    flags = {
+        "flag_values": [int(v) for v in DesignVerdict],
+        "flag_meanings": " ".join(v.name.lower() for v in DesignVerdict),
+    }
+    content["verdict"] = ("design", outcome.verdict, flags)
+    content["violation"] = ("design", outcome.violation, {"units": "1", "long_name": "0 where feasible"})
+    attributes = {"study": problem.study.name, "machine": problem.machine.name, "method": problem.method}
+    return xr.Dataset(content, attrs=attributes)
+
+
+RESULT = Description(
+    type="studies.optimisation.result.Result",
+    title="Design study",
+    fields=(
+        Field("name", "problem.study.name"),
+        Field("machine", "problem.machine.name"),
+        Field("status", lambda result: "ok" if result.solved else "infeasible"),
+        MESSAGE,
+        LOADS_LEFT_OUT,
+        Field("method", "problem.method"),
+        Field("seed", "problem.study.optimizer.seed"),
+        Field("evaluations", "log.count"),
+        Field("infeasible", lambda result: {v.name.lower(): count for v, count in result.counts.items() if v}),
+        Field("poses", lambda result: {"count": result.problem.poses.count, "about": result.problem.poses.description}),
+        Field("objective", _objective),
+        Field("variables", lambda result: variables_of(result.problem, result.genes) if result.solved else {}),
+        _best("objectives"),
+        _best("constraints"),
+        _best("verdict"),
+        Field("initial", _initial),
+        Field("directions", _of_solved(_directions), optional=True),
+        Field(
+            "at_bounds",
+            _of_solved(lambda result: {item.name: item.bound for item in result.influences if item.bound}),
+            optional=True,
+        ),
+        Field("sensitivity", _of_solved(_sensitivity), optional=True),
+        Field("ridges", _of_solved(_ridges), optional=True),
+        Field(
+            "ridges_text",
+            _of_solved(lambda result: ridge_sentences(result.ridges, result.problem) or [result.no_ridges]),
+            optional=True,
+        ),
+        Field("robustness", _scatter),
+        Field("convergence", _of_solved(_convergence), optional=True),
+        Field("front", _front),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.optimisation_figures.pictures",
+    makers={"nc": designs_dataset},
+    machine="problem.machine",
+    state=lambda result: result.problem.study.name,
+    answered=lambda result: result.solved,
+    files={
+        "result.json": "json",
+        "designs.nc": "nc",
+        "best.toml": lambda result: as_file(result.machine) if result.solved else None,
+    },
+)
+
+
+def write_result(result: Result, folder: Path) -> list[Path]:
+    """Write the files of a result without figures, and list them with those of the search; return their paths."""
+    written = write_files(RESULT, result, folder)
+    list_files(folder, [*written, *(folder / name for name in (QUESTION, HISTORY, ROWS))])
+    return written
