@@ -86,7 +86,7 @@ def judge(path: Path, exact: Answer, length: float) -> Verdict:
     joints = solve_joints(machine)
     # Mobility at other poses is not compared and takes most of the time of an analysis.
     with (
-        patch("kinetostat.equilibrium.state.solve_joints", return_value=joints),
+        patch("kinetostat.kinematics.closure.solve_joints", return_value=joints),
         patch("kinetostat.equilibrium.state._nearby", return_value=[]),
     ):
         analysis = analyze(machine)

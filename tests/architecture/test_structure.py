@@ -9,6 +9,7 @@ from source import PACKAGE, ROOT, imports, modules, wrong_in
 
 LAYERS = [
     "frozen",
+    "late",
     "arrays",
     "tolerances",
     "units",
@@ -104,6 +105,31 @@ def test_an_analysis_starts_without_heavy_libraries():
     code = f"import {', '.join(LIGHT)}, sys; print([m for m in sys.modules if m.split('.')[0] in {HEAVY}])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+UNCALLED = [
+    "engine",
+    "vibration",
+    "accuracy",
+    "validation",
+    "exchange",
+    "studio",
+    "equilibrium.solving",
+    "machine.written.family",
+]
+"""Rooms and files that the analysis of a free machine of a family never calls."""
+
+
+def test_an_analysis_imports_what_it_calls():
+    """Each module costs as much as a hundredth of an analysis: see `late`."""
+    code = (
+        "import sys; from kinetostat.cli import main; main(['analyze', 'hexapod']); "
+        "print('imported:', *(m.removeprefix('kinetostat.') for m in sys.modules if m.startswith('kinetostat.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    imported = done.stdout.rpartition("imported:")[2].split()
+    assert "equilibrium.state" in imported
+    assert not [name for name in imported for part in UNCALLED if f"{name}.".startswith(f"{part}.")]
 
 
 def test_frozen_classes_are_compiled_late():

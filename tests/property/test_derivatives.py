@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from kinetostat.engine import derivatives
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import PointTable
-from kinetostat.kinematics.closing import closing_equations
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closing import Joints, closing_equations
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load

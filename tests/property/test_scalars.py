@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closing import Joints
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values

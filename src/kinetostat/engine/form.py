@@ -16,8 +16,8 @@ from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import closing_equations
-from kinetostat.kinematics.closure import CLOSED_FORMS, Joints
+from kinetostat.kinematics.closing import Joints, closing_equations
+from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond

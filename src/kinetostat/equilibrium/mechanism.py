@@ -19,7 +19,7 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import ElasticLeg, Given, Masses, Units, Weight, elastic_leg
 from kinetostat.equilibrium.drives import with_drives
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Configuration, Machine

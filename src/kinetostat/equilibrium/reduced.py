@@ -24,7 +24,7 @@ from kinetostat.equilibrium.numbers import borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.equilibrium.state import HELD_BY_LOADS
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring

@@ -8,27 +8,22 @@ answers solve for the same joints. What is not about a pose, and what an answer 
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from random import Random
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinetostat.algebra.scalar import total
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.actuation import with_tensions
-from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.limit import LoadLimit, limit_of
-from kinetostat.equilibrium.links import Strut, struts
-from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.tangent import Stability, stability
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.kinetostatics.refusal import known_mobility, why_not
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.late import LateModule
 from kinetostat.machine.column import Column, stacked
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.links import growth_of
@@ -38,6 +33,26 @@ from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
+
+if TYPE_CHECKING:
+    from kinetostat.equilibrium import actuation, balance, links, solving, tangent
+    from kinetostat.equilibrium import limit as load_limit
+    from kinetostat.equilibrium import mechanism as mechanisms
+    from kinetostat.equilibrium.balance import Balance
+    from kinetostat.equilibrium.limit import LoadLimit
+    from kinetostat.equilibrium.links import Strut
+    from kinetostat.equilibrium.mechanism import Mechanism
+    from kinetostat.equilibrium.tangent import Stability
+    from kinetostat.kinematics import closure
+else:
+    actuation = LateModule("kinetostat.equilibrium.actuation")
+    balance = LateModule("kinetostat.equilibrium.balance")
+    load_limit = LateModule("kinetostat.equilibrium.limit")
+    links = LateModule("kinetostat.equilibrium.links")
+    mechanisms = LateModule("kinetostat.equilibrium.mechanism")
+    solving = LateModule("kinetostat.equilibrium.solving")
+    tangent = LateModule("kinetostat.equilibrium.tangent")
+    closure = LateModule("kinetostat.kinematics.closure")
 
 HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
 """Statuses without loads at which a machine may come to rest: tension and weight hold where springs do not."""
@@ -78,7 +93,7 @@ class MachineState(Immutable):
     @cached_property
     def joints(self) -> Joints | None:
         """Joint coordinates that close the legs; None of a family that places its legs in closed form."""
-        return solve_joints(self.machine) if self.machine.family.chains else None
+        return closure.solve_joints(self.machine) if self.machine.family.chains else None
 
     @cached_property
     def configuration(self) -> Configuration:
@@ -138,17 +153,19 @@ class MachineState(Immutable):
         return "" if self.machine.loaded else loads_left_out(self.machine, self.configuration)
 
     @cached_property
-    def relaxed(self) -> Balance:
+    def relaxed(self) -> "Balance":
         """The equations of the free state, without loads and preloads."""
-        mechanism = with_share(mechanism_of(self.machine, self.configuration, self.joints, self.count), 0.0)
-        return balance(mechanism, free_state(mechanism))
+        mechanism = solving.with_share(
+            mechanisms.mechanism_of(self.machine, self.configuration, self.joints, self.count), 0.0
+        )
+        return balance.balance(mechanism, balance.free_state(mechanism))
 
     @cached_property
-    def _loads(self) -> tuple[Mechanism, Mask]:
+    def _loads(self) -> "tuple[Mechanism, Mask]":
         return _loaded_mechanism(self.machine, self.configuration, self.joints, self.count)
 
     @property
-    def mechanism(self) -> Mechanism:
+    def mechanism(self) -> "Mechanism":
         """The machine with all its loads and the tensions that its file leaves open, as rows of screw motions.
 
         Raises:
@@ -162,7 +179,7 @@ class MachineState(Immutable):
         return self._loads[1]
 
     @cached_property
-    def at_rest(self) -> Balance | None:
+    def at_rest(self) -> "Balance | None":
         """The equations where the machine is at rest under its loads at a single pose, stable or not.
 
         None where the machine has no place, where rigid parts leave undecided what carries a load, or where it comes to
@@ -173,13 +190,13 @@ class MachineState(Immutable):
         """
         if int(self.free.status) in PLACELESS or self.free.undecided or not self.balanced[0]:
             return None
-        solution = at_rest(self.mechanism)
+        solution = solving.at_rest(self.mechanism)
         return solution.balance if solution.settled[0] else None
 
     @cached_property
-    def stability(self) -> Stability | None:
+    def stability(self) -> "Stability | None":
         """Whether the machine stays where it is at rest, and how far its loads may grow; None without a rest."""
-        return None if self.at_rest is None else stability(self.at_rest)
+        return None if self.at_rest is None else tangent.stability(self.at_rest)
 
     @property
     def stands(self) -> bool:
@@ -187,25 +204,25 @@ class MachineState(Immutable):
         return self.stability is not None and self.stability.stable
 
     @property
-    def equations(self) -> Balance | None:
+    def equations(self) -> "Balance | None":
         """The equations in the state that is meant, at a single pose; None where it comes to no stable rest."""
         if not self.machine.loaded:
             return self.relaxed
         return self.at_rest if self.stands else None
 
     @cached_property
-    def limit(self) -> LoadLimit | None:
+    def limit(self) -> "LoadLimit | None":
         """The state in which the machine stands last while its loads grow, up to all of them; None if it never does."""
-        return limit_of(self.mechanism)
+        return load_limit.limit_of(self.mechanism)
 
     @cached_property
-    def struts(self) -> tuple[Strut, ...]:
+    def struts(self) -> "tuple[Strut, ...]":
         """The struts whose E I is known, with what presses them at rest; none without a rest."""
         if self.at_rest is None:
             return ()
         configuration, joints = self.configuration, None if self.joints is None else self.joints.coordinates
         members = located_members(self.machine, configuration, joints)
-        return tuple(struts(configuration.legs, members, self.free.reference, self.at_rest))
+        return tuple(links.struts(configuration.legs, members, self.free.reference, self.at_rest))
 
     @cached_property
     def actuator_loads(self) -> list[tuple[Spring, float]]:
@@ -240,13 +257,13 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
     """
     kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
     reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
-    here, rng = values(machine), np.random.default_rng(0)
-    poses = [{path: here[path] + r * float(rng.uniform(-1, 1)) for path, r in reach.items()} for _ in range(3)]
+    here, rng = values(machine), Random(0)
+    poses = [{path: here[path] + r * rng.uniform(-1.0, 1.0) for path, r in reach.items()} for _ in range(3)]
     answers = [respond(with_values(machine, pose)) for pose in poses]
     return [answer.configuration for answer in answers if Status(int(answer.status)) is Status.OK]
 
 
-def actuator_loads_at_rest(equations: Balance) -> list[tuple[Spring, Array]]:
+def actuator_loads_at_rest(equations: "Balance") -> list[tuple[Spring, Array]]:
     """Return every actuator with the size of what it carries in a state, N or N·m [n]."""
     mechanism = equations.mechanism
     holding = total([terms.holding for terms in equations.legs])
@@ -256,7 +273,7 @@ def actuator_loads_at_rest(equations: Balance) -> list[tuple[Spring, Array]]:
 
 def _loaded_mechanism(
     machine: Machine, configuration: Configuration, joints: Joints | None, count: int = 1
-) -> tuple[Mechanism, Mask]:
+) -> "tuple[Mechanism, Mask]":
     """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
 
     Returns:
@@ -265,7 +282,7 @@ def _loaded_mechanism(
     Raises:
         InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
-    mechanism = mechanism_of(machine, configuration, joints, count)
+    mechanism = mechanisms.mechanism_of(machine, configuration, joints, count)
     check_loads(machine, count, mechanism.weighs)
     load = machine.tables["load"]
     least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
@@ -283,7 +300,7 @@ def _loaded_mechanism(
             f"{machine.name}: load.min_tension and load.max_tension bound what only pulls or only pushes, which no "
             'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
         )
-    return with_tensions(mechanism, least / mechanism.force, most / mechanism.force)
+    return actuation.with_tensions(mechanism, least / mechanism.force, most / mechanism.force)
 
 
 def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:

@@ -26,7 +26,7 @@ from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram

@@ -9,6 +9,7 @@ placements are in the base frame.
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import isnan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,31 @@ from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
-from kinetostat.machine.written.family import place
+
+if TYPE_CHECKING:
+    from kinetostat.machine.written import family
+else:
+    family = LateModule("kinetostat.machine.written.family")
 
 POINT, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint coordinates that have been solved for.
+
+    Attributes:
+        coordinates: one scalar per joint coordinate, leg by leg, rad or m from the home pose; closed forms over any
+            scalar give turns instead of angles.
+        status: `Status` code: OK, OUT_OF_REACH, SINGULAR or NOT_CONVERGED.
+    """
+
+    coordinates: tuple[Scalar | Turn, ...]
+    status: Scalar
 
 
 def clearance(closure: Closure) -> Scalar:
@@ -94,7 +114,7 @@ def leg_ends(chains: Chains, coordinates: Sequence[Scalar]) -> list[LegEnd]:
 
 def leg_end(steps: Sequence[Step], home: Displacement, coordinates: Iterator[Scalar | Turn]) -> LegEnd:
     """Follow one leg from base to platform, and take its coordinates, rad (or turns) or m from the home pose."""
-    chain, motion = place([step for step in steps if step.moves], coordinates)
+    chain, motion = family.place([step for step in steps if step.moves], coordinates)
     return LegEnd(motion @ home, tuple(element.mover for element in chain))  # type: ignore[attr-defined]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
+from kinetostat.kinematics.closing import Joints, clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
 from kinetostat.kinematics.posture import nearest_home
@@ -22,20 +22,6 @@ from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import CLOSED
-
-
-@dataclass(frozen=True)
-class Joints:
-    """Joint coordinates that have been solved for.
-
-    Attributes:
-        coordinates: one scalar per joint coordinate, leg by leg, rad or m from the home pose; closed forms over any
-            scalar give turns instead of angles.
-        status: `Status` code: OK, OUT_OF_REACH, SINGULAR or NOT_CONVERGED.
-    """
-
-    coordinates: tuple[Scalar | Turn, ...]
-    status: Scalar
 
 
 @dataclass(frozen=True)

@@ -11,22 +11,27 @@ Source: theory section 6, (19) for legs that close. In the base frame.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import ANGLES, gaps_at, leg_ends, pose_of, squared_distance, units_of
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closing import ANGLES, Joints, gaps_at, leg_ends, pose_of, squared_distance, units_of
 from kinetostat.kinematics.status import Status
+from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.column import column, stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.numerics.iteration import least_squares
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
+
+if TYPE_CHECKING:
+    from kinetostat.kinematics import closure
+else:
+    closure = LateModule("kinetostat.kinematics.closure")
 
 MOST_DAMPED_STEPS = 60
 """Number of steps of damped least squares: a start that has not arrived by then is in no solution's reach."""
@@ -179,7 +184,7 @@ class LegByLeg:
         places = [actuator.place for actuator in self.driven]
         self.free = np.array([i for i in range(self.chains.size) if i not in places], dtype=int)
         self.units = units_of(self.chains, np.array([self.length]))[0][self.free]
-        joints = solve_joints(machine)
+        joints = closure.solve_joints(machine)
         closes = int(joints.status) in (Status.OK, Status.SINGULAR)
         self.joints = np.array(joints.coordinates if closes else [0.0] * self.chains.size, dtype=float)
         self.actuators: Sequence[Actuator] = [actuator.at(self.joints.tolist()) for actuator in self.driven]
@@ -220,7 +225,7 @@ class LegByLeg:
     def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array) -> list[bool]:
         """See `System` [actuators]."""
         columns = {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in self.chains.pose}
-        there = solve_joints(with_values(self.machine, columns))
+        there = closure.solve_joints(with_values(self.machine, columns))
         amounts = [actuator.at(there.coordinates).coordinate for actuator in self.driven]
         off = goal - stacked(amounts, len(poses))
         off = np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
@@ -252,7 +257,7 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
     """
     if machine.family.chains is None:
         return actuators_of(machine.configure())
-    at = (joints or solve_joints(machine)).coordinates
+    at = (joints or closure.solve_joints(machine)).coordinates
     return [actuator.at(at) for actuator in joint_actuators(machine.chains(), leg_names(machine))]
 
 

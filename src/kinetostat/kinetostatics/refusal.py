@@ -5,16 +5,22 @@ Source of what it puts into words: theory sections 2 and 9, and (24)-(27) for wh
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from kinetostat.kinematics.closing import why_out_of_reach
 from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Mobility, SortOfPose, describe, mobility, why_singular
-from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
+from kinetostat.late import LateModule
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.tolerances import SINGULAR
+
+if TYPE_CHECKING:
+    from kinetostat.kinematics import nearest
+else:
+    nearest = LateModule("kinetostat.kinematics.nearest")
 
 
 def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration]) -> str:
@@ -77,7 +83,7 @@ def _lacks_actuators(configuration: Configuration, motion: Mobility) -> str:
 
 
 def _off_constraint(machine: Machine) -> str:
-    near = nearest_pose(machine)
+    near = nearest.nearest_pose(machine)
     shown = ", ".join(f"{name} {value:.5g} {'m' if name in 'xyz' else 'rad'}" for name, value in near.items())
     return (
         "The legs cannot close at this pose on the branch of the home pose; the nearest admissible pose is "

@@ -7,24 +7,29 @@ Source: theory sections 2 to 9, in their order; loads of actuators, theory (29).
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import within_reach
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closing import Joints, within_reach
 from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
+from kinetostat.late import LateModule
 from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
 from kinetostat.machine.limits import limits_loads
 from kinetostat.machine.loads import load_on_platform, moving_mass
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.tolerances import SINGULAR
+
+if TYPE_CHECKING:
+    from kinetostat.kinematics import closure
+else:
+    closure = LateModule("kinetostat.kinematics.closure")
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ def respond(machine: Machine, joints: Joints | None = None, configuration: Confi
         configuration: where everything is then, if known.
     """
     if joints is None:
-        joints = solve_joints(machine) if machine.family.chains else CLOSED_FORM
+        joints = closure.solve_joints(machine) if machine.family.chains else CLOSED_FORM
     configuration = configuration or machine.configure(joints.coordinates)
     reference, guide, legs, statics = _statics(machine, configuration)
     singularity_margin: Scalar = 1.0

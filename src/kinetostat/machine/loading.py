@@ -9,11 +9,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinetostat.display import ENGINEERING, Display, read_display
+from kinetostat.late import LateModule
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.cross_section import resolve
@@ -25,9 +25,6 @@ from kinetostat.machine.orientation import form_of, make_room, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
-from kinetostat.machine.written import family as written
-from kinetostat.machine.written.checking import check_numbers, complete_plan
-from kinetostat.machine.written.document import by_name, check_paths, separate, with_parts
 from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
@@ -41,6 +38,15 @@ from kinetostat.spec.tolerance_table import take_tolerances, tolerance_lines
 from kinetostat.spec.validation import SCHEMA_VERSION, validated_tables
 from kinetostat.units import UnitError
 
+if TYPE_CHECKING:
+    from kinetostat.machine.written import checking
+    from kinetostat.machine.written import document as legs_of_file
+    from kinetostat.machine.written import family as written
+else:
+    checking = LateModule("kinetostat.machine.written.checking")
+    legs_of_file = LateModule("kinetostat.machine.written.document")
+    written = LateModule("kinetostat.machine.written.family")
+
 SUFFIX = ".toml"
 STUDY = (
     "is a study, but this command takes a machine; name the machine that the study gives as machine = ..., or use "
@@ -53,9 +59,8 @@ STUDY = (
 @cache
 def bundled() -> dict[str, str]:
     """The text of every bundled machine file by name, in alphabetical order."""
-    known_families = (resources.files("kinetostat.machine") / "bundled").iterdir()
-    files = sorted((f for f in known_families if f.name.endswith(SUFFIX)), key=lambda f: f.name)
-    return FixedDict({f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files})
+    files = sorted(Path(__file__).with_name("bundled").glob(f"*{SUFFIX}"), key=lambda file: file.name)
+    return FixedDict({file.stem: file.read_text(encoding="utf-8") for file in files})
 
 
 @checked
@@ -151,15 +156,15 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
     """A machine written leg by leg."""
-    named = by_name(document, origin)
-    check_paths(named, settings)
+    named = legs_of_file.by_name(document, origin)
+    legs_of_file.check_paths(named, settings)
     coordinates = PLANAR_POSE if named.get("space") == "planar" else SPATIAL_POSE
-    changed = with_parts(_with_overrides(named, settings, {}, coordinates, origin), origin)
+    changed = legs_of_file.with_parts(_with_overrides(named, settings, {}, coordinates, origin), origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
-    plan, numbers = separate(changed, origin)
+    plan, numbers = legs_of_file.separate(changed, origin)
     machine = _validated_machine(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin, display)
-    check_numbers(plan, machine.tables, origin)
-    family = family_with_loads(written.family_of(complete_plan(plan, machine.family_tables)), numbers, origin)
+    checking.check_numbers(plan, machine.tables, origin)
+    family = family_with_loads(written.family_of(checking.complete_plan(plan, machine.family_tables)), numbers, origin)
     whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, stand, system_of, undriven
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond

@@ -18,8 +18,7 @@ from kinetostat.equilibrium.actuation import commanded_state
 from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, states_at
 from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import pose_of
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints, pose_of
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of

@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.algebra.vector import AXES, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn
 from kinetostat.machine.loads import located_members

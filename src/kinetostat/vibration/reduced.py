@@ -22,7 +22,7 @@ from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import PLATFORM, moving_masses

@@ -7,35 +7,43 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from kinetostat.equilibrium.solving import Rest
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinematics.status import Status
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, shown, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import AXES, Analysis, analyze
 from kinetostat.studies.indices import indices_json
-from kinetostat.studies.plain_data import stiffness_of_spring
-from kinetostat.studies.requirements import requirements
 from kinetostat.studies.setting import pose_of
-from kinetostat.studies.under_load import LoadedState, under_load
 from kinetostat.views import analysis_tables as free
-from kinetostat.views import loaded_tables as loaded
 from kinetostat.views.first_lines import first_lines
 from kinetostat.views.forward import actuator_coordinates
 from kinetostat.views.question import MESSAGE, NAME, STATUS, Description, Field, Lines, Option, Question, Records
+
+if TYPE_CHECKING:
+    from kinetostat.equilibrium import solving
+    from kinetostat.studies import plain_data, requirements, under_load
+    from kinetostat.studies.under_load import LoadedState
+    from kinetostat.views import loaded_tables as loaded
+else:
+    solving = LateModule("kinetostat.equilibrium.solving")
+    plain_data = LateModule("kinetostat.studies.plain_data")
+    requirements = LateModule("kinetostat.studies.requirements")
+    under_load = LateModule("kinetostat.studies.under_load")
+    loaded = LateModule("kinetostat.views.loaded_tables")
 
 INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
 
 
 def analyze_in_state(
     machine: Machine, axes: str = "base", along: Sequence[Sequence[float]] = ()
-) -> Analysis | LoadedState:
+) -> "Analysis | LoadedState":
     """Analyse a machine in the state that is meant, and judge the requirements of its file.
 
     Args:
@@ -47,7 +55,7 @@ def analyze_in_state(
         InputError: axes or directions of a machine that is meant under its loads.
     """
     state = state_of(machine)
-    verdicts = requirements(state) if machine.requirements else ()
+    verdicts = requirements.requirements(state) if machine.requirements else ()
     if not machine.loaded:
         analysis = analyze(state, axes)
         directions = tuple(map(analysis.along, along)) if analysis.status is Status.OK else ()
@@ -57,7 +65,7 @@ def analyze_in_state(
             '--loaded or state = "loaded" in [load] gives results in base axes only; leave '
             "--along and --axes out, or add --set load.state=free."
         )
-    return replace(under_load(state), requirements=verdicts)
+    return replace(under_load.under_load(state), requirements=verdicts)
 
 
 def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
@@ -84,13 +92,13 @@ def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
         yield free.eigenscrew_table(analysis.indices.eigenscrews, analysis.machine.reference, display)
 
 
-def _loaded_lines(state: LoadedState) -> Lines:
+def _loaded_lines(state: "LoadedState") -> Lines:
     yield "Pose", f"{pose_of(state.machine)}. {state.message}"
     if state.displacement:
         yield "Stability", loaded.stability_of(state)
 
 
-def _loaded_parts(state: LoadedState, _full: bool) -> Iterator[Table | str]:
+def _loaded_parts(state: "LoadedState", _full: bool) -> Iterator[Table | str]:
     if not state.displacement:
         return
     display = state.machine.display
@@ -146,7 +154,10 @@ def _mobility(mobility: Mobility | None) -> dict[str, Any] | None:
 
 
 def _attribution(analysis: Analysis) -> list[dict[str, Any]]:
-    return [{**vars(spring), "stiffness": stiffness_of_spring(spring.stiffness)} for spring in analysis.attribution]
+    return [
+        {**vars(spring), "stiffness": plain_data.stiffness_of_spring(spring.stiffness)}
+        for spring in analysis.attribution
+    ]
 
 
 ANALYSIS = Description(
@@ -231,7 +242,9 @@ LOADED = Description(
     figures="views.loaded_figures.loaded_figures",
     state=lambda state: f"under load: {state.rest.word}",
     answered=lambda state: bool(state.displacement),
-    kept=lambda state: state.rest is not Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements),
+    kept=lambda state: (
+        state.rest is not solving.Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements)
+    ),
 )
 ANALYZE = Question(
     example='kinetostat analyze mine.toml --set pose.x="5 mm" --json',

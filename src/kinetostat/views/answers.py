@@ -11,15 +11,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
 from kinetostat.views.question import Description, late
 from kinetostat.views.questions import ANSWERS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
+
+    from kinetostat.studies import storage
+else:
+    storage = LateModule("kinetostat.studies.storage")
 
 
 @dataclass(frozen=True)
@@ -171,7 +175,7 @@ def write_form(description: Description, answer: object, form: str, path: Path) 
     maker = description.makers.get(form)
     content = late(maker)(answer) if maker else late(f"views.data_forms.{FORMS[form]}")(description, answer)
     if form == "json":
-        write_json(path, content)
+        storage.write_json(path, content)
     else:
         write_content(content, path)
 
@@ -193,8 +197,8 @@ def write_files(description: Description, answer: object, folder: Path) -> list[
 def write_content(content: Any, path: Path) -> None:
     """Write a text, bytes, plain data or a dataset."""
     kinds: tuple[tuple[type, Callable[[Path, Any], None]], ...] = (
-        (str, write_text),
-        (bytes, write_bytes),
-        (dict, write_json),
+        (str, storage.write_text),
+        (bytes, storage.write_bytes),
+        (dict, storage.write_json),
     )
-    next((write for kind, write in kinds if isinstance(content, kind)), write_dataset)(path, content)
+    next((write for kind, write in kinds if isinstance(content, kind)), storage.write_dataset)(path, content)

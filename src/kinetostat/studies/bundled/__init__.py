@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
 from kinetostat.machine.loading import bundled
@@ -17,9 +16,8 @@ SIMPLEST = "zhang-gosselin-2002"
 @cache
 def bundled_studies() -> dict[str, str]:
     """The text of every bundled study file by name, in alphabetical order."""
-    entries = resources.files("kinetostat.studies.bundled").iterdir()
-    files = sorted((f for f in entries if f.name.endswith(SUFFIX)), key=lambda f: f.name)
-    return FixedDict({f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files})
+    files = sorted(Path(__file__).parent.glob(f"*{SUFFIX}"), key=lambda file: file.name)
+    return FixedDict({file.stem: file.read_text(encoding="utf-8") for file in files})
 
 
 def is_study(name: str) -> bool:
