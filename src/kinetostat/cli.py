@@ -199,13 +199,13 @@ def _version_or_help(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from kinetostat.machine.loading import bundled, load
-    from kinetostat.studies.bundled import bundled_studies, study_of
+    from kinetostat.machine.loading import bundled
+    from kinetostat.spec.document import head
+    from kinetostat.studies.bundled import bundled_studies
     from kinetostat.views.tables import print_machines, print_studies, terminal
 
-    names = list(bundled())
-    print_machines(terminal(), [load(name) for name in names], names)
-    print_studies(terminal(), {name: study_of(name) for name in bundled_studies()})
+    print_machines(terminal(), {name: head(text, name) for name, text in bundled().items()})
+    print_studies(terminal(), {name: head(text, name) for name, text in bundled_studies().items()})
     return DONE
 
 

@@ -15,6 +15,7 @@ from kinetostat.commands import common
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER, STOPPED
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
+from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.views import analysis
 
 MACHINE = "zhang-gosselin-4dof"
@@ -236,6 +237,24 @@ def test_help_imports_no_heavy_library():
         assert f"'{heavy}'" not in loaded
 
 
+def test_the_list_says_what_the_files_say(capsys):
+    """It reads no more than the top of each file, and takes nothing for granted of the rest."""
+    main(["list"])
+    printed = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    machines = {name: load(name) for name in bundled()}
+    for name, machine in machines.items():
+        assert f"{name} {machine.name} {machine.family.name}" in printed
+    for name in bundled_studies():
+        study = study_of(name)
+        assert f"{name} {study.name} {study.machine}" in printed
+
+
+def test_the_list_reads_no_file_as_a_whole():
+    script = "import sys, kinetostat.cli\nkinetostat.cli.main(['list'])\nprint('LOADED', *sys.modules)\n"
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert not {"pydantic", "kinetostat.spec.study", "kinetostat.kinematics"} & {*output.split("LOADED")[1].split()}
+
+
 def test_the_package_runs_as_the_command(capsys):
     main(["--version"])
     ran = subprocess.run([sys.executable, "-m", "kinetostat", "--version"], capture_output=True, text=True, check=True)
@@ -251,7 +270,7 @@ def test_one_pose_needs_no_compiler_and_no_datasets(command):
     )
     output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     loaded = output.split("LOADED")[1]
-    for heavy in ("jax", "matplotlib", "xarray", "llvmlite"):
+    for heavy in ("jax", "matplotlib", "xarray", "llvmlite", "pydantic"):
         assert f"'{heavy}'" not in loaded
 
 

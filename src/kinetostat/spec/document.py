@@ -107,6 +107,15 @@ def parse(text: str, origin: str) -> Document:
     return document
 
 
+def head(text: str, origin: str) -> Document:
+    """Read the keys at the top of a shipped file, which stand before its first table, without reading the rest.
+
+    Raises:
+        InputError: they are not TOML.
+    """
+    return parse(text.partition("\n[")[0], origin)
+
+
 def check_bounds(text: str, origin: str) -> None:
     """Check that a text has no more entries, and no deeper keys and brackets, than a machine or study needs.
 

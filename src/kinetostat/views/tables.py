@@ -13,12 +13,13 @@ from kinetostat.display import ENGINEERING, Display
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts, parameters, values
+from kinetostat.spec.document import Document
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
 from kinetostat.views.fitted_table import FittedTable
 
 if TYPE_CHECKING:
-    from kinetostat.spec.study import StudyFile
+    pass
 
 DIGITS_OF_INPUT = 10
 """Digits of what people have written themselves."""
@@ -28,11 +29,11 @@ UNBOUND = 10_000
 """Width that no table reaches, to measure what a table needs."""
 
 
-def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
-    """The bundled machines, and the families a file can name."""
+def print_machines(console: Console, heads: Mapping[str, Document]) -> None:
+    """The bundled machines, by what stands at the top of their files, and the families a file can name."""
     table = text_table("Bundled machines", "name", "machine", "family")
-    for name, machine in zip(names, bundled, strict=True):
-        table.add_row(name, machine.name, machine.family.name)
+    for name, head in heads.items():
+        table.add_row(name, head["name"], head["family"])
     console.print(table)
     table = text_table("Families (kinetostat new FAMILY prints a commented file)", "family", "machine")
     for name, summary in kinds_of_machine().items():
@@ -40,11 +41,11 @@ def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence
     console.print(table)
 
 
-def print_studies(console: Console, studies: Mapping[str, "StudyFile"]) -> None:
+def print_studies(console: Console, heads: Mapping[str, Document]) -> None:
     """The bundled studies by name."""
     table = text_table("Bundled studies (kinetostat optimize STUDY)", "name", "study", "machine")
-    for name, study in studies.items():
-        table.add_row(name, study.name, study.machine)
+    for name, head in heads.items():
+        table.add_row(name, head["name"], head["machine"])
     console.print(table)
 
 

@@ -3,11 +3,18 @@
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from kinetostat.late import LateModule
 from kinetostat.machine.loading import bundled
 from kinetostat.spec import document as documents
 from kinetostat.spec.immutable import FixedDict
-from kinetostat.spec.study import StudyFile, read_study
+
+if TYPE_CHECKING:
+    from kinetostat.spec import study
+    from kinetostat.spec.study import StudyFile
+else:
+    study = LateModule("kinetostat.spec.study")
 
 SUFFIX = ".toml"
 SIMPLEST = "zhang-gosselin-2002"
@@ -31,13 +38,13 @@ def is_study(name: str) -> bool:
     return documents.is_study(documents.read(Path(name)))
 
 
-def study_of(name: str, settings: Sequence[str] = ()) -> StudyFile:
+def study_of(name: str, settings: Sequence[str] = ()) -> "StudyFile":
     """A bundled study with overrides "path=value".
 
     Raises:
         InputError: a mistake in an override.
     """
-    return read_study(documents.parse(bundled_studies()[name], name), name, settings)
+    return study.read_study(documents.parse(bundled_studies()[name], name), name, settings)
 
 
 def study_template() -> str:
