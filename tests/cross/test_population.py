@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinetostat.engine.batch import Evaluator, evaluate
+from kinetostat.engine.batch import evaluate, evaluate_designs
 from kinetostat.engine.derivatives import differentiate, evaluate_gradient
 from kinetostat.engine.points import PointTable, Population
 from kinetostat.machine.loading import load
@@ -27,7 +27,7 @@ def stiff_path(name):
 
 def test_every_design_at_every_pose():
     machine, population = load("zhang-gosselin-4dof"), Population(drawn(DESIGNS, 30, 0), drawn(POSES, 7, 1))
-    found = Evaluator(machine, population.paths, NAMES)(population)
+    found = evaluate_designs(machine, population, NAMES)
     assert population.shape == found.status.shape == (30, 7)
     columns = {path: np.repeat(values, 7) for path, values in population.designs.items()}
     columns |= {path: np.tile(values, 30) for path, values in population.poses.items()}
@@ -42,7 +42,7 @@ def test_every_design_at_every_pose():
 def test_without_poses_it_is_the_machines_own(name):
     machine, path = load(name), stiff_path(name)
     population = Population({path: float(values(machine)[path]) * np.array([0.9, 1.0, 1.1])}, {})
-    found = Evaluator(machine, population.paths, ["compliance_x"])(population)
+    found = evaluate_designs(machine, population, ["compliance_x"])
     expected = evaluate(machine, PointTable(population.designs), ["compliance_x"])
     assert found.status.shape == (3, 1)
     np.testing.assert_allclose(found.values["compliance_x"][:, 0], expected.values["compliance_x"], rtol=1e-9)
@@ -72,7 +72,7 @@ def test_a_free_spring_among_the_designs():
     """A stiffness of exactly 0 is a joint: it is computed apart, in values and in derivatives."""
     machine = load("zhang-gosselin-4dof", ["stiffness.passive_actuator=1000 N*m/rad"])
     population = Population({"stiffness.passive_actuator": np.array([0.0, 500.0])}, {})
-    found = Evaluator(machine, population.paths, ["compliance_x"])(population)
+    found = evaluate_designs(machine, population, ["compliance_x"])
     sloped = differentiate(machine, population, ["compliance_x"], population.paths)
     np.testing.assert_allclose(found.values["compliance_x"], sloped.values["compliance_x"], rtol=1e-9)
     assert np.isfinite(found.values["compliance_x"]).all()

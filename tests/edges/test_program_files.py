@@ -315,6 +315,18 @@ def test_sources_that_changed_since_the_start_keep_the_process_from_storing(fold
     program_files._surroundings.cache_clear()
 
 
+def test_a_system_that_does_not_say_its_processor_keeps_nothing(folder, monkeypatch):
+    def refuse():
+        raise PermissionError(13, "no /proc here")
+
+    program_files._surroundings.cache_clear()
+    monkeypatch.setattr(program_files, "_processor", refuse)
+    write_program(TEXT, CONTENT)
+    assert read_program(TEXT) is None
+    assert not folder.exists()
+    program_files._surroundings.cache_clear()
+
+
 def recipe(machine) -> Recipe:
     form, _ = form_of(machine, ["pose.z"])
     return Recipe(objectives_of, Specimen(machine), form, (((("stiffness_x", 1.0),),), None, False))

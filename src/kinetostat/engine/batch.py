@@ -250,22 +250,16 @@ class PopulationResults:
         return cls(values, status.reshape(population.shape), slopes)
 
 
-class Evaluator:
-    """Evaluates quantities of whole populations of a machine's designs, always in machine code."""
+def evaluate_designs(machine: Machine, population: Population, quantities: Sequence[str]) -> PopulationResults:
+    """Compute quantities of every design at every pose; the size of a population alone decides how it is cut.
 
-    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> None:
-        """Compile.
-
-        Args:
-            machine: gives all parameters that do not vary.
-            paths: leaf paths of those that do: of designs, then of poses.
-            quantities: names from `kinetostatics.quantities.QUANTITIES`.
-        """
-        self._names, self._function = tuple(quantities), function_of(machine, paths, quantities)
-
-    def __call__(self, population: Population) -> PopulationResults:
-        """Evaluate a population; its size alone decides how it is cut, so that equal ones give equal bits."""
-        return PopulationResults.of(population, self._names, *self._function.at(population))
+    Args:
+        machine: gives all parameters that do not vary.
+        population: designs and poses.
+        quantities: names from `kinetostatics.quantities.QUANTITIES`.
+    """
+    function = function_of(machine, population.paths, quantities)
+    return PopulationResults.of(population, quantities, *function.at(population))
 
 
 def responses(machine: Machine, points: Points) -> Response:

@@ -227,12 +227,13 @@ def _surroundings() -> str | None:
         sources = [source for room in ("", *ROOMS) for source in _sources(str(package / room), deep=bool(room))]
         compiler = find_spec("llvmlite")
         version = os.stat(compiler.origin) if compiler and compiler.origin else None
+        processor = _processor()
     except OSError:
         return None
     if not sources or max(changed for _, _, changed in sources) > sys.modules[package.name].STARTED * 1e9:
         return None
     llvm = (compiler.origin, version.st_size, version.st_mtime_ns) if compiler and version else ()
-    return repr((str(package), sources, sys.version, llvm, _processor()))
+    return repr((str(package), sources, sys.version, llvm, processor))
 
 
 def _sources(folder: str, deep: bool) -> list[tuple[str, int, int]]:

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.engine.batch import Evaluator
+from kinetostat.engine.batch import evaluate_designs
 from kinetostat.engine.points import Population
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -84,7 +84,6 @@ class Assessor:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self._evaluate = Evaluator(problem.machine, problem.paths, problem.names)
         robust = problem.robust is not None
         self._deviations = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
 
@@ -122,7 +121,7 @@ class Assessor:
     def _judge(self, columns: Mapping[str, Array], each: int) -> Outcome:
         """Designs, each of which is `each` machines in a row."""
         problem = self.problem
-        answers = self._evaluate(Population(columns, problem.poses.columns))
+        answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), problem.names)
         there = answers.status == Status.OK
         pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
         numbers = [self._over_machines(term.values(answers.values, there), each, sign > 0) for term, sign in pairs]
