@@ -177,7 +177,8 @@ def _export(options: argparse.Namespace) -> int:
 
 def _reproduce(options: argparse.Namespace) -> int:
     from kinetostat.studies.paper.reproduction import reproduce
-    from kinetostat.views.paper import print_summary, write_all
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.paper import REPRODUCTION, print_summary, write_all
 
     with progress_bar("reproducing") as progress:
         reproduction = reproduce(progress)
@@ -187,6 +188,6 @@ def _reproduce(options: argparse.Namespace) -> int:
     return give(
         options,
         reproduction.explained,
-        reproduction.as_json,
+        lambda: json_of(REPRODUCTION, reproduction),
         lambda console: print_summary(console, reproduction, written, options.full),
     )

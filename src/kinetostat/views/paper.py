@@ -7,16 +7,18 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, fields
+from dataclasses import asdict, astuple, fields
 from functools import partial
 from html import escape
 from importlib.metadata import version
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
@@ -24,13 +26,16 @@ from kinetostat.spec.installation import command, starting
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
 from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
-from kinetostat.studies.storage import write_dataset, write_json, write_text
+from kinetostat.studies.storage import write_text
+from kinetostat.views.answers import write_files
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import Tell, as_svg, contour_maps, curves, save
 from kinetostat.views.optimisation import designs_dataset
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.page import Markup, figure, table, whole_page
+from kinetostat.views.question import Description, Drawing, Field, Lines
 from kinetostat.views.tables import text_table
+from kinetostat.views.terminal import tell as tell_answer
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
@@ -52,53 +57,30 @@ def write_all(
     Returns:
         What was written, the page first.
     """
-    drawn = figures(reproduction)
+    drawn = {name: drawing() for name, drawing in figures(reproduction).items()}
     written = [folder / "index.html"]
     write_text(written[0], page(reproduction, drawn))
-    written.append(folder / "reproduction.json")
-    write_json(written[-1], reproduction.as_json())
-    for name, rows in (
-        ("numbers", reproduction.comparisons),
-        ("equations", reproduction.checks),
-        ("statements", reproduction.claims),
-        ("search", reproduction.search_claims),
-    ):
-        written.append(folder / f"{name}.csv")
-        write_text(written[-1], _csv(rows))
-    written.append(folder / "figure-6.nc")
-    write_dataset(written[-1], designs_dataset(reproduction.search))
-    for name, dataset in (("figure-4", reproduction.curves), ("figure-5", reproduction.maps)):
-        written.append(folder / f"{name}.nc")
-        write_dataset(written[-1], dataset)
+    written += write_files(REPRODUCTION, reproduction, folder)
     return written + save({name: partial(drawn.__getitem__, name) for name in drawn}, folder, formats, tell)
 
 
-def figures(reproduction: Reproduction) -> dict[str, Figure]:
+def figures(reproduction: Reproduction) -> dict[str, Drawing]:
     """The figures by file name."""
     # The paper calls this offset of the passive leg y, the coordinate of its figure.
     section = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
     section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
-    return {
-        "machine": three_views(reproduction.machine, MACHINE_TITLE),
-        "figure-4": curves(reproduction.curves, GROUPS["stiffness"], FIGURE_4),
-        "figure-5": contour_maps(section, GROUPS["compliance"], FIGURE_5),
-        "figure-6": convergence(reproduction.search.log, FIGURE_6),
+    draw = {
+        "machine": partial(three_views, reproduction.machine, title=MACHINE_TITLE),
+        "figure-4": partial(curves, reproduction.curves, GROUPS["stiffness"], title=FIGURE_4),
+        "figure-5": partial(contour_maps, section, GROUPS["compliance"], title=FIGURE_5),
+        "figure-6": partial(convergence, reproduction.search.log, title=FIGURE_6),
     }
+    return {name: Drawing(CAPTIONS[name], function) for name, function in draw.items()}
 
 
 def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path], full: bool = False) -> None:
-    """Print the verdict and the misprints of the paper; every number, equation and statement if `full`."""
-    console.print(verdict(reproduction), style="bold green" if reproduction.explained else "bold red", highlight=False)
-    for line in misprints(reproduction):
-        console.print(line, highlight=False)
-    if full:
-        _print_everything(console, reproduction)
-    else:
-        differing = [
-            comparison for comparison in reproduction.comparisons if comparison.verdict is PrintVerdict.DIFFERS
-        ]
-        if differing:
-            console.print(_numbers_table(differing))
+    """Print the reproduction, where its files are, and what to try next; every number and statement if `full`."""
+    tell_answer(console, REPRODUCTION, reproduction, full)
     more = "" if full else "; --full prints every number, equation and statement"
     console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{more}", highlight=False)
     console.print("next:", highlight=False)
@@ -106,9 +88,20 @@ def print_summary(console: Console, reproduction: Reproduction, written: Sequenc
         console.print(f"  {line}", highlight=False, soft_wrap=True)
 
 
-def _print_everything(console: Console, reproduction: Reproduction) -> None:
-    """Print every number next to the printed one, then equations and statements."""
-    console.print(_numbers_table(reproduction.comparisons))
+def _lines(reproduction: Reproduction) -> Lines:
+    yield "Verdict", verdict(reproduction)
+    for line in misprints(reproduction):
+        yield "Misprint", line
+
+
+def _tables(reproduction: Reproduction, full: bool) -> Iterator[Table | str]:
+    """Numbers that differ; if `full`, every number next to the printed one, then equations and statements."""
+    if not full:
+        differing = [number for number in reproduction.comparisons if number.verdict is PrintVerdict.DIFFERS]
+        if differing:
+            yield _numbers_table(differing)
+        return
+    yield _numbers_table(reproduction.comparisons)
     equations = text_table(
         "Equations 1-32: matrices of the paper against those of kinetostat", "eq.", "statement", "residual", ""
     )
@@ -116,11 +109,9 @@ def _print_everything(console: Console, reproduction: Reproduction) -> None:
         equations.add_row(
             check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else Text("FAILS", "red")
         )
-    console.print(equations)
+    yield equations
     for claim in (*reproduction.claims, *reproduction.search_claims):
-        console.print(Text.assemble((claim.place, "bold"), f"  {claim.finding.value}"))
-        console.print(f"  {claim.statement}", highlight=False)
-        console.print(f"  {claim.measured} {claim.limits}", highlight=False, style="dim")
+        yield f"{claim.place}  {claim.finding.value}\n  {claim.statement}\n  {claim.measured} {claim.limits}"
 
 
 def verdict(reproduction: Reproduction) -> str:
@@ -207,6 +198,35 @@ CAPTIONS = {
     "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "
     "best and mean still are from the last best.",
 }
+
+
+REPRODUCTION = Description(
+    type="studies.paper.reproduction.Reproduction",
+    title="The paper",
+    fields=(
+        Field("paper", lambda _reproduction: printed.CITATION),
+        Field("explained"),
+        Field("comparisons"),
+        Field("equations", lambda answer: [asdict(check) | {"holds": check.holds} for check in answer.checks]),
+        Field("statements", "claims"),
+        Field("optimisation", "search_claims"),
+        Field("typography", lambda _reproduction: list(printed.TYPOGRAPHY)),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=figures,
+    state=lambda answer: "explained" if answer.explained else "NOT explained",
+    files={
+        "reproduction.json": "json",
+        "numbers.csv": lambda answer: _csv(answer.comparisons),
+        "equations.csv": lambda answer: _csv(answer.checks),
+        "statements.csv": lambda answer: _csv(answer.claims),
+        "search.csv": lambda answer: _csv(answer.search_claims),
+        "figure-6.nc": lambda answer: designs_dataset(answer.search),
+        "figure-4.nc": attrgetter("curves"),
+        "figure-5.nc": attrgetter("maps"),
+    },
+)
 
 
 def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:

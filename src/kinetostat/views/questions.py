@@ -56,6 +56,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
     "validation.comparison.Validation": "views.validation.VALIDATION",
     "studies.optimisation.result.Result": "views.optimisation.RESULT",
+    "studies.paper.reproduction.Reproduction": "views.paper.REPRODUCTION",
     "studies.comparison.Comparison": "views.comparison.COMPARISON",
 }
 """Place of the `Description` of each class of answers."""

@@ -7,7 +7,6 @@ threshold open, the one that is taken here is named as such.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict
 from enum import StrEnum
 from itertools import pairwise
 from typing import Any
@@ -132,18 +131,6 @@ class Reproduction(Immutable):
             and all(check.holds for check in self.checks)
             and all(claim.finding is not Finding.FAILS for claim in (*self.claims, *self.search_claims))
         )
-
-    def as_json(self) -> dict[str, Any]:
-        """Numbers, equations and statements as plain data."""
-        return {
-            "paper": printed.CITATION,
-            "explained": self.explained,
-            "comparisons": [asdict(comparison) for comparison in self.comparisons],
-            "equations": [asdict(check) | {"holds": check.holds} for check in self.checks],
-            "statements": [asdict(claim) for claim in self.claims],
-            "optimisation": [asdict(claim) for claim in self.search_claims],
-            "typography": list(printed.TYPOGRAPHY),
-        }
 
 
 @checked
