@@ -85,7 +85,7 @@ KNOWN = (
         "modes",
         ".csv",
         "vibration_files.write_modes",
-        "natural frequencies, shapes, masses and shares of energy",
+        "natural frequencies, motions of the tool and modal masses, as modes -o writes them",
         (".nc",),
     ),
     Format(

@@ -24,7 +24,7 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.views import analysis_tables as free
 from kinetostat.views.first_lines import first_lines
 from kinetostat.views.forward import actuator_coordinates
-from kinetostat.views.question import MESSAGE, NAME, STATUS, Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import FIRST_FIELDS, MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 
 if TYPE_CHECKING:
     from kinetostat.equilibrium import solving
@@ -164,13 +164,11 @@ ANALYSIS = Description(
     type="studies.analysis.Analysis",
     title="Stiffness",
     fields=(
-        NAME,
+        *FIRST_FIELDS,
         Field("family", "machine.family.name"),
         Field("components"),
         Field("axes"),
         Field("pose", _pose),
-        STATUS,
-        MESSAGE,
         Field("platform", _platform),
         Field("tool_offset", lambda analysis: analysis.machine.tables["tool"].offset),
         Field("stiffness"),
