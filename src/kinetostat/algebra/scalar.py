@@ -59,6 +59,13 @@ def cos(a: Scalar) -> Scalar:
     return math.cos(a) if isinstance(a, float) else a.__array_namespace__().cos(a)
 
 
+def arctan2(y: Scalar, x: Scalar) -> Scalar:
+    """Angle in rad of the point (x, y), between -pi and pi."""
+    if isinstance(y, float) and isinstance(x, float):
+        return math.atan2(y, x)
+    return (x if isinstance(y, float) else y).__array_namespace__().atan2(y, x)
+
+
 def steady(a: Scalar) -> Scalar:
     """The number itself, which derivatives of traced formulas take for a constant."""
     traced = getattr(a, "__array_namespace__", None)

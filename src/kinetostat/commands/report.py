@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.result import Result
 
 EXPORT_FORMATS = (
-    "mjcf", "mjcf-vibration", "urdf", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space", "nastran",
+    "mjcf", "mjcf-vibration", "urdf", "c", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space", "nastran",
     "abaqus", "ansys",
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
@@ -66,10 +66,11 @@ def _add_export_command(commands: "Commands") -> None:
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
     )
+    in_c = {"inputs": "of c: parameters that become arguments", "outputs": "of c: quantities, as compliance_x"}
     for kind, names in (("inputs", "forces fx,fy,fz,mx,my,mz"), ("outputs", "motions x,y,z,rx,ry,rz")):
         command.add_argument(
             f"--{kind}", metavar="NAMES", type=_names,
-            help=f"of a state space: {names} of the tool, or names of actuators (default: all of the tool)",
+            help=f"of a state space: {names} of the tool, or names of actuators (default: the tool's); {in_c[kind]}",
         )  # fmt: skip
 
 

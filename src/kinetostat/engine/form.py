@@ -11,16 +11,19 @@ from typing import TypeAlias
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
+from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints, closing_equations
+from kinetostat.kinematics.closing import Joints, closing_equations, platform_placement, within_reach
 from kinetostat.kinematics.closure import CLOSED_FORMS
+from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, in_order
@@ -82,6 +85,13 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
     ordinary = tuple(ORDINARY_PARAMETER[0] < number < ORDINARY_PARAMETER[1] for number in numbers)
     turning = tuple(path for path in varying if path in angles)
     return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
+
+
+def form_with_numbers(machine: Machine, varying: Sequence[str]) -> Form:
+    """Return the form of programs that hold all numbers of a machine but those that vary, by leaf path."""
+    constant = [(path, float(value)) for path, value in values(machine).items() if path not in varying]
+    angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
+    return Form(tuple(constant), (), (), tuple(varying), tuple(path for path in varying if path in angles))
 
 
 def directions(machine: Machine) -> frozenset[str]:
@@ -219,6 +229,41 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
     stepped, square = equations.step(equations.start() if first else [*coordinates])
     results = [_number(value) for value in (*stepped, square)]
     return _formula(given, columns, results, 0.0, coordinates=coordinates)
+
+
+def placement_of(
+    kind: Specimen, form: Form, paths: Sequence[str], closed: bool
+) -> tuple[TracedFormula, list[Actuator]]:
+    """Trace where a machine is: coordinates of actuators, the tool point T (m) and the columns of Q, in the base frame.
+
+    Args:
+        kind: of a machine whose joints have closed forms.
+        form: how its parameters enter; numbers of joints in the drawing are constant.
+        paths: leaf paths of the parameters to differentiate by.
+        closed: whether joints are computed inside the program, as legs written leg by leg need it.
+
+    Returns:
+        The formula, whose code is the `Status` by reach alone, and the actuators with traced coordinates.
+    """
+    given = traced_machine(kind, form)
+    status: Scalar = int(Status.OK)
+    if closed:
+        chains = given.machine.chains()
+        joints = CLOSED_FORMS.over_scalars(chains)
+        platform, status = platform_placement(chains), joints.status
+        at_home = joint_actuators(kind.machine.chains(), leg_names(kind.machine))
+        actuators = [actuator.at(joints.coordinates) for actuator in at_home]
+    else:
+        configuration = given.machine.configure()
+        platform, actuators = configuration.platform, actuators_of(configuration)
+        status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
+    tool = platform.apply(Vector(*given.machine.tables["tool"].offset))
+    turn = (platform.rotation.x, platform.rotation.y, platform.rotation.z)
+    places = [c for vector in (tool, *turn) for c in vector.components()]
+    accepted = status < Status.OK + 0.5
+    wanted = [actuator.coordinate for actuator in actuators] + places
+    results = [_number(where(accepted, value, math.nan)) for value in wanted]
+    return _formula(given, (), results, _number(status), paths), actuators
 
 
 def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:

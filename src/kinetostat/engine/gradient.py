@@ -97,12 +97,8 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
         slope: of the result by the node.
     """
     match operation:
-        case "add":
-            return slope
-        case "sub":
-            return slope if place == 0 else -slope
-        case "neg":
-            return -slope
+        case "add" | "sub" | "neg":
+            return -slope if operation == "neg" or (operation == "sub" and place) else slope
         case "mul":
             return slope * operands[1 - place]
         case "div":
@@ -110,6 +106,9 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
             return share if place == 0 else -(share * value)
         case "sqrt":
             return slope * (0.5 * (1.0 / value))
+        case "atan2":
+            y, x = operands
+            return slope * ((x if place == 0 else -y) * (1.0 / (x * x + y * y)))
         case "abs":
             return where(operands[0] < 0.0, -slope, slope)
         case "where":
@@ -127,6 +126,7 @@ NUMPY_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "neg": np.negative,
     "abs": np.absolute,
     "sqrt": np.sqrt,
+    "atan2": np.arctan2,
     "steady": np.positive,
     "lt": np.less,
     "le": np.less_equal,
@@ -134,7 +134,7 @@ NUMPY_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "where": np.where,
 }
 """Every operation of a graph."""
-UNBOUNDED = {"mul", "div", "sqrt", TURN_OPERATION}
+UNBOUNDED = {"mul", "div", "sqrt", "atan2", TURN_OPERATION}
 """Operations whose derivative may be infinite."""
 
 Values = dict[int, Any]

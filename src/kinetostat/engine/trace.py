@@ -24,7 +24,7 @@ class Node:
     """One value of a graph: an operation and its operands. Two equal values of one graph are the same object.
 
     Attributes:
-        operation: "input", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "steady", "lt", "le", "and" or "where".
+        operation: "input" or one of `gradient.NUMPY_FUNCTIONS`.
         operands: nodes and floats; empty for an input.
         number: position in the graph; operands have smaller ones.
         fixed: whether it depends on inputs alone that are the same at all points.
@@ -126,6 +126,11 @@ class Namespace:
     def steady(a: Traced) -> Traced:
         """The number itself, which derivatives take for a constant."""
         return a.graph.number("steady", a)
+
+    @staticmethod
+    def atan2(y: Operand, x: Operand) -> Traced:
+        """Angle in rad of the point (x, y)."""
+        return _binary("atan2", _operand(y), _operand(x))
 
     @staticmethod
     def where(condition: Condition, a: Operand, b: Operand) -> Operand:

@@ -70,6 +70,13 @@ KNOWN = (
         "urdf_export.write",
         "machine as URDF with closed loops and stiffnesses; read back by new --from",
     ),
+    Format(
+        "c",
+        ".c",
+        "c_source.write",
+        "functions in C99: K, C, actuators, derivatives, the way back, the command under load",
+        channels=True,
+    ),
     Format("glb", ".glb", "solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
     Format(
         "step",

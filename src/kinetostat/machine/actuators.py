@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.scalar import Scalar, arctan2, is_zero
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
+from kinetostat.machine.column import plain
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.machine import Chains, Configuration
 from kinetostat.machine.rods import rods
@@ -110,8 +111,15 @@ def name_of(spring: Spring) -> str:
 def _next_point(leg: Leg, place: int, end: Vector, away: Vector | None = None) -> Vector:
     """The first point of a leg after an element that is not at another point; at the latest the platform's, its end."""
     points = (point for element in leg.chain[place + 1 :] for point in element.path)
-    apart = (p for p in points if away is None or not (np.asarray((p - away).norm(), dtype=float) <= NO_LINK).all())
-    return next(apart, end)
+    return next((point for point in points if away is None or not _coincide(point, away)), end)
+
+
+def _coincide(first: Vector, second: Vector) -> bool:
+    """Whether points are one, at every pose; traced points are if they are so by form."""
+    apart = first - second
+    if not all(isinstance(plain(c), float | np.ndarray) for c in apart.components()):
+        return all(is_zero(c) for c in apart.components())
+    return bool((np.asarray(apart.norm(), dtype=float) <= NO_LINK).all())
 
 
 def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, Scalar]:
@@ -120,7 +128,7 @@ def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, 
         raise ValueError("a slide has no crank")
     crank = _next_point(leg, place, end, centre) - centre
     if np.abs(np.asarray(axis.z, dtype=float)).max() > 1.0 - PARALLEL_AXES:
-        return BEARING, np.arctan2(crank.y, crank.x)
+        return BEARING, arctan2(crank.y, crank.x)
     level = np.hypot(axis.x, axis.y)
     outward = Vector(axis.y / level, -axis.x / level, 0.0)
     radial = np.asarray(outward.dot(centre), dtype=float)
@@ -128,7 +136,7 @@ def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, 
     east = np.where(np.abs(outward.x) > NO_LINK, outward.x, outward.y)
     outward = outward * np.where(np.where(tangential, east, radial) < 0.0, -1.0, 1.0)
     upward = Vector(-axis.x * axis.z / level, -axis.y * axis.z / level, level)
-    return ELEVATION, np.arctan2(crank.dot(upward), crank.dot(outward))
+    return ELEVATION, arctan2(crank.dot(upward), crank.dot(outward))
 
 
 @dataclass(frozen=True)
@@ -152,7 +160,7 @@ class JointActuator:
     def at(self, joints: Sequence[Scalar | Turn]) -> Actuator:
         """The actuator at given joint coordinates (m, and rad or turns)."""
         amount = joints[self.place]
-        angle = np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
+        angle = arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
         return Actuator(self.name, self.leg, self.meaning, self.offset + self.sign * angle, self.slides)
 
     def joint_coordinate(self, coordinate: Scalar) -> Scalar:

@@ -140,6 +140,10 @@ class _Functions:
         return _wrap(np.cos(a.values))
 
     @staticmethod
+    def atan2(y: Scalar, x: Scalar) -> Column:
+        return _wrap(np.arctan2(plain(y), plain(x)))
+
+    @staticmethod
     def where(condition: Any, a: Scalar, b: Scalar) -> Column:
         """`a` where the condition holds, `b` elsewhere."""
         return _wrap(np.where(condition.values, plain(a), plain(b)))

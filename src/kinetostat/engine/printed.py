@@ -1,0 +1,148 @@
+"""Prints a traced graph as straight-line source code of another language: no loop, no call but those of the table.
+
+Each operation is a row of `NOTATION`. An operation that is used once stands inside of the expression that uses it, as
+long as a line stays short; everything else has a line and a name of its own. Nothing is rounded: numbers are printed
+with all digits, and operations stay those of the graph, so that the code gives what machine code and NumPy give.
+"""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed
+
+LONGEST_EXPRESSION = 92
+"""Characters up to which an expression takes in another one."""
+
+NOTATION: dict[str, str] = {
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "neg": "-{0}",
+    "lt": "{0} < {1}",
+    "le": "{0} <= {1}",
+    "and": "{0} && {1}",
+    "where": "{0} ? {1} : {2}",
+    "steady": "{0}",
+    "abs": "{abs}({0})",
+    "sqrt": "{sqrt}({0})",
+    "atan2": "{atan2}({0}, {1})",
+}
+"""Every operation of a graph, in the notation that C and JavaScript share."""
+ATOM = re.compile(r"(\w+(\[\d+\])?|\d+(\.\d+)?(e[+-]?\d+)?)$")
+"""A name, an element or a positive number."""
+CALL = re.compile(r"[\w.]+\(")
+CALLS = ("abs", "sqrt", "atan2")
+"""Operations that are functions: their operands need no brackets."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language whose expressions are those of `NOTATION`.
+
+    Attributes:
+        functions: its names of `CALLS`.
+        number, condition: words that begin the declaration of a constant, by what it is.
+        infinity, undefined: its words for infinity and for what is not a number.
+    """
+
+    functions: dict[str, str]
+    number: str
+    condition: str
+    infinity: str
+    undefined: str
+
+
+C = Language({"abs": "fabs", "sqrt": "sqrt", "atan2": "atan2"}, "const double", "const int", "INFINITY", "NAN")
+JAVASCRIPT = Language(
+    {"abs": "Math.abs", "sqrt": "Math.sqrt", "atan2": "Math.atan2"}, "const", "const", "Infinity", "NaN"
+)
+
+
+@dataclass(frozen=True)
+class Printed:
+    """Source code of a graph.
+
+    Attributes:
+        lines: declarations of constants, in order.
+        results: expressions of the results, in order.
+        operations: number of operations.
+    """
+
+    lines: tuple[str, ...]
+    results: tuple[str, ...]
+    operations: int
+
+
+def print_graph(
+    inputs: Sequence[Traced], names: Sequence[str], results: Sequence[Operand], language: Language
+) -> Printed:
+    """Print what some results need.
+
+    Args:
+        inputs: all inputs of the graph.
+        names: how they are written.
+        results: nodes of the graph, or numbers.
+        language: of the source code.
+
+    Raises:
+        ValueError: a result needs another input.
+    """
+    written = {given.number: name for given, name in zip(inputs, names, strict=True)}
+    used = needed(results)
+    uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
+    uses.update(result.number for result in results if isinstance(result, Node))
+    lines: list[str] = []
+    for node in used:
+        if node.number in written:
+            continue
+        if node.operation == "input":
+            raise ValueError("a result depends on an input that has no name")
+        text = _expression(node, written, language)
+        if uses[node.number] > 1 or len(text) > LONGEST_EXPRESSION:
+            name = f"v{len(lines)}"
+            kind = language.condition if isinstance(node, Condition) else language.number
+            lines.append(f"{kind} {name} = {text};")
+            text = name
+        written[node.number] = text
+    values = tuple(_operand(result, written, language) for result in results)
+    return Printed(tuple(lines), values, sum(node.operation != "input" for node in used))
+
+
+def _expression(node: Node, written: dict[int, str], language: Language) -> str:
+    operands = [_operand(operand, written, language) for operand in node.operands]
+    if node.operation not in CALLS:
+        operands = [operand if _is_plain(operand) else f"({operand})" for operand in operands]
+    return NOTATION[node.operation].format(*operands, **language.functions)
+
+
+def _is_plain(text: str) -> bool:
+    """Whether an operand is a name, a positive number, an element or a call, which needs no brackets."""
+    call = CALL.match(text)
+    return bool(ATOM.match(text)) or (call is not None and _closes_at_end(text, call.end()))
+
+
+def _closes_at_end(text: str, start: int) -> bool:
+    """Whether the bracket before a place of a text is closed by its last character."""
+    depth = 1
+    for place in range(start, len(text)):
+        depth += (text[place] == "(") - (text[place] == ")")
+        if depth == 0:
+            return place == len(text) - 1
+    return False
+
+
+def _operand(operand: Operand, written: dict[int, str], language: Language) -> str:
+    return written[operand.number] if isinstance(operand, Node) else literal(operand, language)
+
+
+def literal(number: float, language: Language) -> str:
+    """Write a number with all its digits."""
+    if math.isnan(number):
+        return language.undefined
+    if math.isinf(number):
+        return language.infinity if number > 0.0 else f"-{language.infinity}"
+    return repr(float(number))

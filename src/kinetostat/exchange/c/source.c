@@ -1,0 +1,297 @@
+/* section: always */
+$note
+#include "${stem}.h"
+
+#include <math.h>
+
+$constants
+$programs
+static void take(const machine_real *given, double *in)
+{
+    for (int k = 0; k < MACHINE_INPUTS; k++) {
+        in[k] = (double)given[k];
+        if (IS_ANGLE[k] && fabs(in[k]) > LARGEST_ANGLE) {
+            in[k] = atan2(sin(in[k]), cos(in[k]));
+        }
+    }
+}
+
+int machine_matrices(const machine_real in[], machine_real stiffness[36], machine_real compliance[36])
+{
+    double at[MACHINE_INPUTS], out[42];
+    take(in, at);
+    const int status = entries_at(at, out);
+    for (int i = 0, entry = 0; i < 6; i++) {
+        for (int j = i; j < 6; j++, entry++) {
+            compliance[6 * i + j] = compliance[6 * j + i] = (machine_real)out[entry];
+            stiffness[6 * i + j] = stiffness[6 * j + i] = (machine_real)out[21 + entry];
+        }
+    }
+    return status;
+}
+
+int machine_actuators(const machine_real in[], machine_real coordinates[], machine_real *slopes)
+{
+    double at[MACHINE_INPUTS], out[MACHINE_ACTUATORS * (1 + MACHINE_INPUTS)];
+    take(in, at);
+    const int status = slopes ? actuator_slopes_at(at, out) : actuators_at(at, out);
+    for (int k = 0; k < MACHINE_ACTUATORS; k++) {
+        coordinates[k] = (machine_real)out[k];
+    }
+    for (int k = 0; slopes && k < MACHINE_ACTUATORS * MACHINE_INPUTS; k++) {
+        slopes[k] = (machine_real)out[MACHINE_ACTUATORS + k];
+    }
+    return status;
+}
+/* section: solve */
+
+/* Solve n equations by elimination with row exchanges; 0 where they are singular. */
+static int solve(int n, double *matrix, double *right)
+{
+    for (int k = 0; k < n; k++) {
+        int pivot = k;
+        for (int i = k + 1; i < n; i++) {
+            if (fabs(matrix[i * n + k]) > fabs(matrix[pivot * n + k])) {
+                pivot = i;
+            }
+        }
+        if (!(fabs(matrix[pivot * n + k]) > 0.0)) {
+            return 0;
+        }
+        for (int j = 0; j < n; j++) {
+            const double kept = matrix[k * n + j];
+            matrix[k * n + j] = matrix[pivot * n + j];
+            matrix[pivot * n + j] = kept;
+        }
+        const double kept = right[k];
+        right[k] = right[pivot];
+        right[pivot] = kept;
+        for (int i = k + 1; i < n; i++) {
+            const double share = matrix[i * n + k] / matrix[k * n + k];
+            for (int j = k; j < n; j++) {
+                matrix[i * n + j] -= share * matrix[k * n + j];
+            }
+            right[i] -= share * right[k];
+        }
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        for (int j = k + 1; j < n; j++) {
+            right[k] -= matrix[k * n + j] * right[j];
+        }
+        right[k] /= matrix[k * n + k];
+    }
+    return 1;
+}
+/* section: forward */
+
+/* How far the actuators are from where they should be, in lengths of the machine or rad: all, and the largest. */
+static double actuators_off(const double *out, const double *wanted, double *off)
+{
+    double largest = 0.0;
+    for (int k = 0; k < MACHINE_ACTUATORS; k++) {
+        off[k] = wanted[k] - out[k];
+        off[k] = IS_SLIDE[k] ? off[k] / LENGTH : atan2(sin(off[k]), cos(off[k]));
+        largest = fabs(off[k]) > largest || !(fabs(off[k]) <= HUGE_VAL) ? fabs(off[k]) : largest;
+    }
+    return largest;
+}
+
+int machine_forward(const machine_real coordinates[], machine_real in[])
+{
+    double at[MACHINE_INPUTS], next[MACHINE_INPUTS], out[MACHINE_ACTUATORS * (1 + MACHINE_INPUTS)];
+    double wanted[MACHINE_ACTUATORS], off[MACHINE_ACTUATORS], matrix[MACHINE_ACTUATORS * MACHINE_COORDINATES];
+    take(in, at);
+    for (int k = 0; k < MACHINE_ACTUATORS; k++) {
+        wanted[k] = (double)coordinates[k];
+    }
+    int status = actuator_slopes_at(at, out);
+    double left = actuators_off(out, wanted, off);
+    for (int step = 0; step < STEPS_FORWARD && status == MACHINE_OK && left > 0.0; step++) {
+        for (int i = 0; i < MACHINE_ACTUATORS; i++) {
+            for (int j = 0; j < MACHINE_COORDINATES; j++) {
+                const double slope = out[MACHINE_ACTUATORS + i * MACHINE_INPUTS + j];
+                matrix[i * MACHINE_COORDINATES + j] = IS_SLIDE[i] ? slope / LENGTH : slope;
+            }
+        }
+        if (!solve(MACHINE_COORDINATES, matrix, off)) {
+            return MACHINE_SINGULAR;
+        }
+        double there = 0.0;
+        int nearer = 0;
+        /* A step that leads no nearer is shortened; near the solution that is round-off, and the end. */
+        for (double share = 1.0; !nearer && share > SHORTEST_SHARE; share *= 0.25) {
+            for (int j = 0; j < MACHINE_INPUTS; j++) {
+                next[j] = at[j] + (j < MACHINE_COORDINATES ? share * off[j] : 0.0);
+            }
+            double trial[MACHINE_ACTUATORS], gap[MACHINE_ACTUATORS];
+            there = actuators_at(next, trial) == MACHINE_OK ? actuators_off(trial, wanted, gap) : HUGE_VAL;
+            nearer = there < left;
+        }
+        if (!nearer) {
+            break;
+        }
+        for (int j = 0; j < MACHINE_COORDINATES; j++) {
+            at[j] = next[j];
+        }
+        status = actuator_slopes_at(at, out);
+        left = actuators_off(out, wanted, off);
+    }
+    if (status == MACHINE_OK && !(left <= CLOSED)) {
+        status = MACHINE_NOT_CONVERGED;
+    }
+    for (int j = 0; j < MACHINE_COORDINATES; j++) {
+        in[j] = (machine_real)at[j];
+    }
+    return status;
+}
+/* section: rest */
+
+/* Coordinates of the state of rest, by Newton's method; NaN where there is none nearby. */
+static void rest_of(const double *at, double *state)
+{
+    double next[STATES + 1];
+    first_steps_at(at, next);
+    for (int step = 0; step < STEPS_AT_REST && next[STATES] > ONE_STEP_AWAY * ONE_STEP_AWAY; step++) {
+        for (int k = 0; k < STATES; k++) {
+            state[k] = next[k];
+        }
+        step_at(at, state, next);
+    }
+    for (int k = 0; k < STATES; k++) {
+        state[k] = next[k];
+    }
+}
+
+int machine_rest(const machine_real in[], machine_real displacement[6])
+{
+    double at[MACHINE_INPUTS], state[STATES], out[6];
+    take(in, at);
+    rest_of(at, state);
+    const int status = displacement_at(at, state, out);
+    for (int k = 0; k < 6; k++) {
+        displacement[k] = (machine_real)out[k];
+    }
+    return status;
+}
+
+/* The vector of the rotation from one orientation to another; each is three columns. */
+static void rotation_between(const double *start, const double *end, double *vector)
+{
+    double sines[3] = {0.0, 0.0, 0.0}, cosines = -1.0;
+    for (int c = 0; c < 9; c += 3) {
+        sines[0] += 0.5 * (start[c + 1] * end[c + 2] - start[c + 2] * end[c + 1]);
+        sines[1] += 0.5 * (start[c + 2] * end[c] - start[c] * end[c + 2]);
+        sines[2] += 0.5 * (start[c] * end[c + 1] - start[c + 1] * end[c]);
+        cosines += start[c] * end[c] + start[c + 1] * end[c + 1] + start[c + 2] * end[c + 2];
+    }
+    const double sine = sqrt(sines[0] * sines[0] + sines[1] * sines[1] + sines[2] * sines[2]);
+    const double stretch = sine > 1e-8 ? atan2(sine, 0.5 * cosines) / sine : 1.0;
+    for (int k = 0; k < 3; k++) {
+        vector[k] = stretch * sines[k];
+    }
+}
+
+/* Columns of an orientation after the rotation by a vector. */
+static void rotate(const double *vector, const double *columns, double *rotated)
+{
+    const double angle = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+    const double first = angle > 1e-8 ? sin(angle) / angle : 1.0;
+    const double half = angle > 1e-8 ? sin(0.5 * angle) / (0.5 * angle) : 1.0;
+    const double second = 0.5 * half * half;
+    for (int c = 0; c < 9; c += 3) {
+        const double *a = columns + c;
+        const double once[3] = {vector[1] * a[2] - vector[2] * a[1], vector[2] * a[0] - vector[0] * a[2],
+                                vector[0] * a[1] - vector[1] * a[0]};
+        const double twice[3] = {vector[1] * once[2] - vector[2] * once[1], vector[2] * once[0] - vector[0] * once[2],
+                                 vector[0] * once[1] - vector[1] * once[0]};
+        for (int k = 0; k < 3; k++) {
+            rotated[c + k] = a[k] + first * once[k] + second * twice[k];
+        }
+    }
+}
+
+int machine_command(const machine_real in[], machine_real coordinates[])
+{
+    double wanted[12], at[MACHINE_INPUTS], out[MACHINE_ACTUATORS + 12 * (1 + MACHINE_INPUTS)];
+    double state[STATES], moved[6], turned[9], off[6], rates[6 * MACHINE_COORDINATES];
+    double square[MACHINE_COORDINATES * MACHINE_COORDINATES], change[MACHINE_COORDINATES];
+    const double *place = out + MACHINE_ACTUATORS, *slopes = place + 12;
+    take(in, at);
+    for (int k = 0; k < MACHINE_ACTUATORS; k++) {
+        coordinates[k] = (machine_real)NAN;
+    }
+    int status = placement_at(at, out);
+    for (int k = 0; k < 12; k++) {
+        wanted[k] = place[k];
+    }
+    for (int step = 0; step < STEPS_OF_COMMAND && status == MACHINE_OK; step++) {
+        rest_of(at, state);
+        status = displacement_at(at, state, moved);
+        if (status != MACHINE_OK) {
+            return status;
+        }
+        rotate(moved, place + 3, turned);
+        rotation_between(turned, wanted + 3, off);
+        for (int k = 0; k < 3; k++) {
+            off[k] *= LENGTH;
+            off[3 + k] = wanted[k] - (place[k] + moved[3 + k]);
+        }
+        for (int j = 0; j < MACHINE_COORDINATES; j++) {
+            for (int axis = 0; axis < 3; axis++) {
+                const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+                double turn = 0.0;
+                for (int c = 3; c < 12; c += 3) {
+                    turn += 0.5 * place[c + next] * slopes[(c + last) * MACHINE_INPUTS + j];
+                    turn -= 0.5 * place[c + last] * slopes[(c + next) * MACHINE_INPUTS + j];
+                }
+                rates[axis * MACHINE_COORDINATES + j] = LENGTH * turn;
+                rates[(3 + axis) * MACHINE_COORDINATES + j] = slopes[axis * MACHINE_INPUTS + j];
+            }
+        }
+        for (int i = 0; i < MACHINE_COORDINATES; i++) {
+            change[i] = 0.0;
+            for (int k = 0; k < 6; k++) {
+                change[i] += rates[k * MACHINE_COORDINATES + i] * off[k];
+            }
+            for (int j = 0; j < MACHINE_COORDINATES; j++) {
+                square[i * MACHINE_COORDINATES + j] = 0.0;
+                for (int k = 0; k < 6; k++) {
+                    square[i * MACHINE_COORDINATES + j] +=
+                        rates[k * MACHINE_COORDINATES + i] * rates[k * MACHINE_COORDINATES + j];
+                }
+            }
+        }
+        if (!solve(MACHINE_COORDINATES, square, change)) {
+            return MACHINE_SINGULAR;
+        }
+        double largest = 0.0;
+        for (int j = 0; j < MACHINE_COORDINATES; j++) {
+            at[j] += change[j];
+            largest = fmax(largest, IS_ANGLE[j] ? fabs(change[j]) : fabs(change[j]) / LENGTH);
+        }
+        status = placement_at(at, out);
+        if (status == MACHINE_OK && largest <= COMMANDED) {
+            for (int k = 0; k < MACHINE_ACTUATORS; k++) {
+                coordinates[k] = (machine_real)out[k];
+            }
+            return MACHINE_OK;
+        }
+    }
+    return status == MACHINE_OK ? MACHINE_NOT_CONVERGED : status;
+}
+/* section: quantities */
+
+int machine_quantities(const machine_real in[], machine_real quantities[], machine_real *slopes)
+{
+    double at[MACHINE_INPUTS], out[MACHINE_QUANTITIES * (1 + MACHINE_INPUTS)];
+    take(in, at);
+    $rest_first
+    const int status = slopes ? quantity_slopes_at(at, ${state}out) : quantities_at(at, ${state}out);
+    for (int k = 0; k < MACHINE_QUANTITIES; k++) {
+        quantities[k] = (machine_real)out[k];
+    }
+    for (int k = 0; slopes && k < MACHINE_QUANTITIES * MACHINE_INPUTS; k++) {
+        slopes[k] = isfinite(out[k / MACHINE_INPUTS]) ? (machine_real)out[MACHINE_QUANTITIES + k] : (machine_real)NAN;
+    }
+    return status;
+}

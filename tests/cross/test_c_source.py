@@ -1,0 +1,258 @@
+"""The machine as C: its functions against the engine and against Python pose by pose, compiled without a warning."""
+
+import ctypes
+import math
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from kinetostat import export, load
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.derivatives import evaluate_gradient
+from kinetostat.engine.kernel import closes_inside
+from kinetostat.engine.points import PointTable
+from kinetostat.exchange.c_source import ENTRIES
+from kinetostat.kinematics.forward import stand
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.loading import bundled
+from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.commanding import actuator_targets
+
+WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
+"""The C compilers of this machine."""
+LOADED = ["load.force=[2, -3, -10]"]
+NUMBERS = np.ctypeslib.ndpointer(dtype=float, flags="C_CONTIGUOUS")
+
+
+class Functions:
+    """The functions of an exported machine as a library of this process."""
+
+    def __init__(self, machine, folder, inputs=None, outputs=None):
+        self.source = export(machine, folder / "pkm.c", inputs=inputs, outputs=outputs)[0]
+        library = folder / "pkm.so"
+        command = [COMPILERS[0], *WARNINGS, "-O1", "-shared", "-fPIC", str(self.source), "-o", str(library), "-lm"]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+        self._library = ctypes.CDLL(str(library))
+
+    def at(self, name, poses, *sizes):
+        """Call a function at poses [n x inputs]: its codes [n] and each of its results [n x size]."""
+        function = getattr(self._library, f"pkm_{name}")
+        function.argtypes, function.restype = [NUMBERS] * (1 + len(sizes)), ctypes.c_int
+        results = [np.empty((len(poses), size)) for size in sizes]
+        codes = [function(pose, *(result[k] for result in results)) for k, pose in enumerate(poses)]
+        return np.array(codes), *results
+
+
+def poses_of(machine, count, spread, seed=0):
+    """Coordinates of random poses [n x coordinates], and the same as points by leaf path."""
+    known = {path: float(value) for path, value in values(machine).items() if path.startswith("pose.")}
+    chains = machine.family.chains
+    length = float(machine.chains().length if chains else machine.configure().length)
+    angle = {leaf: p.quantity.kind == "angle" for p in parameters(machine.family) for leaf in p.leaves}
+    units = [1.0 if angle[path] else length for path in known]
+    rows = (
+        np.array([*known.values()])
+        + spread * np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(known))) * units
+    )
+    return rows, PointTable(dict(zip(known, np.ascontiguousarray(rows.T), strict=True)))
+
+
+def printable():
+    machines = {name: load(name) for name in bundled()}
+    return [name for name, m in machines.items() if m.family.chains is None or closes_inside(m)]
+
+
+def spreads(matrices):
+    """The scale of each entry of matrices [n x 36]: the root of the diagonal entries in its row and column."""
+    diagonal = np.sqrt(np.abs(matrices.reshape(-1, 6, 6)[:, range(6), range(6)]))
+    return (diagonal[:, :, None] * diagonal[:, None, :]).reshape(-1, 36)
+
+
+@pytest.mark.parametrize("name", printable())
+def test_matrices_and_statuses_are_those_of_the_engine(name, tmp_path):
+    machine = load(name)
+    functions = Functions(machine, tmp_path)
+    poses, points = poses_of(machine, 1000, 0.3)
+    codes, stiffness, compliance = functions.at("matrices", poses, 36, 36)
+    found = evaluate(machine, points, ENTRIES, repeated=True)
+    assert np.array_equal(codes, found.status)
+    assert (codes == Status.OK).sum() > 20
+    ok = codes == Status.OK
+    upper = [(i, j) for i in range(6) for j in range(i, 6)]
+    for matrix, word in ((compliance, "compliance"), (stiffness, "stiffness")):
+        expected = np.empty((len(poses), 6, 6))
+        for (i, j), entry in zip(upper, [e for e in ENTRIES if e.startswith(word)], strict=True):
+            expected[:, i, j] = expected[:, j, i] = found.values[entry]
+        expected = expected.reshape(-1, 36)[ok]
+        scale = spreads(expected)
+        finite = np.isfinite(expected)
+        assert np.array_equal(matrix[ok][~finite], expected[~finite])
+        off = np.abs(matrix[ok] - expected)[finite] / np.where(np.isfinite(scale), scale, np.abs(expected))[
+            finite
+        ].clip(1e-300)
+        assert off.max(initial=0.0) < 1e-12
+
+
+@pytest.mark.parametrize("name", printable())
+def test_actuators_stand_where_python_says_and_slopes_are_those_of_differences(name, tmp_path):
+    machine = load(name)
+    functions = Functions(machine, tmp_path)
+    poses, points = poses_of(machine, 25, 0.05)
+    count = len(stand(machine))
+    codes, coordinates, slopes = functions.at("actuators", poses, count, count * poses.shape[1])
+    assert (codes == Status.OK).any()
+    for pose, code, found, slope in zip(poses, codes, coordinates, slopes, strict=True):
+        there = with_values(machine, dict(zip(points.paths, pose.tolist(), strict=True)))
+        expected = np.array([float(a.coordinate) for a in stand(there)])
+        if code != Status.OK:
+            assert np.isnan(found).all()
+            continue
+        assert found == pytest.approx(expected, rel=1e-12, abs=1e-13)
+        step = 1e-6
+        for j, column in enumerate(slope.reshape(count, -1).T):
+            beside = np.stack([pose, pose])
+            beside[:, j] += [-step, step]
+            _, both, _ = functions.at("actuators", beside, count, count * poses.shape[1])
+            difference = np.arctan2(np.sin(both[1] - both[0]), np.cos(both[1] - both[0])) / (2.0 * step)
+            assert column == pytest.approx(difference, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta", "tricept", "hexapod-hardware"])
+def test_a_pose_comes_back_from_its_actuators(name, tmp_path):
+    machine = load(name)
+    functions = Functions(machine, tmp_path)
+    poses, _ = poses_of(machine, 200, 0.1)
+    size = poses.shape[1]
+    codes, coordinates, _ = functions.at("actuators", poses, size, size * size)
+    ok = codes == Status.OK
+    assert ok.sum() > 100
+    back = np.tile(poses_of(machine, 1, 0.0)[0], (len(poses), 1))
+    forward = functions._library.pkm_forward
+    forward.argtypes, forward.restype = [NUMBERS, NUMBERS], ctypes.c_int
+    ends = np.array([forward(wanted, start) for wanted, start in zip(coordinates, back, strict=True)])
+    assert (ends[ok] == Status.OK).all()
+    assert np.abs(back - poses)[ok].max() < 1e-12
+    assert (ends[~ok] != Status.OK).all()
+
+
+def test_coordinates_that_no_pose_has_are_refused(tmp_path):
+    functions = Functions(load("hexapod"), tmp_path)
+    forward = functions._library.pkm_forward
+    forward.argtypes, forward.restype = [NUMBERS, NUMBERS], ctypes.c_int
+    start = poses_of(load("hexapod"), 1, 0.0)[0][0]
+    assert forward(np.array([0.1, 9.0, 0.1, 9.0, 0.1, 9.0]), start) != Status.OK
+    assert forward(np.full(6, math.nan), start) != Status.OK
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hexapod-cubic", "tricept"])
+def test_rest_and_command_are_those_of_the_solver_for_any_machine(name, tmp_path):
+    machine = load(name, LOADED)
+    functions = Functions(machine, tmp_path)
+    poses, points = poses_of(machine, 20, 0.03)
+    codes, displacement = functions.at("rest", poses, 6)
+    names = [f"displacement_{part}" for part in ("rx", "ry", "rz", "x", "y", "z")]
+    found = evaluate(machine, points, names)
+    assert np.array_equal(codes, found.status)
+    ok = codes == Status.OK
+    assert ok.sum() > 10
+    expected = np.stack([found.values[each] for each in names], axis=1)
+    assert displacement[ok] == pytest.approx(expected[ok], rel=1e-9, abs=1e-14)
+    targets = actuator_targets(machine, points.columns(0, len(poses)), len(poses))
+    ends, coordinates = functions.at("command", poses, targets.coordinates.shape[1])
+    assert (ends[ok] == Status.OK).all()
+    assert coordinates[ok] == pytest.approx(targets.coordinates[ok], rel=1e-12, abs=1e-13)
+
+
+def test_quantities_and_their_derivatives_are_those_of_the_engine(tmp_path):
+    """Of the free machine, under load, and natural frequencies, by the pose and by chosen parameters."""
+    machine = load("hexapod", [*LOADED, "tool.mass=4 kg", "tool.inertia=[0.02, 0.02, 0.03, 0, 0, 0]"])
+    wanted = [
+        "compliance_x",
+        "stiffness_rz",
+        "frequency_1",
+        "loaded_frequency_2",
+        "displacement_z",
+        "tangent_stiffness_z",
+    ]
+    inputs = ["load.force.0", "tool.offset.2", "stiffness.actuator.3"]
+    functions = Functions(machine, tmp_path, inputs, wanted)
+    poses, points = poses_of(machine, 12, 0.03)
+    chosen = [float(values(machine)[name]) for name in inputs]
+    rows = np.ascontiguousarray(np.hstack([poses, np.tile(chosen, (len(poses), 1))]))
+    paths = [*points.paths, *inputs]
+    codes, found, slopes = functions.at("quantities", rows, len(wanted), len(wanted) * len(paths))
+    assert (codes == Status.OK).all()
+    table = PointTable(dict(zip(paths, np.ascontiguousarray(rows.T), strict=True)))
+    expected = evaluate_gradient(machine, table, wanted, paths)
+    assert found == pytest.approx(expected.values.T, rel=1e-9)
+    sloped, exact = slopes.reshape(len(rows), len(wanted), len(paths)), np.moveaxis(expected.gradients, 2, 0)
+    known = np.isfinite(exact)
+    assert known.all()
+    assert np.array_equal(known, np.isfinite(sloped))
+    scale = np.abs(np.where(known, exact, 0.0)).max(axis=(0, 2))[None, :, None]
+    assert np.allclose(
+        np.where(known, sloped, 0.0) / scale.clip(1e-300), np.where(known, exact, 0.0) / scale.clip(1e-300), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize(
+    ("name", "settings", "outputs"),
+    [
+        ("hexapod", LOADED, "compliance_x,displacement_z"),
+        ("hexapod-hardware", [], "stiffness_z"),
+        ("planar-3rrr", [], "singularity_margin"),
+        ("zhang-gosselin-4dof", LOADED, "compliance_rx,frequency_1"),
+        ("hexapod", ["stiffness.actuator=rigid"], "stiffness_z"),
+    ],
+)
+def test_the_written_test_passes_under_sanitizers(compiler, name, settings, outputs, tmp_path):
+    machine = load(name, settings)
+    files = export(machine, tmp_path / "a.machine-1.c", outputs=outputs.split(","))
+    source, header, test, _ = files
+    assert header.name == "a.machine-1.h"
+    checks = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    for further in (["-O2", *checks], ["-O2", "-DA_MACHINE_1_REAL=float"], ["-O2", "-pedantic"]):
+        program = tmp_path / "checked"
+        command = [compiler, *WARNINGS, *further, str(test), str(source), "-o", str(program), "-lm"]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+        ran = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+        assert "0 differences" in ran.stdout
+
+
+def test_the_written_test_fails_where_a_number_is_wrong(tmp_path):
+    files = export(load("planar-3rpr"), tmp_path / "pkm.c")
+    source = files[0].read_text()
+    assert source.count("0.5") > 2
+    files[0].write_text(source.replace("0.5", "0.5001", 1))
+    command = ["make", "-s", "-f", "pkm.mk", "test"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, check=False).returncode != 0
+
+
+@pytest.mark.parametrize(
+    ("name", "inputs", "outputs", "says"),
+    [
+        ("passive-leg-3dof-pu", ["tool.ofset.2"], None, "--inputs"),
+        ("hexapod", None, ["stifness_z"], "--outputs"),
+        ("hexapod", None, ["displacement_z"], "nothing loads it"),
+    ],
+)
+def test_what_has_no_program_is_refused_in_a_sentence(name, inputs, outputs, says, tmp_path):
+    with pytest.raises(InputError, match=says):
+        export(load(name), tmp_path / "pkm.c", inputs=inputs, outputs=outputs)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_leg_without_a_closed_form_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no closed form"):
+        export(load("tests/cases/seven-joint-arm.toml"), tmp_path / "pkm.c")
+
+
+def test_a_name_that_make_cannot_take_is_refused(tmp_path):
+    with pytest.raises(InputError, match="letters"):
+        export(load("hexapod"), tmp_path / "my machine.c")
