@@ -161,7 +161,6 @@ def _attribution(analysis: Analysis) -> list[dict[str, Any]]:
 
 
 ANALYSIS = Description(
-    type="studies.analysis.Analysis",
     title="Stiffness",
     fields=(
         *FIRST_FIELDS,
@@ -213,7 +212,6 @@ SPRING = (
     Field("slack"),
 )
 LOADED = Description(
-    type="studies.under_load.LoadedState",
     title="Under load",
     fields=(
         NAME,
@@ -244,7 +242,7 @@ LOADED = Description(
         state.rest is not solving.Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements)
     ),
 )
-ANALYZE = Question(
+ANALYZE_QUESTION = Question(
     example='kinetostat analyze mine.toml --set pose.x="5 mm" --json',
     answer=analyze_in_state,
     options=(

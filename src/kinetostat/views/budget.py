@@ -260,7 +260,6 @@ def _contributions(answer: Budget) -> list[dict[str, Any]]:
 
 
 BUDGET = Description(
-    type="studies.budget.budget.Budget",
     title="Error by tolerances",
     fields=(
         NAME,
@@ -312,7 +311,6 @@ def _line_about(answer: PossibleErrors, error: Any) -> str | None:
 
 
 POSSIBLE_ERRORS = Description(
-    type="studies.budget.budget.PossibleErrors",
     title="Numbers that may be off",
     fields=(
         NAME,

@@ -73,7 +73,6 @@ def command_csv(answer: Command, corrections: bool = False) -> str:
 
 
 COMMAND = Description(
-    type="studies.commanding.Command",
     title="Commands",
     fields=(
         NAME,
@@ -181,7 +180,6 @@ def _grid_text(answer: CorrectionTable) -> str:
 
 
 CORRECTIONS = Description(
-    type="studies.corrections.CorrectionTable",
     title="Corrections",
     fields=(
         NAME,

@@ -170,7 +170,6 @@ def _grid(comparison: Comparison) -> dict[str, Any] | None:
 
 
 COMPARISON = Description(
-    type="studies.comparison.Comparison",
     title="Designs side by side",
     fields=(
         Field("designs", _designs),

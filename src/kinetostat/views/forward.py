@@ -78,8 +78,7 @@ def _asked(machine: Machine, starts: int, spread: float, actuators: Sequence[str
     return forward(machine, coordinates_by_name(actuators), starts, spread)
 
 
-ASSEMBLY_MODES = Description(
-    type="studies.assembly.Forward",
+FORWARD = Description(
     title="Poses of the actuator coordinates",
     fields=(
         NAME,
@@ -105,7 +104,7 @@ ASSEMBLY_MODES = Description(
     state=lambda answer: "assembly modes" if answer.poses else "no assembly mode",
     answered=lambda answer: bool(answer.poses),
 )
-FORWARD = Question(
+FORWARD_QUESTION = Question(
     example='kinetostat forward hexapod --actuators "leg 1=96 mm, leg 2=95 mm"',
     answer=_asked,
     options=(

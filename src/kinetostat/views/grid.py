@@ -157,7 +157,6 @@ def _extremes_table(size: str, extremes: Mapping[str, Extremes], display: Displa
 
 
 GRID = Description(
-    type="xarray.Dataset",
     title="Over the grid",
     fields=grid_fields(lambda dataset: dataset),
     lines=lambda dataset: lines_of_points(failures(dataset), dataset["status"].size),
@@ -229,7 +228,6 @@ def _sets(carrying: Carrying) -> list[dict[str, Any]]:
 
 
 CARRYING = Description(
-    type="studies.carrying.Carrying",
     title="Legs that carry",
     fields=(*grid_fields(attrgetter("dataset")), Field("sets", _sets)),
     lines=lambda carrying: lines_of_points(failures(carrying.dataset), carrying.dataset["status"].size),
@@ -243,7 +241,6 @@ CARRYING = Description(
 
 
 STORED_GRID = Description(
-    type="studies.stored_grid.StoredGrid",
     title="Over the grid",
     fields=(
         Field("name", "question.machine.name"),

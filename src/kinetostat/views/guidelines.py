@@ -249,7 +249,6 @@ PARAMETER = (
     Field("softer_at", lambda row: row.get("softer_at"), forms=("json", "csv"), optional=True),
 )
 GUIDELINES = Description(
-    type="studies.guidelines.Guidelines",
     title="Guidelines",
     fields=(
         *FIRST_FIELDS,
@@ -272,7 +271,7 @@ GUIDELINES = Description(
     answered=lambda answer: answer.status is Status.OK,
     files={"guidelines.json": "json"},
 )
-DESIGN_GUIDELINES = Question(
+GUIDELINES_QUESTION = Question(
     example='kinetostat guidelines zhang-gosselin-4dof --over "x=-2 cm:2 cm:11" --over "z=66 cm:70 cm:11" -o out',
     answer=guidelines,
     options=(

@@ -182,7 +182,6 @@ def _next_file(answer: Identification) -> str | None:
 
 
 IDENTIFICATION = Description(
-    type="studies.identification.identification.Identification",
     title="Identification",
     fields=(
         Field("machine", "machine.name"),
@@ -217,7 +216,6 @@ IDENTIFICATION = Description(
 )
 
 RECORDED_FIT = Description(
-    type="studies.identification.record.RecordedFit",
     title="Identification",
     fields=(),
     lines=lambda fit: [*_fit_lines(fit.record), ("Measurements", f"{fit.record.data}.")],

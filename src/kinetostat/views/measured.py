@@ -108,7 +108,6 @@ ENTRY = (
 )
 
 MEASURED_STIFFNESS = Description(
-    type="studies.measured.comparison.MeasuredComparison",
     title="Measured stiffness",
     fields=(
         Field("machine", "machine.name"),

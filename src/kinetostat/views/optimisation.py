@@ -363,7 +363,6 @@ def designs_dataset(result: Result) -> xr.Dataset:
 
 
 RESULT = Description(
-    type="studies.optimisation.result.Result",
     title="Design study",
     fields=(
         Field("name", "problem.study.name"),

@@ -201,7 +201,6 @@ CAPTIONS = {
 
 
 REPRODUCTION = Description(
-    type="studies.paper.reproduction.Reproduction",
     title="The paper",
     fields=(
         Field("paper", lambda _reproduction: printed.CITATION),

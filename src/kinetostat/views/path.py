@@ -67,7 +67,6 @@ def at_poses_of(machine: Machine, poses: Path, progress: Progress, quantities: S
 
 
 PATH = Description(
-    type="studies.evaluation.PoseAnswers",
     title="Along the poses",
     fields=(
         NAME,
@@ -85,7 +84,7 @@ PATH = Description(
     state=lambda _answer: "",
     answered=lambda answer: answer.answered,
 )
-POSES_OF_A_FILE = Question(
+PATH_QUESTION = Question(
     example="kinetostat path hexapod poses.csv -o stiffness.csv -o stiffness.png",
     answer=at_poses_of,
     options=(

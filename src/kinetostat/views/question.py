@@ -145,7 +145,6 @@ class Description:
     """All that surfaces know of answers of one kind.
 
     Attributes:
-        type: class of the answers, "module.Class" within kinetostat.
         title: of a section or a panel that shows one.
         fields: values and records of the answer, in the order of JSON.
         lines: the sentences, the answer first. The line "Pose" is left out where a report has said it.
@@ -163,7 +162,6 @@ class Description:
         figure_prefix: stands before the names of the figures in a folder.
     """
 
-    type: str
     title: str
     fields: tuple[Field | Records, ...]
     lines: Callable[[Any], Lines] = NO_PARTS

@@ -5,22 +5,25 @@ from collections.abc import Mapping
 QUESTIONS: Mapping[str, tuple[str, str]] = {
     "analyze": (
         "compute stiffness, compliance, attribution and indices at a pose",
-        "views.analysis.ANALYZE",
+        "views.analysis.ANALYZE_QUESTION",
     ),
-    "forward": ("compute the poses that actuator coordinates give", "views.forward.FORWARD"),
-    "path": ("compute quantities at the poses of a CSV file: table, CSV and picture", "views.path.POSES_OF_A_FILE"),
+    "forward": ("compute the poses that actuator coordinates give", "views.forward.FORWARD_QUESTION"),
+    "path": ("compute quantities at the poses of a CSV file: table, CSV and picture", "views.path.PATH_QUESTION"),
     "sweep": ("compute quantities along one parameter: table, curves and NetCDF", "views.grid.SWEEP_QUESTION"),
     "map": ("compute quantities over two to six parameters: contour maps and NetCDF", "views.grid.MAP_QUESTION"),
-    "workspace": ("compute where the machine can work: volume, limits, pictures", "views.workspace.REACHED_POSES"),
+    "workspace": ("compute where the machine can work: volume, limits, pictures", "views.workspace.WORKSPACE_QUESTION"),
     "sensitivity": (
         "rank the parameters by their effect on the stiffness at a pose",
-        "views.sensitivity.SENSITIVITIES",
+        "views.sensitivity.SENSITIVITY_QUESTION",
     ),
     "guidelines": (
         "show what stiffness depends on, what counts as rigid, what to change",
-        "views.guidelines.DESIGN_GUIDELINES",
+        "views.guidelines.GUIDELINES_QUESTION",
     ),
-    "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
+    "modes": (
+        "compute natural frequencies and modes, and the receptance of the tool",
+        "views.vibration.MODES_QUESTION",
+    ),
     "budget": (
         "compute the error of the tool that tolerances allow, and what it is made of",
         "views.budget.BUDGET_QUESTION",
@@ -38,7 +41,7 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
 
 ANSWERS: Mapping[str, str] = {
     "studies.analysis.Analysis": "views.analysis.ANALYSIS",
-    "studies.assembly.Forward": "views.forward.ASSEMBLY_MODES",
+    "studies.assembly.Forward": "views.forward.FORWARD",
     "studies.under_load.LoadedState": "views.analysis.LOADED",
     "studies.vibration.Vibration": "views.vibration.VIBRATION",
     "studies.evaluation.PoseAnswers": "views.path.PATH",

@@ -87,7 +87,6 @@ PARAMETER = (
     Field("percent_per_percent", unit="1", long_name=PER, axes=("quantity",)),
 )
 SENSITIVITY = Description(
-    type="studies.sensitivity.Sensitivity",
     title="Sensitivity",
     fields=(
         *FIRST_FIELDS,
@@ -104,7 +103,7 @@ SENSITIVITY = Description(
     answered=lambda answer: answer.status is Status.OK,
     files={"sensitivity.json": "json"},
 )
-SENSITIVITIES = Question(
+SENSITIVITY_QUESTION = Question(
     example="kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
     answer=sensitivity,
     options=(quantities_option("compliance"),),

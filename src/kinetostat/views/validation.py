@@ -89,7 +89,6 @@ C_ABOUT = "compliance, rad/(N·m), rad/N and m/N"
 MATRIX = ("moved", "loaded")
 
 VALIDATION = Description(
-    type="validation.comparison.Validation",
     title="Validation",
     fields=(
         NAME,

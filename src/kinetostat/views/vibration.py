@@ -182,7 +182,6 @@ MODE = (
 RESPONSE = ("frequency", "moved", "loaded")
 
 VIBRATION = Description(
-    type="studies.vibration.Vibration",
     title="Vibration",
     fields=(
         *FIRST_FIELDS,
@@ -215,7 +214,7 @@ VIBRATION = Description(
     answered=lambda answer: bool(answer.modes),
     files={"modes.csv": "csv", "response.nc": "nc"},
 )
-MODES = Question(
+MODES_QUESTION = Question(
     example='kinetostat modes hexapod --set tool.mass="12 kg" -o modes',
     answer=modes,
     options=(

@@ -119,7 +119,6 @@ def _volume(answer: Workspace) -> dict[str, Any]:
 
 
 WORKSPACE = Description(
-    type="studies.workspace.Workspace",
     title="Workspace",
     fields=(
         NAME,
@@ -141,7 +140,7 @@ WORKSPACE = Description(
     answered=lambda answer: answer.exists,
     files={"workspace.nc": "nc"},
 )
-REACHED_POSES = Question(
+WORKSPACE_QUESTION = Question(
     example='kinetostat workspace hexapod --set "limits.longest_leg=20 cm" --over "x=-8 cm:8 cm:41" '
     '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "free_stiffness_z > 20 N/um" -o out',
     answer=workspace,
