@@ -8,14 +8,16 @@ from importlib.metadata import PackageNotFoundError, version
 from io import StringIO
 
 import numpy as np
+import pytest
 from rich.console import Console
 
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
-from kinetostat.commands.doctor import print_checks
+from kinetostat.commands.doctor import _program_folder, print_checks
+from kinetostat.engine import program_files
 from kinetostat.spec.installation import adding, installing
 from kinetostat.studies import diagnosis, self_test
-from kinetostat.studies.diagnosis import InstallationCheck, Soundness
+from kinetostat.studies.diagnosis import InstallationCheck, Soundness, UnsoundError
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import table_3
 
@@ -132,6 +134,17 @@ def test_wrong_numbers_are_found(monkeypatch):
     assert "differs when it is read again" in found["files"].detail
     failed = {name for name, check in found.items() if check.state is Soundness.FAILED and check.fix}
     assert failed == {"paper", "machine code", "search", "files"}
+
+
+def test_the_folder_of_programs_is_shown_and_one_that_others_may_use_is_a_fault(tmp_path, monkeypatch):
+    folder = tmp_path / "programs"
+    monkeypatch.setenv(program_files.VARIABLE, str(folder))
+    assert _program_folder() == f"{folder}: compiled programs (none yet)"
+    program_files.write_program("a recipe", bytes(200_000))
+    assert _program_folder() == f"{folder}: 0.2 MB of compiled programs"
+    folder.chmod(0o755)
+    with pytest.raises(UnsoundError, match="chmod 700"):
+        _program_folder()
 
 
 def test_a_broken_library_hides_nothing_else(tmp_path):

@@ -48,9 +48,25 @@ def _checks() -> "Iterator[InstallationCheck]":
 
     yield from diagnose()
     yield check_of("self-test", "pictures", _picture_size, reinstall("matplotlib"))
-    yield InstallationCheck("places", "cache", Soundness.ABSENT, "none: compiled programs live in memory only")
+    yield check_of("places", "cache", _program_folder, "chmod 700 the folder, if it is yours")
     yield InstallationCheck("places", "configuration", Soundness.ABSENT, "none: files and options say everything")
     yield check_of("places", "studio", _state_folder, reinstall("kinetostat"))
+
+
+def _program_folder() -> str:
+    from kinetostat.engine.program_files import SharedFolderError, disk_usage, usual_folder
+    from kinetostat.studies.diagnosis import UnsoundError
+
+    folder = usual_folder()
+    if folder is None:
+        return "none: compiled programs live in memory only"
+    try:
+        size = disk_usage()
+    except SharedFolderError as error:
+        raise UnsoundError(str(error)) from None
+    except FileNotFoundError:
+        return f"{folder}: compiled programs (none yet)"
+    return f"{folder}: {size / 1e6:.1f} MB of compiled programs"
 
 
 def _state_folder() -> str:

@@ -23,9 +23,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.util import find_spec
+from itertools import takewhile
 from pathlib import Path
-
-from kinetostat.engine.machine_code import SELF_LINKED
 
 VARIABLE = "KINETOSTAT_CACHE"
 """Variable of the environment with another folder for them, or "off"."""
@@ -49,7 +48,7 @@ def read_program(text: str) -> bytes | None:
     name = _name(text)
     if name is None:
         return None
-    with suppress(OSError), _folder() as folder:
+    with _if_possible(), _folder() as folder:
         secret = _secret(folder)
         data = _read(folder, name)
         if hmac.compare_digest(data[:HASH_SIZE], _hash(secret, name, data[HASH_SIZE:])):
@@ -69,11 +68,22 @@ def write_program(text: str, content: bytes) -> None:
     name = _name(text)
     if name is None:
         return
-    with suppress(OSError), _folder(make=True) as folder:
+    with _if_possible(), _folder(make=True) as folder:
         secret = _secret(folder, make=True)
         with _new_file(folder, _hash(secret, name, content) + content) as new:
             os.rename(new, name, src_dir_fd=folder, dst_dir_fd=folder)
         _drop_oldest(folder)
+
+
+def disk_usage() -> int:
+    """Return how many bytes all programs have on disk.
+
+    Raises:
+        SharedFolderError: the folder is not used, because others may.
+        OSError: it is not there.
+    """
+    with _folder() as folder, os.scandir(folder) as entries:
+        return sum(entry.stat(follow_symlinks=False).st_size for entry in entries if entry.name != SECRET)
 
 
 def usual_folder() -> Path | None:
@@ -91,12 +101,28 @@ def usual_folder() -> Path | None:
     return (Path(wished) if os.path.isabs(wished) else system) / "kinetostat" / "programs"
 
 
+class SharedFolderError(PermissionError):
+    """The folder is not the user's alone; its message says what to do."""
+
+
+@contextmanager
+def _if_possible() -> Iterator[None]:
+    """Go on without the disk where the system refuses something; where others may use the folder, a warning says so."""
+    try:
+        yield
+    except SharedFolderError as error:
+        warnings.warn(str(error), stacklevel=4)
+    except OSError:
+        pass
+
+
 @contextmanager
 def _folder(make: bool = False) -> Iterator[int]:
     """Open the folder and give its descriptor.
 
     Raises:
-        OSError: it is not there and cannot be made, or others may write or read it.
+        SharedFolderError: others may write or read it.
+        OSError: it is not there and cannot be made.
     """
     path = usual_folder()
     if path is None:
@@ -108,12 +134,10 @@ def _folder(make: bool = False) -> Iterator[int]:
     folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     try:
         if not _is_private(folder):
-            warnings.warn(
+            raise SharedFolderError(
                 f'compiled programs are not kept in "{path}", because it belongs to others or they may use it; '
-                f"`chmod 700` it if it is yours, or choose another folder with {VARIABLE}.",
-                stacklevel=2,
+                f"`chmod 700` it if it is yours, or choose another folder with {VARIABLE}."
             )
-            raise PermissionError("the folder is not the user's own")
         yield folder
     finally:
         os.close(folder)
@@ -249,16 +273,22 @@ def _sources(folder: str, deep: bool) -> list[tuple[str, int, int]]:
     return sorted(sources) + [source for path in sorted(below) for source in _sources(path, deep)]
 
 
-FEATURES = ("vendor_id", "cpu family", "model", "model name", "stepping", "flags")
-"""Lines on a processor that say what code it can run."""
+FEATURES = (
+    *("vendor_id", "cpu family", "model", "model name", "stepping", "flags"),
+    *("Features", "CPU implementer", "CPU architecture", "CPU variant", "CPU part", "CPU revision"),
+)
+"""Lines on a processor that say what code it can run: of Intel's kind, and of ARM's."""
 
 
 def _processor() -> str:
     """The processor that code is made for, on Linux as the system says it, because LLVM takes long to load."""
-    if not SELF_LINKED:
-        from kinetostat.engine.native import host_description  # LLVM has to load the code here in any case
+    if sys.platform != "linux":
+        from kinetostat.engine.native import host_description  # LLVM has to load the code there in any case
 
         return host_description()
     with open("/proc/cpuinfo", encoding="utf-8") as file:
-        lines = iter(lambda: file.readline().partition(":"), ("\n", "", ""))  # of the first processor
-        return repr([(name.strip(), text.strip()) for name, _, text in lines if name.strip() in FEATURES])
+        first = [line.partition(":") for line in takewhile(str.strip, file)]  # until an empty line
+    known = [(name.strip(), text.strip()) for name, _, text in first if name.strip() in FEATURES]
+    if not known:
+        raise OSError("the system does not say what its processor can do")
+    return repr(known)
