@@ -18,12 +18,12 @@ from kinetostat.commands.common import (
     Help,
     Parser,
     add_command,
-    judged,
+    judge_requirements,
     load_machine,
     no_answer,
     print_json,
     said_when_slow,
-    stopped,
+    say_stopped,
     takes_machine,
 )
 from kinetostat.commands.compare import add_compare_commands
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"kinetostat: {as_typed(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        return stopped("files that had been written are complete.")
+        return say_stopped("files that had been written are complete.")
     except BrokenPipeError:
         _forget_output()
         return DONE
@@ -251,7 +251,7 @@ def _check(options: argparse.Namespace) -> int:
     with said_when_slow(LOOKING):
         analysis = analyze(machine)
     print_machine(terminal(), machine, f"The file has no mistake. {analysis.message}")
-    code = judged(machine)
+    code = judge_requirements(machine)
     return no_answer(analysis.message) if analysis.status is not Status.OK else code
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 
 from kinetostat.frozen import dataclass
-from kinetostat.units import UnitError, measured
+from kinetostat.units import UnitError, multiple_of_unit
 
 SI = "si"
 """How people write that every result is shown in SI units."""
@@ -82,7 +82,7 @@ class Display:
 
     def scale(self, unit: str) -> Scale:
         """Return the scale of an SI unit; a unit that has no other way to be read stays as it is."""
-        return _scales(self.units).get(unit) or Scale(1.0, _spelled(unit))
+        return _scales(self.units).get(unit) or Scale(1.0, _as_printed(unit))
 
     def deflection(self, unit: str) -> Scale:
         """Return the scale of a small motion in m or rad: that of the compliances, µm and µrad unless chosen."""
@@ -96,15 +96,15 @@ class Display:
             unit: their SI unit.
             values: SI; those that are not finite do not count.
         """
-        if unit not in SMALL_MOTIONS or self.scale(unit).unit != UNIT_OF[unit] or UNIT_OF[unit] in self._named:
+        if unit not in SMALL_MOTIONS or self.scale(unit).unit != UNIT_OF[unit] or UNIT_OF[unit] in self._chosen_units:
             return self.scale(unit)
         small = self.deflection(unit)
         largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
         return small if largest * small.factor < SMALL_MOTIONS[unit] else self.scale(unit)
 
     @property
-    def _named(self) -> set[str]:
-        return {_spelled(word) for word in self.units.split(",")}
+    def _chosen_units(self) -> set[str]:
+        return {_as_printed(word) for word in self.units.split(",")}
 
     def number(self, value: float | None, unit: str = "1", endless: str = INFINITE) -> str:
         """Return an SI value as a number in the unit of `scale`, without the unit."""
@@ -174,8 +174,8 @@ def number(value: float | None, endless: str = INFINITE, digits: int = 4) -> str
     if float(mantissa) == 0.0:
         return "0"
     if PLAIN_POWERS[0] <= size <= PLAIN_POWERS[1]:
-        return _trimmed(f"{value:.{max(digits - 1 - size, 0)}f}")
-    return f"{_trimmed(mantissa)}e{size}"
+        return _without_zeros(f"{value:.{max(digits - 1 - size, 0)}f}")
+    return f"{_without_zeros(mantissa)}e{size}"
 
 
 def number_and_uncertainty(value: float, uncertainty: float) -> tuple[str, str]:
@@ -198,7 +198,7 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text} {unit}".rstrip() if text[-1:].isdigit() and unit != "1" else text
 
 
-def _trimmed(text: str) -> str:
+def _without_zeros(text: str) -> str:
     """Return a number without the zeros at the end of its fraction."""
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -212,26 +212,26 @@ def _scales(units: str) -> dict[str, Scale]:
     """
     words = [word.strip() for word in units.split(",") if word.strip()]
     whole = SI in (word.lower() for word in words)
-    chosen = {si: _spelled(si) if whole else unit for si, unit in UNIT_OF.items()}
+    chosen = {si: _as_printed(si) if whole else unit for si, unit in UNIT_OF.items()}
     named = {}
     for word in words:
         if word.lower() not in (SI, "engineering"):
-            unit = _spelled(word)
-            named[measured(unit, UNIT_OF, EXAMPLE)[0]] = unit
+            unit = _as_printed(word)
+            named[multiple_of_unit(unit, UNIT_OF, EXAMPLE)[0]] = unit
     for stiff, soft in DUAL.items():
         for given, other in ((stiff, soft), (soft, stiff)):
             if given in named and other not in named:
                 chosen[other] = _reciprocal(named[given])
     chosen |= named
-    return {si: Scale(1.0 / measured(unit, [si], EXAMPLE)[1], unit) for si, unit in chosen.items()}
+    return {si: Scale(1.0 / multiple_of_unit(unit, [si], EXAMPLE)[1], unit) for si, unit in chosen.items()}
 
 
 @cache
 def _small(unit: str) -> Scale:
-    return Scale(1.0 / measured(unit, ["m", "rad"], EXAMPLE)[1], unit)
+    return Scale(1.0 / multiple_of_unit(unit, ["m", "rad"], EXAMPLE)[1], unit)
 
 
-def _spelled(unit: str) -> str:
+def _as_printed(unit: str) -> str:
     """Return a unit as it is printed: "N m/urad" becomes "N·m/µrad", "cm**2" becomes "cm²"."""
     unit = re.sub(r"\*\*([2-4])", lambda power: POWERS[power[1]], unit)
     unit = re.sub(r"(?<!\*)\*(?!\*)|(?<=\w)\s+(?=\w)", "·", unit.replace("μ", "µ"))

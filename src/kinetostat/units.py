@@ -164,13 +164,13 @@ def parse(value: object, kind: str, bare: str = "") -> float:
     """
     wanted = replace(KINDS[kind], bare=bare)
     if isinstance(value, bool) or not isinstance(value, Real | str):
-        raise UnitError(f"it must be {_allowed(wanted)}")
+        raise UnitError(f"it must be {_allowed_form(wanted)}")
     if isinstance(value, str):
         return _parse_text(value, wanted)
     try:
         return _finite(float(value), wanted)
     except OverflowError:
-        raise UnitError(f"it is too large; write {_allowed(wanted)}") from None
+        raise UnitError(f"it is too large; write {_allowed_form(wanted)}") from None
 
 
 def write(value: float, kind: str) -> str:
@@ -178,7 +178,7 @@ def write(value: float, kind: str) -> str:
     return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}".rstrip()
 
 
-def written(value: float, kind: str, like: object = None) -> str | float:
+def written_value(value: float, kind: str, like: object = None) -> str | float:
     """Return an SI value as people write it in a file: the shortest text from which `parse` reads exactly this value.
 
     Args:
@@ -226,7 +226,7 @@ def as_read(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
-def measured(unit: str, known: Collection[str], example: str) -> tuple[str, float]:
+def multiple_of_unit(unit: str, known: Collection[str], example: str) -> tuple[str, float]:
     """Find which of several SI units a unit is a multiple of.
 
     Args:
@@ -257,18 +257,18 @@ def _parse_text(text: str, wanted: Kind) -> float:
         return math.inf
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
-        raise UnitError(f"it must be {_allowed(wanted)}")
+        raise UnitError(f"it must be {_allowed_form(wanted)}")
     number, unit = float(match[1]), match[2] or wanted.bare
     return _finite(number * _factor(unit, wanted) if unit else number, wanted)
 
 
 def _finite(number: float, wanted: Kind) -> float:
     if not math.isfinite(number):
-        raise UnitError(f"it is not a finite number; write {_allowed(wanted)}")
+        raise UnitError(f"it is not a finite number; write {_allowed_form(wanted)}")
     return number
 
 
-def _allowed(wanted: Kind) -> str:
+def _allowed_form(wanted: Kind) -> str:
     if not wanted.unit:
         return f"a number without a unit, e.g. {wanted.example}"
     rigid = f', or "{RIGID}"' if wanted.stiff else ""
@@ -303,16 +303,16 @@ def _in_root_units(unit: str) -> "PlainQuantity[float] | None":
 def _factor(unit: str, wanted: Kind) -> float:
     """SI value of one `unit`."""
     if UNIT.fullmatch(unit) is None:
-        raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
+        raise UnitError(f'"{unit}" is not a unit; write {_allowed_form(wanted)}')
     if unit == WITHOUT_ANGLE.get(wanted.name):
         return 1.0
     if usual := _usual(unit, wanted.unit):
         return usual
     given, target = _in_root_units(unit), _in_root_units(wanted.unit)
     if given is None or target is None:
-        raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}')
+        raise UnitError(f'the unit "{unit}" is unknown; write {_allowed_form(wanted)}')
     angle, in_kind = (dict(quantity.unit_items()).get("radian", 0) for quantity in (given, target))
     misread = angle != in_kind and (angle or wanted.name in TURNS_COUNT)
     if given.dimensionality != target.dimensionality or misread:
-        raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed(wanted)}')
+        raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed_form(wanted)}')
     return float(given.magnitude / target.magnitude)

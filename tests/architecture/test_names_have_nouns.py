@@ -14,11 +14,14 @@ ADVERB = r"held|told|found|said|kept|made|left|together|apart|away|there|here"
 PARTICIPLE = re.compile(rf"_?({ENDING}|{ADVERB})")
 """Names of functions that are a lone participle or adverb, by their endings."""
 NOUNS = """
-    agent alignment argument attachment bolt component content count default different displacement document element
-    extent fault font front gradient hidden indent instant joint moment mount open point present print result salt
-    screen segment statement tangent then tilt unseen variant when
+    agent alignment amount argument attachment bolt children client complement component constraint content
+    count default different displacement document element extent fault font front gradient hidden hint indent
+    instant joint listen moment mount open percent placement point present print result salt screen segment
+    shorten silent specimen statement tangent then tilt unseen variant when
 """
 """Nouns, verbs and conjunctions with such an ending."""
+FLAGS = {"bool", "Mask"}
+"""Types of a flag, and of an array of flags."""
 ASKING = re.compile(r"(What|Which|How|Where|When)\b")
 """Beginnings of first lines that describe a thing by a question."""
 SHORTEST = 60
@@ -28,24 +31,16 @@ CATALOGUE = "kinetostat.machine.catalogue"
 REGISTERED = {"kinetostat.exchange.solids"}
 """Modules that a registry names in words of its own."""
 PARTICIPLES_LEFT: dict[str, int] = {
-    "accuracy": 2,
-    "algebra": 7,
-    "commands": 4,
-    "display": 3,
-    "engine": 6,
-    "equilibrium": 3,
-    "exchange": 1,
-    "kinematics": 3,
-    "kinetostatics": 10,
-    "machine": 30,
-    "numerics": 1,
-    "spec": 8,
-    "studies": 20,
-    "studio": 34,
-    "units": 3,
-    "validation": 1,
-    "vibration": 4,
-    "views": 14,
+    "accuracy": 1,
+    "algebra": 4,
+    "engine": 2,
+    "exchange": 4,
+    "kinematics": 2,
+    "kinetostatics": 3,
+    "machine": 22,
+    "spec": 3,
+    "studies": 3,
+    "studio": 6,
 }
 ASKING_LEFT: dict[str, int] = {
     "algebra": 1,
@@ -91,7 +86,7 @@ def participles(tree):
     """Functions that are named by a lone participle and do not return a flag."""
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     named = [f for f in functions if PARTICIPLE.fullmatch(f.name) and f.name.lstrip("_") not in NOUNS.split()]
-    return [f.name for f in named if not (isinstance(f.returns, ast.Name) and f.returns.id == "bool")]
+    return [f.name for f in named if not (isinstance(f.returns, ast.Name) and f.returns.id in FLAGS)]
 
 
 def first_lines(tree):

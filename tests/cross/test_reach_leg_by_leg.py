@@ -11,7 +11,7 @@ from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec import document
@@ -111,7 +111,7 @@ def test_the_lengths_of_links_show_no_pose_out_of_reach_that_is_not(name, monkey
         patched.setattr(closure, "too_far_or_near", lambda problems, _: np.zeros(len(problems.poses), dtype=bool))
         status = np.asarray(solve_joints(with_values(machine, columns)).status)
     chains = with_values(machine, columns).chains()
-    given = stacked(chains.pose.values(), 60)
+    given = stacked_columns(chains.pose.values(), 60)
     beyond = np.zeros(60, dtype=bool)
     for problems in problems_of(chains, 60, free_coordinates(chains)):
         goal = goal_of(problems, given)

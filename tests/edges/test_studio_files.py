@@ -18,7 +18,7 @@ from kinetostat.machine.loading import build, bundled, load
 from kinetostat.studio.admission import BoundedBody
 from kinetostat.studio.menus import about
 from kinetostat.studio.serving import LOOPBACK
-from kinetostat.studio.text_pane import explained, reading
+from kinetostat.studio.text_pane import explanation_of, reading
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -84,8 +84,8 @@ def test_a_mistake_in_the_text_is_marked_at_its_line(machine, before, after, lin
 
 def test_the_meaning_of_a_field_is_that_of_the_schema():
     machine = load("hexapod")
-    assert explained(machine, "geometry.base_radius").startswith("<b>base_radius</b>: radius of the base joints")
-    assert explained(machine, "geometry.nothing") == explained(machine, "name") == ""
+    assert explanation_of(machine, "geometry.base_radius").startswith("<b>base_radius</b>: radius of the base joints")
+    assert explanation_of(machine, "geometry.nothing") == explanation_of(machine, "name") == ""
 
 
 def test_the_gallery_opens_any_bundled_machine():

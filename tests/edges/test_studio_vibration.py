@@ -6,7 +6,7 @@ from studio_page import on_page
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
-from kinetostat.studies.attribution import ranked
+from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import modes
 from kinetostat.studio.answers import SwingRequest, ringing, swing
 from kinetostat.views.scene.proportions import proportions_of
@@ -44,7 +44,7 @@ def test_a_row_chooses_the_mode_that_swings_and_whose_energies_are_shown():
         await page.send("vibration-table", "pick", 2)
         assert page.shown("MachineView", "swing") != first
         assert page.one("vibration-table")._props["chosen"] == 2
-        strain = ranked(answer.modes[2].strain)[0]
+        strain = ranking_of(answer.modes[2].strain)[0]
         energies = page.one("vibration-energies").content
         assert energies.index(strain[0]) < energies.index(f"{percent(strain[1])} %")
         assert page.one("vibration-mode").text == f"mode 3, {answer.modes[2].frequency:.4g} Hz"

@@ -8,7 +8,7 @@ from starlette.responses import PlainTextResponse
 
 pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
 
-from kinetostat.studio.admission import CREDIT, PACE, SENDING, SHARE, OwnOrigin, Pace, Paced, timed
+from kinetostat.studio.admission import CREDIT, PACE, SENDING, SHARE, OwnOrigin, Pace, Paced, timed_handler
 
 HOST = "127.0.0.1:8000"
 
@@ -98,7 +98,7 @@ def test_the_time_of_a_message_counts_for_its_own_connection(monkeypatch):
 
     async def slow(scope, receive, send):
         await receive()
-        timed(lambda *_: scope[PACE].add(10.0), lambda _: scope)("tab", "message")
+        timed_handler(lambda *_: scope[PACE].add(10.0), lambda _: scope)("tab", "message")
         await receive()
 
     socket(Paced(slow), b"", [{"type": "websocket.receive"}])

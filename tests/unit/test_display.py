@@ -7,7 +7,7 @@ import pytest
 from kinetostat.display import DASH, ENGINEERING, UNIT_OF, Display, number, number_and_uncertainty, read_display
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.units import UnitError, measured, parse
+from kinetostat.units import UnitError, multiple_of_unit, parse
 from kinetostat.views.answers import plain_of
 from refusals import refused
 
@@ -96,7 +96,7 @@ def test_small_motions_are_in_the_unit_of_the_compliance():
 def test_motions_that_are_all_small_are_read_in_small_units_unless_chosen(units, unit, values, shown):
     scale = read_display({"units": units}).fitting(unit, values)
     assert scale.unit == shown
-    assert measured(scale.unit, [unit], "mm")[1] * scale.factor == pytest.approx(1.0)
+    assert multiple_of_unit(scale.unit, [unit], "mm")[1] * scale.factor == pytest.approx(1.0)
 
 
 def test_units_are_chosen_one_by_one_and_the_dual_unit_follows():
@@ -113,7 +113,7 @@ def test_units_are_chosen_one_by_one_and_the_dual_unit_follows():
 def test_a_scale_and_its_unit_say_the_same(unit):
     for display in (ENGINEERING, Display("si"), Display("N/mm, N*m/mrad, m, arcmin, kN, t, MPa")):
         scale = display.scale(unit)
-        assert measured(scale.unit, [unit], "")[1] * scale.factor == pytest.approx(1.0, rel=1e-14)
+        assert multiple_of_unit(scale.unit, [unit], "")[1] * scale.factor == pytest.approx(1.0, rel=1e-14)
 
 
 def test_stiffness_and_compliance_have_one_factor_so_that_k_c_is_1_as_printed():

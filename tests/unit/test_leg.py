@@ -11,7 +11,7 @@ from elastic import leg_compliance
 from geometry import displacements, rotations, vectors
 from kinetostat.algebra.screw import force_along
 from kinetostat.algebra.vector import AXES, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
-from kinetostat.kinetostatics.leg import relaxed
+from kinetostat.kinetostatics.leg import free_springs_as_joints
 from kinetostat.machine.leg import Joint, Leg, Spring, reciprocal_wrenches, revolutes, two_force_leg
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from numeric import U, screw
@@ -209,7 +209,7 @@ class TestRelaxed:
         free = [Spring(e.name, e.joint, 0.0) if i in freed else e for i, e in enumerate(self.CHAIN)]
         jointed = [e.joint if i in freed else e for i, e in enumerate(self.CHAIN)]
         tip = Vector(0.1, 0.2, 0.5)
-        found = relaxed(Leg("leg", tuple(free)).screws(tip, 1.0))
+        found = free_springs_as_joints(Leg("leg", tuple(free)).screws(tip, 1.0))
         known = Leg("leg", tuple(jointed)).screws(tip, 1.0)
         assert len(found.wrenches) == len(known.wrenches) == 5 - len(freed)
         assert np.allclose(span(found.wrenches), span(known.wrenches), rtol=0, atol=FEW)
@@ -221,34 +221,34 @@ class TestRelaxed:
 
     def test_its_free_springs_feel_nothing(self):
         free = [Spring(e.name, e.joint, 0.0) if i == 3 else e for i, e in enumerate(self.CHAIN)]
-        found = relaxed(Leg("leg", tuple(free)).screws(ZERO, 1.0))
+        found = free_springs_as_joints(Leg("leg", tuple(free)).screws(ZERO, 1.0))
         assert set(found.loads[2]) == {0.0}
         assert found.compliance[2] == 0.0
         assert len(found.loads) == len(found.compliance) == 4
 
     def test_a_leg_without_free_springs_is_itself(self):
         screws = Leg("leg", self.CHAIN).screws(ZERO, 1.0)
-        assert relaxed(screws) is screws
+        assert free_springs_as_joints(screws) is screws
 
     def test_a_spring_that_is_nearly_free_is_kept(self):
         soft = [Spring(e.name, e.joint, 1e-300) if i == 3 else e for i, e in enumerate(self.CHAIN)]
         screws = Leg("leg", tuple(soft)).screws(ZERO, 1.0)
-        assert relaxed(screws) is screws
+        assert free_springs_as_joints(screws) is screws
 
     def test_a_free_spring_that_feels_no_load_frees_nothing(self):
         idle = (*self.CHAIN, Spring("idle", Joint(X_AXIS, ZERO), 0.0))
-        found = relaxed(Leg("leg", idle).screws(Vector(0.1, 0.2, 0.5), 1.0))
+        found = free_springs_as_joints(Leg("leg", idle).screws(Vector(0.1, 0.2, 0.5), 1.0))
         assert len(found.wrenches) == 5
 
     def test_two_free_springs_about_one_axis_free_it_once(self):
         twice = (*self.CHAIN[:2], Spring("one", Joint(Z_AXIS, ZERO), 0.0), Spring("two", Joint(Z_AXIS, ZERO), 0.0))
-        found = relaxed(Leg("leg", (*twice, *self.CHAIN[3:])).screws(Vector(0.1, 0.2, 0.5), 1.0))
+        found = free_springs_as_joints(Leg("leg", (*twice, *self.CHAIN[3:])).screws(Vector(0.1, 0.2, 0.5), 1.0))
         assert len(found.wrenches) == 4
         assert found.singularity_margin > 0.01
 
     def test_a_limp_leg_carries_nothing(self):
         limp = [self.CHAIN[0], *(Spring(f"s{i}", Joint(axis, ZERO), 0.0) for i, axis in enumerate(AXES))]
         limp += [Spring(f"t{i}", Joint(axis), 0.0) for i, axis in enumerate(AXES)]
-        found = relaxed(Leg("leg", tuple(limp)).screws(ZERO, 1.0))
+        found = free_springs_as_joints(Leg("leg", tuple(limp)).screws(ZERO, 1.0))
         assert found.wrenches == ()
         assert len(found.loads) == 6

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from kinetostat.studio.playback import BETWEEN, between
+from kinetostat.studio.playback import BETWEEN, poses_between
 
 
 def test_a_path_goes_evenly_through_all_kept_poses():
-    path = between([{"pose.x": 0.0, "pose.z": 1.0}, {"pose.x": 0.2, "pose.z": 1.0}, {"pose.x": 0.2, "pose.z": 0.5}])
+    path = poses_between(
+        [{"pose.x": 0.0, "pose.z": 1.0}, {"pose.x": 0.2, "pose.z": 1.0}, {"pose.x": 0.2, "pose.z": 0.5}]
+    )
     assert set(path) == {"pose.x", "pose.z"}
     assert len(path["pose.x"]) == 2 * BETWEEN + 1
     assert path["pose.x"][[0, BETWEEN, -1]] == pytest.approx([0.0, 0.2, 0.2])

@@ -3,6 +3,7 @@
 import pytest
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studio.pulling import (
@@ -14,24 +15,23 @@ from kinetostat.studio.pulling import (
     free_axes,
     goal_of,
     handles,
-    placed,
+    numbers_after_pull,
     point_goal,
-    pulled,
 )
 
 HEXAPOD = "hexapod"
 
 
 def follow(machine, axis, amount):
-    start = placed(machine).platform
-    numbers = pulled(Pull(machine, PLATFORM, "", axis, goal_of(start, axis, amount)))
-    return numbers, start, placed(with_values(machine, numbers)).platform
+    start = state_of(machine).configuration.platform
+    numbers = numbers_after_pull(Pull(machine, PLATFORM, "", axis, goal_of(start, axis, amount)))
+    return numbers, start, state_of(with_values(machine, numbers)).configuration.platform
 
 
 @pytest.mark.parametrize("name", bundled())
 def test_every_platform_goes_where_it_is_pushed(name):
     machine = load(name)
-    step = 0.01 * float(placed(machine).length)
+    step = 0.01 * float(state_of(machine).configuration.length)
     axes = free_axes(machine)
     assert axes
     for axis in set(axes) & set(MOVES):
@@ -59,14 +59,14 @@ def test_only_motions_that_a_machine_has_are_offered():
 @pytest.mark.parametrize("of", [BASE, HEAD])
 def test_a_joint_goes_where_it_is_pulled_by_geometry_alone(of):
     machine = load(HEXAPOD, ["pose.x=1 cm", "pose.pitch=4 deg"])
-    configuration = placed(machine)
+    configuration = state_of(machine).configuration
     handle = next(h for h in handles(configuration, ()) if (h.of, h.leg) == (of, "leg 3"))
     up = configuration.platform.rotation if of == HEAD else None
     along = up.x if up else Vector(1.0, 0.0, 0.0)
     goal = handle.point + along * 0.004
-    numbers = pulled(Pull(machine, of, "leg 3", "", point_goal(goal.components())))
+    numbers = numbers_after_pull(Pull(machine, of, "leg 3", "", point_goal(goal.components())))
     assert all(path.startswith("geometry.") for path in numbers)
-    after = placed(with_values(machine, numbers))
+    after = state_of(with_values(machine, numbers)).configuration
     reached = next(h for h in handles(after, ()) if (h.of, h.leg) == (of, "leg 3")).point
     assert (reached - goal).norm() < 1e-6
     assert (after.platform.translation - configuration.platform.translation).norm() == 0.0
@@ -74,9 +74,9 @@ def test_a_joint_goes_where_it_is_pulled_by_geometry_alone(of):
 
 def test_a_joint_of_a_machine_leg_by_leg_moves_alone():
     machine = load("tripteron")
-    handle = next(h for h in handles(placed(machine), ()) if (h.of, h.leg) == (HEAD, "z"))
+    handle = next(h for h in handles(state_of(machine).configuration, ()) if (h.of, h.leg) == (HEAD, "z"))
     goal = handle.point + Vector(0.01, 0.005, 0.0)
-    numbers = pulled(Pull(machine, HEAD, "z", "", point_goal(goal.components())))
+    numbers = numbers_after_pull(Pull(machine, HEAD, "z", "", point_goal(goal.components())))
     changed = {path for path, number in numbers.items() if abs(number - values(machine)[path]) > 1e-6}
     assert changed == {"legs.z.wrist.point.0", "legs.z.wrist.point.1"}
 

@@ -10,7 +10,7 @@ from kinetostat.machine.loading import as_toml, build, bundled, changed, load, r
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
-from kinetostat.units import KINDS, parse, written
+from kinetostat.units import KINDS, parse, written_value
 
 OWN = """\
 # what the designer wrote
@@ -155,7 +155,7 @@ def test_a_written_number_is_read_as_exactly_that_number(kind):
         for mantissa in (1.0, 0.1 + 0.2, math.pi, 17.4532925199432957, 9.999999999999998):
             value = mantissa * 10.0**exponent
             for like in (None, KINDS[kind].example, "5 cm", 7.0, "rigid", [1]):
-                assert parse(written(value, kind, like), kind) == value
+                assert parse(written_value(value, kind, like), kind) == value
 
 
 @pytest.mark.parametrize(
@@ -172,4 +172,4 @@ def test_a_written_number_is_read_as_exactly_that_number(kind):
     ],
 )
 def test_numbers_as_people_write_them(value, kind, like, text):
-    assert written(value, kind, like) == text
+    assert written_value(value, kind, like) == text

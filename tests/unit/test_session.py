@@ -14,7 +14,7 @@ pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not insta
 
 from kinetostat.studio.controls import PANELS, STEPS
 from kinetostat.studio.session import Memory, Session
-from kinetostat.studio.wording import shown
+from kinetostat.studio.wording import shown_value
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -136,7 +136,7 @@ def test_every_number_has_a_control_and_text_that_can_be_typed(case):
     held = session.values()
     for path, control in session.controls.items():
         assert control.panel in PANELS
-        text = shown(control.parameter.quantity, held[path])
+        text = shown_value(control.parameter.quantity, held[path])
         session.write(path, text)
         assert session.value(path) == pytest.approx(held[path], rel=1e-5, abs=1e-12)
 

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.scalar import is_zero
-from kinetostat.algebra.solve import complement, conjugate, dual_basis, eliminated, least_energy, right_inverse
+from kinetostat.algebra.solve import complement, conjugate, dual_basis, elimination, least_energy, right_inverse
 from numeric import U
 
 STABLE = 50 * U
@@ -225,8 +225,8 @@ def test_elimination_solves_and_its_pivots_tell_what_is_positive_definite(symmet
     drawn = np.random.default_rng(3).normal(size=(6, 6))
     matrix = drawn @ drawn.T + (np.zeros((6, 6)) if symmetric else 0.1 * (drawn - drawn.T))
     right = np.arange(1.0, 7.0)
-    factors = eliminated(matrix.tolist(), symmetric)
+    factors = elimination(matrix.tolist(), symmetric)
     assert factors.solve(right.tolist()) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-9)
     assert min(factors.pivots) > 0.0
     signs = np.linalg.eigvalsh(drawn + drawn.T) > 0.0
-    assert sum(pivot > 0.0 for pivot in eliminated((drawn + drawn.T).tolist()).pivots) == signs.sum()
+    assert sum(pivot > 0.0 for pivot in elimination((drawn + drawn.T).tolist()).pivots) == signs.sum()

@@ -10,7 +10,7 @@ from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.tolerance_classes import GRADES, SIZES, within_class, within_grade
-from kinetostat.spec.tolerance_table import SIGMAS, joined, read_tolerances
+from kinetostat.spec.tolerance_table import SIGMAS, joined_tolerances, read_tolerances
 
 
 def read(value):
@@ -120,7 +120,7 @@ def test_too_many_lines_are_refused():
 def test_paths_need_no_quotes_and_later_lines_come_last():
     lines = read_tolerances({"joints": "1 mm", "geometry": {"base_radius": "2 mm"}})
     assert list(lines) == ["joints", "geometry.base_radius"]
-    assert list(joined(lines, read_tolerances({"joints": "3 mm"}))) == ["geometry.base_radius", "joints"]
+    assert list(joined_tolerances(lines, read_tolerances({"joints": "3 mm"}))) == ["geometry.base_radius", "joints"]
 
 
 TEXT = """

@@ -21,7 +21,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinetostatics.response import compliance_at
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
@@ -86,7 +86,7 @@ def compliances_as_built(errors: Array, model: ErrorModel) -> Array:
     drawn = model.drawn.state
     configuration, _ = _configuration_near(model, np.asarray(errors, dtype=float), drawn.platform, drawn.coordinates)
     rows = compliance_at(model.machine, configuration).rows()
-    return stacked([entry for row in rows for entry in row], len(model)).reshape(-1, 6, 6)
+    return stacked_columns([entry for row in rows for entry in row], len(model)).reshape(-1, 6, 6)
 
 
 def _configuration_near(

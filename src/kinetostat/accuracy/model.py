@@ -32,7 +32,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.numerics.motions import Motions, cross
@@ -310,7 +310,7 @@ def error_model(
     platform, axes = _displacement(rows, response, count)
     with np.errstate(all="ignore"):
         coordinates = tuple(coordinates_toward(row, platform, rows.length) for row in rows.legs)
-    actuators = stacked([a.coordinate for a in stands], count)
+    actuators = stacked_columns([a.coordinate for a in stands], count)
     _mark_other_placements(rows, coordinates, actuators, status)
     springs, compliance_errors = _flexible_springs(response, count)
     tool_home = rows.point + rows.rotation @ np.array(machine.tables["tool"].offset, dtype=float)
@@ -318,7 +318,7 @@ def error_model(
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
     tool = platform.point(np.broadcast_to(tool_home, (count, 3)))
     state = ClosedLegs(platform, coordinates, np.ones(count, dtype=bool))
-    wrench = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
+    wrench = stacked_columns(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
     wrench = np.asarray(wrench, dtype=float)
     leg_compliances = _leg_compliances(response, rows, count)
     drawn = DrawnMachine(status, state, tool, axes, actuators, wrench, springs, leg_compliances)
@@ -332,9 +332,9 @@ def _displacement(rows: HomeRows, response: Response, count: int) -> tuple[Motio
     """Displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
     axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
-    columns = np.stack([stacked(axis.components(), count) for axis in axes], axis=2)
+    columns = np.stack([stacked_columns(axis.components(), count) for axis in axes], axis=2)
     rotation = columns @ rows.rotation.T
-    point = stacked(placement.translation.components(), count)
+    point = stacked_columns(placement.translation.components(), count)
     return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), columns
 
 
@@ -360,8 +360,8 @@ def _leg_compliances(response: Response, rows: HomeRows, count: int) -> tuple[Ar
     for leg in response.legs:
         soft = np.zeros((count, 6, 6))
         for twist, compliance in zip(leg.elastic, leg.compliance, strict=True):
-            size = stacked([compliance], count)
-            screw = in_lengths(stacked(twist.components(), count), rows.length)
+            size = stacked_columns([compliance], count)
+            screw = in_lengths(stacked_columns(twist.components(), count), rows.length)
             soft += np.where(np.isfinite(size), size, 0.0)[:, :, None] * screw[:, :, None] * screw[:, None]
         result.append(soft)
     return tuple(result)
@@ -374,12 +374,12 @@ def _flexible_springs(response: Response, count: int) -> tuple[tuple[FlexibleSpr
     for (leg, spring), twist, compliance in zip(
         of_legs, response.statics.flexibility, response.statics.compliance, strict=True
     ):
-        size = stacked([compliance], count)[:, 0]
+        size = stacked_columns([compliance], count)[:, 0]
         if not (np.isfinite(size).all() and (size > 0.0).any()):
             continue
         alone = sum(other.of == spring.of for _, other in of_legs) == 1
         part = (spring.of if alone else spring.name).removeprefix(f"{leg} ").replace(".", " ")
         words = f"compliance of the {part} of {leg}, relative"
-        flexible.append(FlexibleSpring(stacked(twist.components(), count), size))
+        flexible.append(FlexibleSpring(stacked_columns(twist.components(), count), size))
         names.append(MachineError(f"legs.{leg}.{part}.compliance", "ratio", "compliances", words, leg))
     return tuple(flexible), names

@@ -93,14 +93,14 @@ def squared_distance(first: tuple[Vector, Vector], second: tuple[Vector, Vector]
     d, e = along.dot(between), across.dot(between)
     crossed = a * c - b * b
     apart = crossed > PARALLEL_SEGMENTS * (a * c)
-    s = where(apart, _clamped((b * e - c * d) * reciprocal(where(apart, crossed, 1.0))), 0.0)
+    s = where(apart, _within_ends((b * e - c * d) * reciprocal(where(apart, crossed, 1.0))), 0.0)
     t = (b * s + e) * reciprocal(c)
-    begin, end = _clamped(-d * reciprocal(a)), _clamped((b - d) * reciprocal(a))
+    begin, end = _within_ends(-d * reciprocal(a)), _within_ends((b - d) * reciprocal(a))
     s = where(t < 0.0, begin, where(t > 1.0, end, s))
-    gap = between + along * s - across * _clamped(t)
+    gap = between + along * s - across * _within_ends(t)
     return gap.dot(gap)
 
 
-def _clamped(share: Scalar) -> Scalar:
+def _within_ends(share: Scalar) -> Scalar:
     """Limit a share to the range from 0 to 1."""
     return where(share > 0.0, smaller(share, 1.0), 0.0)

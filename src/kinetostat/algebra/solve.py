@@ -333,7 +333,7 @@ class Eliminated:
         return left
 
 
-def eliminated(rows: Sequence[Sequence[Scalar]], symmetric: bool = True) -> Eliminated:
+def elimination(rows: Sequence[Sequence[Scalar]], symmetric: bool = True) -> Eliminated:
     """Eliminate; of a symmetric matrix only the upper triangle is read."""
     left, size = [list(row) for row in rows], len(rows)
     lower: list[Row] = [[] for _ in rows]

@@ -55,10 +55,10 @@ class Help(argparse.RawDescriptionHelpFormatter):
         return textwrap.wrap(" ".join(text.split()), width, break_long_words=False, break_on_hyphens=False)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return "\n".join(part for line in as_typed(text).splitlines() for part in _broken(indent + line, width))
+        return "\n".join(part for line in as_typed(text).splitlines() for part in _lines_within(indent + line, width))
 
 
-def _broken(line: str, width: int) -> list[str]:
+def _lines_within(line: str, width: int) -> list[str]:
     """Return a line of the help in as many lines as it needs; an example begins with blanks."""
     if len(line) <= width:
         return [line]
@@ -338,7 +338,7 @@ def said_when_slow(what: str) -> "Iterator[None]":
         print(CLEAR_LINE, end="", file=words, flush=True)
 
 
-def judged(machine: "Machine", printing: bool = True) -> int:
+def judge_requirements(machine: "Machine", printing: bool = True) -> int:
     """Judge the requirements of a machine's file, print the verdicts, and return the exit code."""
     if not machine.requirements:
         return DONE
@@ -359,7 +359,7 @@ def no_answer(message: str) -> int:
     return NO_ANSWER
 
 
-def stopped(message: str) -> int:
+def say_stopped(message: str) -> int:
     """Print what remains of a command that was stopped; return the exit code."""
     print(f"\nkinetostat: stopped; {message}", file=sys.stderr)
     return STOPPED

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.asking import add_question, ask
-from kinetostat.commands.common import list_written, note_damage, stopped
+from kinetostat.commands.common import list_written, note_damage, say_stopped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,7 +62,7 @@ def _ask(word: str, question: "Question", options: argparse.Namespace) -> int:
 
         if not options.output or not holds_study(options.output):
             raise
-        return stopped(f"the results so far are in {options.output}; the same command continues from there.")
+        return say_stopped(f"the results so far are in {options.output}; the same command continues from there.")
 
 
 def _answer(
@@ -89,7 +89,7 @@ def _answer(
     wanted = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)
     with compute_with(Crew(options.workers, options.cluster)) as compute:
         if options.output and not wanted.fits_memory:
-            return _stored(options, wanted, word, progress, compute)
+            return _answer_into_folder(options, wanted, word, progress, compute)
         if options.output:
             _check_folder(options.output, options.resume)
         return answer(wanted, progress, compute)
@@ -106,7 +106,7 @@ def _check_folder(folder: Path, resume: bool) -> None:
         raise InputError("a grid that is kept in memory is computed at once and cannot be resumed; leave out --resume.")
 
 
-def _stored(
+def _answer_into_folder(
     options: argparse.Namespace, question: "GridQuestion", word: str, progress: "Progress", compute: "Compute"
 ) -> "StoredGrid":
     from kinetostat.studies.storage import differing

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from kinetostat.commands.common import (
     add_command,
     give,
-    judged,
+    judge_requirements,
     note_damage,
     search_bar,
     takes_figures,
@@ -115,4 +115,4 @@ def _show(options: argparse.Namespace, result: "Result", keys: "Sequence[str]" =
         return {key: data.get(key) for key in keys} if keys else data
 
     code = give(options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message)
-    return judged(result.machine, printing=not options.json) if result.solved else code
+    return judge_requirements(result.machine, printing=not options.json) if result.solved else code

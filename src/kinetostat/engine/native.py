@@ -145,7 +145,7 @@ def line(node: Node, names: Sequence[str], lanes: int) -> str:
     numbers, conditions = type_of(Traced, lanes), type_of(Condition, lanes)
     match node.operation:
         case "add" | "sub" | "mul" | "div":
-            return f"%v{node.number} = {ARITHMETIC[node.operation]}{_relaxed(node)} {numbers} {', '.join(names)}"
+            return f"%v{node.number} = {ARITHMETIC[node.operation]}{_fusing_flag(node)} {numbers} {', '.join(names)}"
         case "neg":
             return f"%v{node.number} = fneg {numbers} {names[0]}"
         case "steady":
@@ -162,7 +162,7 @@ def line(node: Node, names: Sequence[str], lanes: int) -> str:
     raise ValueError(f"no instruction for {node.operation}")
 
 
-def _relaxed(node: Node) -> str:
+def _fusing_flag(node: Node) -> str:
     """Return the flag that lets LLVM fuse an operation, except for a difference of two products.
 
     This difference must be exactly zero where the products are equal, so both must be rounded in the same way.

@@ -94,11 +94,11 @@ class Traced(Node):
         return _div(other, self)
 
     def __neg__(self) -> "Traced":
-        inner = _negated(self)
+        inner = _negated_operand(self)
         return self.graph.number("neg", self) if inner is None else inner
 
     def __abs__(self) -> "Traced":
-        inner = self if _negated(self) is None else _negated(self)
+        inner = self if _negated_operand(self) is None else _negated_operand(self)
         return inner if inner.operation in {"abs", "sqrt"} or inner.bounds else self.graph.number("abs", inner)
 
     def __lt__(self, other: Operand) -> Condition | bool:
@@ -293,7 +293,7 @@ def _operand(a: Any) -> Any:
     return a if isinstance(a, Node) else float(a)
 
 
-def _negated(a: Operand) -> Any:
+def _negated_operand(a: Operand) -> Any:
     """b where `a` is -b by its form, else None."""
     return a.operands[0] if isinstance(a, Node) and a.operation == "neg" else None
 
@@ -312,9 +312,9 @@ def _add(a: Any, b: Any) -> Any:
         return b
     if _is(b, 0.0):
         return a
-    if (minus := _negated(b)) is not None:
+    if (minus := _negated_operand(b)) is not None:
         return _sub(a, minus)
-    if (minus := _negated(a)) is not None:
+    if (minus := _negated_operand(a)) is not None:
         return _sub(b, minus)
     return _binary("add", a, b)
 
@@ -327,9 +327,9 @@ def _sub(a: Any, b: Any) -> Any:
         return -b
     if a is b and a.bounds:
         return 0.0
-    if (minus := _negated(b)) is not None:
+    if (minus := _negated_operand(b)) is not None:
         return _add(a, minus)
-    if (minus := _negated(a)) is not None:
+    if (minus := _negated_operand(a)) is not None:
         return -_add(minus, b)
     graph = (a if isinstance(a, Node) else b).graph
     opposite = graph.known("sub", b, a)
@@ -346,9 +346,9 @@ def _mul(a: Any, b: Any) -> Any:
         return 0.0
     if isinstance(b, float) and math.copysign(1.0, b) < 0.0:
         return -_mul(a, -b)
-    if (minus := _negated(a)) is not None:
+    if (minus := _negated_operand(a)) is not None:
         return -_mul(minus, b)
-    if (minus := _negated(b)) is not None:
+    if (minus := _negated_operand(b)) is not None:
         return -_mul(a, minus)
     return _binary("mul", a, b)
 
@@ -359,9 +359,9 @@ def _div(a: Any, b: Any) -> Any:
         return a
     if a is b and a.bounds:
         return 1.0
-    if (minus := _negated(a)) is not None:
+    if (minus := _negated_operand(a)) is not None:
         return -_div(minus, b)
-    if (minus := _negated(b)) is not None:
+    if (minus := _negated_operand(b)) is not None:
         return -_div(a, minus)
     return _binary("div", a, b)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, where
-from kinetostat.algebra.solve import Eliminated, Row, eliminated
+from kinetostat.algebra.solve import Eliminated, Row, elimination
 from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
@@ -262,7 +262,7 @@ class Tangent:
     def __init__(self, machine: Cut, place: Place) -> None:
         self.place, self.mechanism, self.carrier, self.rods = place, machine.mechanism, machine.carrier, machine.rods
         self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
-        self._factors = eliminated(place.rates.tolist(), self._symmetric)
+        self._factors = elimination(place.rates.tolist(), self._symmetric)
         self.step: Row = self._factors.solve((-place.terms.left[0]).tolist())
 
     @property
@@ -271,7 +271,7 @@ class Tangent:
         if self._symmetric:
             return definite(self._factors, self.place.rates)
         rows = 0.5 * (self.place.rates + self.place.rates.T)
-        return definite(eliminated(rows.tolist()), rows)
+        return definite(elimination(rows.tolist()), rows)
 
     def displacement(self) -> tuple[Row, Scalar]:
         """Rotation vector and displacement of the tool point after the step, and whether the turn is small enough."""
@@ -317,7 +317,7 @@ class Tangent:
     def factor(self) -> tuple[Scalar, Scalar]:
         """By which the load may grow until the state gives way, and whether springs alone hold the machine."""
         elastic, rates = self.place.elastic, self.place.rates
-        half = eliminated((0.5 * (elastic + elastic.T)).tolist())
+        half = elimination((0.5 * (elastic + elastic.T)).tolist())
         greatest = greatest_eigenvalue(relative(half, elastic - 0.5 * (rates + rates.T)))
         grows = greatest > UNRESISTED
         return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
@@ -348,7 +348,7 @@ def _inverse_diagonal(rows: list[Row], rank: int) -> tuple[Row, Scalar]:
     """The diagonal of the inverse of a symmetric matrix, infinite if its rank is less, and whether it is sure."""
     if rank < len(rows):
         return [math.inf] * len(rows), True
-    factors = eliminated(rows)
+    factors = elimination(rows)
     units = np.eye(len(rows)).tolist()
     solved = [factors.forward(unit) for unit in units]
     diagonal = [total([a * a * b for a, b in zip(row, factors.shrink, strict=True)]) for row in solved]

@@ -24,7 +24,7 @@ from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.kinetostatics.refusal import known_mobility, why_not
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.late import LateModule
-from kinetostat.machine.column import Column, stacked
+from kinetostat.machine.column import Column, stacked_columns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import loads_left_out, located_members
@@ -66,8 +66,8 @@ NEARBY = 0.03
 class MachineState(Immutable):
     """A machine at its pose, or at n poses, with all that follows from it.
 
-    `machine.loaded` says which state is meant: free, or at rest under all loads of the file. What is `free`, `relaxed`
-    or about limits and motions is known of both; what is at rest is solved for where somebody asks.
+    `machine.loaded` says which state is meant: free, or at rest under all loads of the file. What is `free`, or
+    about limits and motions, is known of both; what is at rest is solved for where somebody asks.
 
     Attributes:
         machine: the machine with its pose and its loads, or with columns of n poses.
@@ -153,7 +153,7 @@ class MachineState(Immutable):
         return "" if self.machine.loaded else loads_left_out(self.machine, self.configuration)
 
     @cached_property
-    def relaxed(self) -> "Balance":
+    def free_equations(self) -> "Balance":
         """The equations of the free state, without loads and preloads."""
         mechanism = solving.with_share(
             mechanisms.mechanism_of(self.machine, self.configuration, self.joints, self.count), 0.0
@@ -207,7 +207,7 @@ class MachineState(Immutable):
     def equations(self) -> "Balance | None":
         """The equations in the state that is meant, at a single pose; None where it comes to no stable rest."""
         if not self.machine.loaded:
-            return self.relaxed
+            return self.free_equations
         return self.at_rest if self.stands else None
 
     @cached_property
@@ -285,7 +285,7 @@ def _loaded_mechanism(
     mechanism = mechanisms.mechanism_of(machine, configuration, joints, count)
     check_loads(machine, count, mechanism.weighs)
     load = machine.tables["load"]
-    least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
     if np.isinf(least).all() and np.isinf(most).all():
         return mechanism, np.ones(count, dtype=bool)
     least = np.where(np.isinf(least), 0.0, least)
@@ -316,7 +316,7 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
             says how they grow.
     """
     load = machine.tables["load"]
-    if not weighs and np.any(stacked(load.gravity, count)):
+    if not weighs and np.any(stacked_columns(load.gravity, count)):
         raise InputError(
             f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
             "links a cross-section with a density."
@@ -325,9 +325,9 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         tables = (getattr(machine.tables[table], kind.name) for table in ("expansion", "temperature_rise"))
         expansions, rises = (entries if isinstance(entries, tuple) else (entries,) for entries in tables)
         for expansion, rise in zip(expansions, rises, strict=True):
-            growth_of(expansion, float(np.abs(stacked([rise], count)).max(initial=0.0)), kind.name)
-    turned = np.any(stacked([load.gravity_angle], count))
-    if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
+            growth_of(expansion, float(np.abs(stacked_columns([rise], count)).max(initial=0.0)), kind.name)
+    turned = np.any(stacked_columns([load.gravity_angle], count))
+    if turned and not stacked_columns(load.gravity_axis, count).any(axis=1).all():
         raise InputError(
             f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
             "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."

@@ -18,7 +18,7 @@ from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rota
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
-from kinetostat.machine.column import column, stacked
+from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 
@@ -218,7 +218,7 @@ def gaps_at(chains: Chains, coordinates: Array) -> Gaps:
     ends = leg_ends(chains, [column(c) for c in coordinates.T])
     scale = np.stack([np.ones(count)] * 3 + [1.0 / length] * 3, axis=1)[:, :, None] * units_of(chains, length)[:, None]
     twists = [block * scale for block in _platform_twists(ends, count)]
-    closure = stacked(_between_legs(ends, length), count) / length[:, None]
+    closure = stacked_columns(_between_legs(ends, length), count) / length[:, None]
     closure_rates = [np.zeros((count, 0, chains.size)), *(block - twists[0] for block in twists[1:])]
     return Gaps(closure, np.concatenate(closure_rates, axis=1), twists[0])
 
@@ -236,7 +236,7 @@ def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
     for end in ends:
         block = np.zeros((count, 6, size))
         for k, mover in enumerate(end.movers, first):
-            block[:, :, k] = stacked(mover.twist(end.platform.translation).components(), count)
+            block[:, :, k] = stacked_columns(mover.twist(end.platform.translation).components(), count)
         first += len(end.movers)
         blocks.append(block)
     return blocks

@@ -18,7 +18,7 @@ from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_o
 from kinetostat.kinematics.posture import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
-from kinetostat.machine.column import column, stacked
+from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import CLOSED
@@ -114,7 +114,7 @@ class ClosedForms:
         count = len(task.goal)
         with np.errstate(all="ignore"):
             closed = self.over_scalars(task.chains)
-            coordinates = stacked([_angle(amount) for amount in closed.coordinates], count)
+            coordinates = stacked_columns([_angle(amount) for amount in closed.coordinates], count)
             status = np.broadcast_to(np.asarray(closed.status), (count,))
             left = status == Status.NOT_CONVERGED
             if left.all():

@@ -22,7 +22,7 @@ from kinetostat.kinematics.closing import ANGLES, Joints, gaps_at, leg_ends, pos
 from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
-from kinetostat.machine.column import column, stacked
+from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.numerics.iteration import least_squares
@@ -124,7 +124,7 @@ class ByPose:
     def _off(self, unknowns: Array, goal: Array) -> Array:
         """Coordinates that the actuators lack [n x actuators]; NaN where a leg does not reach."""
         measured = actuators_of(self._with_unknowns(unknowns).configure())
-        off = goal - stacked([actuator.coordinate for actuator in measured], len(unknowns))
+        off = goal - stacked_columns([actuator.coordinate for actuator in measured], len(unknowns))
         return np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
 
     def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
@@ -227,7 +227,7 @@ class LegByLeg:
         columns = {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in self.chains.pose}
         there = closure.solve_joints(with_values(self.machine, columns))
         amounts = [actuator.at(there.coordinates).coordinate for actuator in self.driven]
-        off = goal - stacked(amounts, len(poses))
+        off = goal - stacked_columns(amounts, len(poses))
         off = np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
         close = np.abs(off).max(axis=1, initial=0.0) < ONE_PLACEMENT
         return [bool(same) for same in close & (np.asarray(there.status) == Status.OK)]

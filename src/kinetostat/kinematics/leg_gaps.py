@@ -17,7 +17,7 @@ from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
-from kinetostat.machine.column import column, plain, stacked
+from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
 from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
@@ -202,7 +202,7 @@ class Problems:
             each = 1.0 / np.repeat(lengths, legs)
             turned = rotation_between(ends.rotation, wanted.rotation).components()
             apart = [plain(c) * each for c in (wanted.translation - ends.translation).components()]
-            left.append(stacked([*turned, *apart], len(each)).reshape(len(lengths), 6 * legs))
+            left.append(stacked_columns([*turned, *apart], len(each)).reshape(len(lengths), 6 * legs))
             rates.append(self._spread(part, twists, wanted, len(lengths)))
             apart = plain(squared_distance(ends, wanted, column(np.repeat(lengths, legs))))
             distance = distance + np.asarray(apart).reshape(-1, legs).sum(axis=1)
@@ -237,7 +237,7 @@ class Problems:
         for k, places in enumerate(part.columns):
             rates[:, 6 * k : 6 * k + 6, places] = blocks[:, k]
         for k, name in enumerate(self.free, self.size - len(self.free)):
-            rates[:, :, k] = -stacked(_rates_of(name, wanted), count * legs).reshape(count, 6 * legs)
+            rates[:, :, k] = -stacked_columns(_rates_of(name, wanted), count * legs).reshape(count, 6 * legs)
         return rates
 
 

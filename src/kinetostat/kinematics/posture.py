@@ -51,7 +51,7 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
             break
         part, there = problems.take(rows), some(goal, rows)
         step, far = _steps(part, best[rows], there)
-        end, closed = _closed(part, best[rows] + share[:, None] * step, there)
+        end, closed = _closing_step(part, best[rows] + share[:, None] * step, there)
         # Sums of squares tell steps apart down to half of the digits; shorter ones are Newton's last and taken whole.
         short = largest(step) <= SURE_STEP
         nearer = closed & (short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
@@ -107,7 +107,7 @@ def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Arra
     return steps, far
 
 
-def _closed(problems: Problems, start: Array, goal: Coordinates) -> tuple[Array, Mask]:
+def _closing_step(problems: Problems, start: Array, goal: Coordinates) -> tuple[Array, Mask]:
     """Close the legs again after a step, by least motions; return unknowns and whether that closes them."""
 
     def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:

@@ -14,7 +14,16 @@ from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
+from kinetostat.kinetostatics.leg import (
+    INFINITE,
+    Action,
+    Modes,
+    combine,
+    free_springs_as_joints,
+    leg_modes,
+    leg_resistance,
+    modes_of,
+)
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNFELT, UNREACHED_COMPONENT
 
@@ -72,7 +81,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
 
     Source: theory (4), (8) and (9), eqs. 21 and 32.
     """
-    shared = _shared(legs, length, guide)
+    shared = _sharing(legs, length, guide)
     resistances = [leg_resistance(leg) for leg in legs]
     shares_of_k = [share for resistance in resistances for share in resistance.shares]
     return Statics(
@@ -98,7 +107,7 @@ def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         legs, guide: as for `solve_statics`.
         length: characteristic length, m.
     """
-    shared = _shared(legs, length, guide)
+    shared = _sharing(legs, length, guide)
     return without_round_off(weighted_sum(shared.motions, reciprocal(length)), length, shared.round_off)
 
 
@@ -115,11 +124,11 @@ class _Shared:
     round_off: Scalar
 
 
-def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
+def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
     """How the legs share any load."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
-    balanced = [relaxed(leg) for leg in legs] if redundant else legs
-    modes = [modes_of(leg) if redundant or _in_series(leg) else _unchanged(leg) for leg in balanced]
+    balanced = [free_springs_as_joints(leg) for leg in legs] if redundant else legs
+    modes = [modes_of(leg) if redundant or _in_series(leg) else _wrenches_as_modes(leg) for leg in balanced]
     wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
         twists, singularity_margin = dual_twists(wrenches, length)
@@ -168,7 +177,7 @@ def _in_series(leg: LegScrews) -> bool:
     return len(leg.loads) > len(leg.wrenches) and not free
 
 
-def _unchanged(leg: LegScrews) -> Modes:
+def _wrenches_as_modes(leg: LegScrews) -> Modes:
     """The wrenches of a leg as modes without compliances: with six wrenches in all, nothing else is needed."""
     return Modes(leg.wrenches, leg.loads, (), ())
 

@@ -84,11 +84,11 @@ def frobenius_condition(response: Response) -> Scalar:
 
 def _squares(matrix: Symmetric6, arm: Scalar, there: Sequence[int]) -> Scalar:
     """Sum of the squares of a matrix whose rotational rows and columns are multiplied by a length or its reciprocal."""
-    scaled = [[_scaled(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
+    scaled = [[_times_power(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
     return total([entry * entry for row in scaled for entry in row])
 
 
-def _scaled(value: Scalar, arm: Scalar, power: int) -> Scalar:
+def _times_power(value: Scalar, arm: Scalar, power: int) -> Scalar:
     for _ in range(power):
         value = value * arm
     return value

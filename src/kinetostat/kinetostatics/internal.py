@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.algebra.screw import Wrench
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.leg import relaxed
+from kinetostat.kinetostatics.leg import free_springs_as_joints
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES
 
@@ -47,7 +47,7 @@ def internal_loads(
         length: characteristic length, m; moments compare with forces through it.
         guide: of a planar machine, the wrenches against twists that do not exist there.
     """
-    balanced = [relaxed(leg) for leg in legs]
+    balanced = [free_springs_as_joints(leg) for leg in legs]
     owners = np.repeat(np.arange(len(legs)), [len(leg.wrenches) for leg in balanced])
     columns = [wrench.components() for leg in balanced for wrench in leg.wrenches]
     columns += [wrench.components() for wrench in guide]
@@ -63,8 +63,8 @@ def internal_loads(
     return InternalLoads(
         internal.shape[1],
         internal.shape[1] - decided,
-        _involved(names, owners, internal),
-        _involved(names, owners, undecided),
+        _involved_legs(names, owners, internal),
+        _involved_legs(names, owners, undecided),
     )
 
 
@@ -82,7 +82,7 @@ def _load_shares(legs: Sequence[LegScrews]) -> Array:
     return np.array(rows).reshape(len(rows), every)
 
 
-def _involved(names: Sequence[str], owners: Integers, loads: Array) -> tuple[str, ...]:
+def _involved_legs(names: Sequence[str], owners: Integers, loads: Array) -> tuple[str, ...]:
     """Names of the legs that carry a share of any of these loads."""
     if not loads.size:
         return ()

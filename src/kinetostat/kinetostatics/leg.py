@@ -27,7 +27,7 @@ Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
 
 
-def relaxed(leg: LegScrews) -> LegScrews:
+def free_springs_as_joints(leg: LegScrews) -> LegScrews:
     """Turn the free springs of a leg into passive joints: it then carries only wrenches that load none of them.
 
     Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
@@ -35,7 +35,7 @@ def relaxed(leg: LegScrews) -> LegScrews:
     free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if type(s) is float and s == INFINITE]
     if not free:
         return leg
-    felt = _independent(free)
+    felt = _independent_rows(free)
     basis: list[list[Scalar]] = []
     singularity_margin = leg.singularity_margin
     if len(felt) < len(leg.wrenches):
@@ -54,7 +54,7 @@ def relaxed(leg: LegScrews) -> LegScrews:
     )
 
 
-def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
+def _independent_rows(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
     """The rows that do not repeat others, where they are numbers; all others."""
     kept: list[Sequence[Scalar]] = []
     for row in rows:
@@ -174,7 +174,7 @@ def leg_resistance(leg: LegScrews) -> Resistance:
     Source: theory (10) and (11).
     """
     if len(leg.loads) != len(leg.wrenches):
-        leg = relaxed(leg)
+        leg = free_springs_as_joints(leg)
     if not leg.wrenches:
         return Resistance([(NOTHING, 0.0)] * len(leg.loads), [])
     stiffness = [reciprocal(s) for s in leg.compliance]

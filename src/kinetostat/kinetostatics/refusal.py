@@ -38,7 +38,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         if placed is Status.OUT_OF_REACH:
             return _off_constraint(machine)
         if placed is not Status.OK:
-            return _undetermined(machine) if placed is Status.SINGULAR else placed.sentence
+            return _undetermined_pose(machine) if placed is Status.SINGULAR else placed.sentence
     if status is Status.OUT_OF_REACH:
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
@@ -91,7 +91,7 @@ def _off_constraint(machine: Machine) -> str:
     )
 
 
-def _undetermined(machine: Machine) -> str:
+def _undetermined_pose(machine: Machine) -> str:
     given = ", ".join(name.removeprefix("pose.") for name in vars(machine.tables["pose"]))
     return (
         f"The pose is not determined: the legs close at the given {given}, but the platform can still move there. "

@@ -159,7 +159,7 @@ def plain(values: Any) -> Any:
     return values.values if values.__class__ is Column else values
 
 
-def stacked(scalars: Sequence[Scalar], count: int) -> Array:
+def stacked_columns(scalars: Sequence[Scalar], count: int) -> Array:
     """Stack scalars as columns [n x scalars]."""
     if not scalars:
         return np.zeros((count, 0))

@@ -150,7 +150,7 @@ def _most(kind: str, meaning: str, positive: bool = True, most: float = math.inf
     return Quantity(kind, meaning, positive, most=most, unset=math.inf)
 
 
-def _squared(number: Scalar) -> Scalar:
+def _square(number: Scalar) -> Scalar:
     return number * number
 
 
@@ -219,7 +219,7 @@ LIMITS = {
             sentence="stands at {} to the base's z axis",
             phrase="a base joint turned too far",
             title="angle at the base joints",
-            compared=lambda limit: _squared(cos(limit)),
+            compared=lambda limit: _square(cos(limit)),
             shown=_angle,
             falling=True,
         ),
@@ -233,7 +233,7 @@ LIMITS = {
             sentence="stands at {} to the platform's z axis",
             phrase="a platform joint turned too far",
             title="angle at the platform joints",
-            compared=lambda limit: _squared(cos(limit)),
+            compared=lambda limit: _square(cos(limit)),
             shown=_angle,
             falling=True,
         ),
@@ -271,7 +271,7 @@ LIMITS = {
             sentence="come within {} of each other",
             phrase="legs touch",
             title="distance between leg axes",
-            compared=_squared,
+            compared=_square,
             shown=math.sqrt,
         ),
     )

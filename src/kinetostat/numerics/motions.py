@@ -15,7 +15,7 @@ from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
 from kinetostat.algebra.vector import Vector, rotation_along
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.numerics.iteration import with_rows
 
 NEXT, AFTER = [1, 2, 0], [2, 0, 1]
@@ -153,7 +153,7 @@ def each_twist(motions: Sequence[Motions], twists: Array) -> Array:
 def of_scalars(scalars: Sequence[Scalar], count: int | None = None) -> Array:
     """Scalars as columns [n x scalars]; without a count as objects, whatever they are [1 x scalars]."""
     if count is not None:
-        return stacked(scalars, count)
+        return stacked_columns(scalars, count)
     result = np.empty((1, len(scalars)), dtype=object)
     for place, scalar in enumerate(scalars):
         result[0, place] = float(scalar) if isinstance(scalar, int | np.floating) else scalar

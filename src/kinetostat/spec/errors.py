@@ -58,11 +58,11 @@ def choice(value: object, known: Iterable[str], what: str) -> str:
     if isinstance(value, str) and value in names:
         return value
     near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
-    hint = f'did you mean "{near[0]}"?' if near else f"choose from {_listed(names) or 'none: nothing is defined'}."
+    hint = f'did you mean "{near[0]}"?' if near else f"choose from {_list_of(names) or 'none: nothing is defined'}."
     raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_of(names: Sequence[str]) -> str:
     """All names with commas; those that count on by the first and the last: frequency_1 to frequency_6."""
     runs: list[list[str]] = []
     for name in names:

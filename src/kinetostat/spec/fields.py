@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written
+from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written_value
 
 LARGEST_OF_KIND = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
@@ -150,7 +150,7 @@ class Quantity:
 
     def written(self, value: float, like: object = None) -> str | float:
         """An SI value of it as people write it in a file, in the unit of what stood there before."""
-        return NO_LIMIT if value == self.unset else written(value, self.kind, like)
+        return NO_LIMIT if value == self.unset else written_value(value, self.kind, like)
 
     def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
         """Return the JSON Schema of what may be written; pydantic asks for it in `machine.file_schema`."""

@@ -138,11 +138,11 @@ def take_tolerances(document: Document, settings: Sequence[str], origin: str) ->
             raise InputError(f'{shorten(setting)} must be {TABLE}.WHAT=VALUE, e.g. {TABLE}.joints="0.05 mm".')
         _, dot, about = path.partition(".")
         line = {about.strip().strip("\"'"): setting_value(value.strip())} if dot else setting_value(value.strip())
-        tolerances = joined(tolerances, read_tolerances(line))
+        tolerances = joined_tolerances(tolerances, read_tolerances(line))
     return {key: value for key, value in document.items() if key != TABLE}, others, tolerances
 
 
-def joined(tolerances: Mapping[str, Tolerance], further: Mapping[str, Tolerance]) -> Tolerances:
+def joined_tolerances(tolerances: Mapping[str, Tolerance], further: Mapping[str, Tolerance]) -> Tolerances:
     """Tolerances with further ones after them, which hold where both are about the same number."""
     return {**{about: line for about, line in tolerances.items() if about not in further}, **further}
 

@@ -240,7 +240,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
-    statics = clean_statics(_turned(response.statics, turn))
+    statics = clean_statics(_turned_statics(response.statics, turn))
     stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
     kept = machine.family.components
     compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
@@ -293,7 +293,7 @@ def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
     return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
 
 
-def _turned(statics: Statics, turn: Rotation) -> Statics:
+def _turned_statics(statics: Statics, turn: Rotation) -> Statics:
     """Return the statics with `turn` applied to every screw from which K, C and their attribution are computed."""
     return replace(
         statics,

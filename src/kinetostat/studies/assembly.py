@@ -70,7 +70,7 @@ class Forward(Immutable):
     message: str
 
     def __repr__(self) -> str:
-        return f"<Forward kinematics of {self.machine.name!r}: {_counted(len(self.poses))}>"
+        return f"<Forward kinematics of {self.machine.name!r}: {_count_of_modes(len(self.poses))}>"
 
     @property
     def present(self) -> ForwardPose | None:
@@ -101,7 +101,7 @@ def forward(
     """
     _check_search(starts, spread)
     system = system_of(machine)
-    driven = _driven(system, actuators or {}, machine)
+    driven = _given_actuators(system, actuators or {}, machine)
     if undriven(system):
         raise InputError(
             f"{machine.name}: the actuators do not determine the pose: the platform can move while they stand still. "
@@ -109,7 +109,7 @@ def forward(
         )
     goal = np.array([actuator.coordinate for actuator in driven], dtype=float)
     modes = assembly_modes(system, goal, starts, spread)
-    poses = tuple(_judged(machine, mode) for mode in modes)
+    poses = tuple(_judged_pose(machine, mode) for mode in modes)
     return Forward(machine, driven, poses, _message(modes, machine, len(goal)))
 
 
@@ -120,7 +120,7 @@ def _check_search(starts: int, spread: float) -> None:
         raise InputError(f"spread is {shorten(spread)}; give a number greater than 0 and at most pi.")
 
 
-def _driven(system: System, given: Mapping[str, float | str], machine: Machine) -> tuple[Actuator, ...]:
+def _given_actuators(system: System, given: Mapping[str, float | str], machine: Machine) -> tuple[Actuator, ...]:
     """The actuators at the coordinates that are given, or where they stand."""
     if not system.actuators:
         raise InputError(f"{machine.name} has no actuator; forward kinematics needs one for each freedom.")
@@ -152,7 +152,7 @@ def _names(system: System) -> dict[str, Actuator]:
     return {**alone, **{actuator.name: actuator for actuator in system.actuators}}
 
 
-def _judged(machine: Machine, mode: AssemblyMode) -> ForwardPose:
+def _judged_pose(machine: Machine, mode: AssemblyMode) -> ForwardPose:
     """An assembly mode with the status that the machine has there."""
     there = with_values(machine, {f"{POSE}{name}": value for name, value in mode.pose.items()})
     status = Status(int(respond(there, mode.joints).status))
@@ -162,7 +162,7 @@ def _judged(machine: Machine, mode: AssemblyMode) -> ForwardPose:
     return ForwardPose(mode.pose, status, mode.residual, mode.present, mode.by_pose, position, tuple(rows))
 
 
-def _counted(count: int) -> str:
+def _count_of_modes(count: int) -> str:
     return f"{count} assembly mode{'' if count == 1 else 's'}"
 
 
@@ -175,7 +175,7 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
             f"further away (spread).{more}"
         )
     there = "there is" if len(modes) == 1 else "there are"
-    first = f"Near the pose {there} {_counted(len(modes))} with these actuator coordinates."
+    first = f"Near the pose {there} {_count_of_modes(len(modes))} with these actuator coordinates."
     if not any(mode.present for mode in modes):
         return (
             f"{first} Moved evenly, the actuators do not lead to any of them: the present mode ends on the way, at a "

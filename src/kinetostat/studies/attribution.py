@@ -5,7 +5,7 @@ The formulas are in `kinetostatics.assembly`; tables and bars of the contributio
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias, TypeVar
+from typing import Protocol, TypeAlias, TypeVar
 
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.frozen import dataclass
@@ -84,6 +84,17 @@ MOST_OF_IT = 0.6
 """Share that the named parts must have together; otherwise kinds of parts are named."""
 
 Key = TypeVar("Key")
+
+
+class WithGreatest(Protocol):
+    """An effect on several directions or indices."""
+
+    @property
+    def greatest(self) -> float:
+        """Size of the greatest of them."""
+
+
+Effect = TypeVar("Effect", bound=WithGreatest)
 Shares: TypeAlias = tuple[tuple[str, float], ...]
 """Names of parts and their shares, the greatest share first."""
 
@@ -153,12 +164,17 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
         f"{kind} ×{len(members)}" if len(members) > 1 else next(iter(members)): sum(parts[part] for part in members)
         for kind, members in kinds.items()
     }
-    return ranked(parts), ranked(together)
+    return ranking_of(parts), ranking_of(together)
 
 
-def ranked(shares: Mapping[Key, float]) -> tuple[tuple[Key, float], ...]:
+def ranking_of(shares: Mapping[Key, float]) -> tuple[tuple[Key, float], ...]:
     """Sort shares, the greatest first; those that are equal but for round-off keep their order."""
     return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))
+
+
+def strongest_first(effects: Sequence[Effect]) -> list[Effect]:
+    """Sort effects by the size of the greatest of each; those that are equal but for round-off keep their order."""
+    return [effects[place] for place, _ in ranking_of({place: item.greatest for place, item in enumerate(effects)})]
 
 
 def largest_contributors(parts: Shares, kinds: Shares) -> str:

@@ -22,7 +22,7 @@ from kinetostat.kinematics.closing import Joints, pose_of
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
@@ -177,8 +177,8 @@ def _actuators(
     """All actuators, where they stand, and whether their coordinates grow as they move forward [n x actuators]."""
     if joints is None:
         actuators = actuators_of(response.configuration)
-        senses = stacked(senses_of(response.configuration), count)
-        return actuators, stacked([actuator.coordinate for actuator in actuators], count), senses
+        senses = stacked_columns(senses_of(response.configuration), count)
+        return actuators, stacked_columns([actuator.coordinate for actuator in actuators], count), senses
     # What counts from the home pose depends on the geometry there, which seldom varies.
     built = {path: column for path, column in columns.items() if path.split(".")[0] in machine.family.tables}
     built = {path: column for path, column in built.items() if not path.startswith("pose.")}
@@ -187,7 +187,7 @@ def _actuators(
     placed = [actuator.at(joints.coordinates) for actuator in of_rows[0]]
     senses = np.broadcast_to(np.array([[each.sign for each in row] for row in of_rows]), (count, len(placed)))
     offsets = np.array([[each.offset - of_rows[0][k].offset for k, each in enumerate(row)] for row in of_rows])
-    return placed, stacked([actuator.coordinate for actuator in placed], count) + offsets, senses
+    return placed, stacked_columns([actuator.coordinate for actuator in placed], count) + offsets, senses
 
 
 @dataclass(frozen=True, eq=False)

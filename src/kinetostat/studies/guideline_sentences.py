@@ -59,7 +59,7 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
     """Which elements each direction depends on; directions of which the same is true share a sentence."""
     single, over = _single(answer), answer.over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
-    for i in _compliant(here):
+    for i in _compliant_directions(here):
         mask = here.shares[single, i] >= MATTERS
         holds = None if over is None else _share_of((over.shares[single, i] >= MATTERS) == mask)
         groups.setdefault((mask.tobytes(), holds), []).append(i)
@@ -71,8 +71,8 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
             if row.max() >= MATTERS
         ]
         silent = [_the(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
-        aside = f", not from {_listed(silent, 'or')}" if silent else ""
-        text = f"{_where(answer, directions)} the compliance comes from {_listed(deciding)}{aside}."
+        aside = f", not from {_list_of(silent, 'or')}" if silent else ""
+        text = f"{_where(answer, directions)} the compliance comes from {_list_of(deciding)}{aside}."
         yield Statement("compliance", _capital(text), holds)
     for word, extreme in (("rigid", 0.0), ("free", math.inf)):
         directions = [i for i, c in enumerate(answer.compliance_diagonal) if c == extreme]
@@ -86,8 +86,8 @@ def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     if not single:
         return
     best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
-    for k in dict.fromkeys(best[_compliant(here)].tolist()):
-        directions = [i for i in _compliant(here) if best[i] == k]
+    for k in dict.fromkeys(best[_compliant_directions(here)].tolist()):
+        directions = [i for i in _compliant_directions(here) if best[i] == k]
         row, many = gains[k, directions], _many(answer.elements[single[k]])
         text = (
             f"{_where(answer, directions)} {_the(answer, single[k])} {'are' if many else 'is'} weakest: doubling "
@@ -100,7 +100,7 @@ def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
 def _counts_as_rigid(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """From which stiffness on an element may be taken as rigid; directions with similar limits share one."""
     for k, element in enumerate(answer.elements):
-        factors = {i: float(here.rigid[k, i, 0]) for i in _compliant(here) if here.rigid[k, i, 0] > 0.0}
+        factors = {i: float(here.rigid[k, i, 0]) for i in _compliant_directions(here) if here.rigid[k, i, 0] > 0.0}
         if element.actuated or not factors:
             continue
         clauses = []
@@ -184,7 +184,7 @@ def _single(answer: Guidelines) -> list[int]:
     return single
 
 
-def _compliant(roles: Roles) -> list[int]:
+def _compliant_directions(roles: Roles) -> list[int]:
     """Places of the directions that are neither rigid nor free; none where the machine has no elements."""
     return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
 
@@ -252,10 +252,10 @@ def _where(answer: Guidelines, directions: Sequence[int]) -> str:
         return "in every direction"
     names = [answer.components[i] for i in directions]
     about, along = [name[1:] for name in names if len(name) == 2], [name for name in names if len(name) == 1]
-    return " and ".join([f"{word} {_listed(axes)}" for word, axes in (("about", about), ("along", along)) if axes])
+    return " and ".join([f"{word} {_list_of(axes)}" for word, axes in (("about", about), ("along", along)) if axes])
 
 
-def _listed(words: Sequence[str], last: str = "and") -> str:
+def _list_of(words: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 

@@ -35,6 +35,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
+from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.sensitivity import (
     Sensitivity,
@@ -332,9 +333,9 @@ def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
     for parameter in sensitivities.parameters:
         if designed(machine, parameter.path):
             row = np.where(compliant, [math.nan if p is None else -p for p in parameter.percents], math.nan)
-            entries.setdefault(_together(machine, parameter.path), []).append(row)
+            entries.setdefault(_path_of_element(machine, parameter.path), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
-    quiet = [_together(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
+    quiet = [_path_of_element(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
     zero = np.where(compliant, 0.0, math.nan)
     rows |= {path: zero for path in quiet if path not in rows}
     kinds = _kinds(machine)
@@ -342,7 +343,7 @@ def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
         Move(path, tuple(None if math.isnan(p) else float(p) for p in row), turning=kinds[path] == "angle")
         for path, row in rows.items()
     ]
-    return sorted(moves, key=lambda move: -move.greatest)
+    return strongest_first(moves)
 
 
 def designed(machine: Machine, path: str) -> bool:
@@ -360,7 +361,7 @@ def _kinds(machine: Machine) -> dict[str, str]:
     return {p.path: p.quantity.kind for p in parameters(machine.family)}
 
 
-def _together(machine: Machine, path: str) -> str:
+def _path_of_element(machine: Machine, path: str) -> str:
     """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
     field = path.rpartition(".")[0]
     whole = {p.path: p for p in parameters(machine.family)}.get(field)

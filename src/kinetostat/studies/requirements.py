@@ -103,13 +103,13 @@ def requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     state, judged = state_of(machine), list[Verdict]()
     for name, requirement in state.machine.requirements.items():
         try:
-            judged += _judged(state, name, requirement)
+            judged += _verdicts_of(state, name, requirement)
         except InputError as error:
             raise InputError(f"requirements.{name}: {error}") from None
     return tuple(judged)
 
 
-def _judged(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
+def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
     machine, show = state.machine, state.machine.display.show
     conditions = [parse_condition(text, machine.family.component_names) for text in requirement.demand]
     points, varied, where = _poses(machine, requirement)

@@ -25,7 +25,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.attribution import ranked
+from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
@@ -214,8 +214,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
     known = [p for p in candidates if not reasons[p.path]]
     influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
-    order = ranked({place: item.greatest for place, item in enumerate(influences) if item.greatest > NO_INFLUENCE})
-    shown = tuple(influences[place] for place, _ in order)
+    shown = tuple(strongest_first([item for item in influences if item.greatest > NO_INFLUENCE]))
     quiet = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
     skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
     return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped, uncounted)

@@ -134,7 +134,7 @@ def answer_into(
         if _partial(final).exists():
             _partial(final).replace(final)
         records = study.records()
-        summary = combined([records[number] for number in range(work.count)], question.names)
+        summary = tally_of([records[number] for number in range(work.count)], question.names)
         return StoredGrid(question, final, summary, work.count, len(missing), repaired, layout is None)
 
 
@@ -292,7 +292,7 @@ def tally(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def combined(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
+def tally_of(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
     """Combine counts and extremes of several chunks."""
     kept = list(parts)
     words: Counter[str] = Counter()

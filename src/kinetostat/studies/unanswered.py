@@ -92,7 +92,7 @@ def _stiffness(response: Response, turn: Rotation, length: float) -> Array | Non
         compliance = np.array(leg.compliance, dtype=float)
         if not (float(leg.singularity_margin) > SINGULAR and np.isfinite(compliance).all()):
             return None
-        wrenches = np.array([_turned(wrench, turn) for wrench in leg.wrenches]).reshape(-1, 6).T
+        wrenches = np.array([_turned_components(wrench, turn) for wrench in leg.wrenches]).reshape(-1, 6).T
         loads = np.array(leg.loads, dtype=float).reshape(len(compliance), -1)
         if not (np.isfinite(wrenches).all() and np.isfinite(loads).all()):
             return None
@@ -104,5 +104,5 @@ def _stiffness(response: Response, turn: Rotation, length: float) -> Array | Non
     return whole
 
 
-def _turned(screw: Screw, turn: Rotation) -> list[float]:
+def _turned_components(screw: Screw, turn: Rotation) -> list[float]:
     return [float(component) for component in screw.rotated(turn).components()]

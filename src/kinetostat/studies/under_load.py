@@ -205,8 +205,8 @@ def _at_rest(state: MachineState, equations: Balance, judged: Stability) -> Load
         _linear(response, mechanism, parts),
         tuple(springs),
         slack,
-        _cleaned(springs_alone),
-        _cleaned(inverse(soft[None])[0]),
+        _clean_stiffness(springs_alone),
+        _clean_stiffness(inverse(soft[None])[0]),
         clean_matrix(soft.tolist()),
         None if math.isnan(judged.factor) else judged.factor,
         tuple((judged.mode * units)[parts].tolist()),
@@ -265,7 +265,7 @@ def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float,
     return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
 
 
-def _cleaned(stiffness: Array) -> list[list[float]] | None:
+def _clean_stiffness(stiffness: Array) -> list[list[float]] | None:
     """A stiffness without round-off; None where no component has a finite one.
 
     Where springs hold nothing in a direction, its entries are round-off beside those of the others of their kind.

@@ -61,12 +61,12 @@ class OwnOrigin:
         if scope["type"] not in ("http", "websocket"):
             await self._served(scope, receive, send)
         elif not _foreign(dict(scope["headers"])):
-            await self._served(scope, receive, _protected(send))
+            await self._served(scope, receive, _protecting_send(send))
         elif scope["type"] == "websocket":
             await receive()  # the request to connect
             await send({"type": "websocket.close", "code": 1008})
         else:
-            await _refuse(_protected(send), 403)
+            await _refuse(_protecting_send(send), 403)
 
 
 def _foreign(headers: dict[bytes, bytes]) -> bool:
@@ -79,7 +79,7 @@ def _foreign(headers: dict[bytes, bytes]) -> bool:
     return elsewhere and not link
 
 
-def _protected(send: Send) -> Send:
+def _protecting_send(send: Send) -> Send:
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
             protection = [(name.encode(), value.encode()) for name, value in PROTECTION.items()]
@@ -182,7 +182,7 @@ class Paced:
         return pace
 
 
-def timed(handler: Callable[[str, Any], None], scope_of: Callable[[str], Scope]) -> Callable[[str, Any], None]:
+def timed_handler(handler: Callable[[str, Any], None], scope_of: Callable[[str], Scope]) -> Callable[[str, Any], None]:
     """Return a handler of messages that adds the time it takes to the pace of the connection.
 
     Args:

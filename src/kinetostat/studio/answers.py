@@ -201,7 +201,7 @@ def quantity_map(request: MapRequest) -> dict[str, Array] | str:
 
 def _values_of(request: MapRequest) -> dict[str, Array]:
     modal = QUANTITIES[request.quantity].modal
-    machine = request.machine if modal else _unloaded(request.machine)
+    machine = request.machine if modal else _without_load(request.machine)
     present, family = values(machine), machine.family
     leaves = [find(family, ends.path).leaves for ends in (request.across, request.up)]
     varied = {leaf for paths in leaves for leaf in paths}
@@ -217,7 +217,7 @@ def _values_of(request: MapRequest) -> dict[str, Array]:
     return evaluate(machine, grid, wanted, repeated=not slow).values
 
 
-def _unloaded(machine: Machine) -> Machine:
+def _without_load(machine: Machine) -> Machine:
     """Remove the load, unless actuators have limits: a load may exceed them, and then decides the status."""
     limits = machine.tables["limits"]
     if is_set(limits.actuator_force) or is_set(limits.actuator_moment):

@@ -138,10 +138,10 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
         length: its characteristic length, m.
     """
     present = values(machine)
-    return tuple(_control(parameter, present, length) for parameter in _offered(machine, present))
+    return tuple(_control(parameter, present, length) for parameter in _offered_parameters(machine, present))
 
 
-def _offered(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
+def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
     """Offer every number, and a field of several as one control where its entries are alike in kind and value.
 
     Of an inertia the three moments move together: no body has a moment about one axis alone.

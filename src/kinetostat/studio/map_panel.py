@@ -44,9 +44,9 @@ class MapPanel:
         self._session, self._on_change = session, on_change
         self._lane = Lane(quantity_map, self._deliver)
         with ui.row().classes("panel-tools"):
-            self.quantity = choice({}, "map of", self._chosen, "map-quantity")
-            self.across = choice({}, "horizontal axis", self._chosen, "map-across")
-            self.up = choice({}, "vertical axis", self._chosen, "map-up")
+            self.quantity = choice({}, "map of", self._choose, "map-quantity")
+            self.across = choice({}, "horizontal axis", self._choose, "map-across")
+            self.up = choice({}, "vertical axis", self._choose, "map-up")
             with icon_button("straighten", "Ranges of the axes", self._show_ranges, "map-ranges"):
                 self._menu = ui.menu().props("no-parent-event").classes("map-ranges")
         with self._menu:
@@ -188,7 +188,7 @@ class MapPanel:
             raise InputError(f"the range of {control.label} is {shorten(text)}; its first end must be the lower one.")
         return low, high
 
-    def _chosen(self) -> None:
+    def _choose(self) -> None:
         if self._asking:
             self.refresh()
 

@@ -82,7 +82,7 @@ class FilesMenu:
             elif len(files) == 1:
                 ui.download(files[0][1], files[0][0])
             else:
-                ui.download(_packed(files), f"{Path(name).stem}.zip")
+                ui.download(_archive_of(files), f"{Path(name).stem}.zip")
 
     async def _run(self, folder: Path, words: Sequence[str]) -> str:
         """Run a command in a folder and return its message: if it has written no file, the message says why."""
@@ -101,7 +101,7 @@ class FilesMenu:
             self._process.kill()
 
 
-def _packed(files: Sequence[tuple[str, bytes]]) -> bytes:
+def _archive_of(files: Sequence[tuple[str, bytes]]) -> bytes:
     """Pack several files into a ZIP archive."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -59,8 +59,8 @@ class StudioPage:
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
-        self._pictures = Lane(picture, self._show_picture, self._unanswered, lambda: self.scene.wait())
-        self._reports = Lane(report, self._show_report, self._unanswered)
+        self._pictures = Lane(picture, self._show_picture, self._say_failure, lambda: self.scene.wait())
+        self._reports = Lane(report, self._show_report, self._say_failure)
         self._latest: Report | None = None
         self._front: Panel | None = None
         self.dark = ui.dark_mode(value=None)
@@ -87,7 +87,7 @@ class StudioPage:
             self.questions = AskTab(self.session)
         ui.context.client.on_delete(self._close)
         ui.on_exception(lambda error: refuse(f"Something could not be done or shown. {as_sentence(error)}"))
-        self._loaded()
+        self._show_machine()
 
     def _header(self) -> None:
         with ui.element("header").classes("top"):
@@ -133,7 +133,7 @@ class StudioPage:
         self.questions.changed()
         self._offer_history()
 
-    def _loaded(self) -> None:
+    def _show_machine(self) -> None:
         """Show another machine: every control, list and picture is made again."""
         machine = self.session.machine
         names = {name: name for name in bundled()}
@@ -190,7 +190,7 @@ class StudioPage:
         self.parameters.go_on()
         self._report()
 
-    def _unanswered(self, error: Exception) -> None:
+    def _say_failure(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed, and let a waiting slider go on."""
         self.scene.fail(error)
         self.parameters.go_on()
@@ -251,7 +251,7 @@ class StudioPage:
         except InputError as error:
             refuse(str(error))
             return
-        self._loaded()
+        self._show_machine()
 
     def _to_front(self) -> None:
         mode = str(self.mode.value)
@@ -269,7 +269,7 @@ class StudioPage:
         if self.session.take(machine, typed):
             self.changed()
         else:
-            self._loaded()
+            self._show_machine()
 
     def _save(self) -> None:
         name, content = self.session.as_file()

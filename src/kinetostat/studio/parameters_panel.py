@@ -15,7 +15,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studio.controls import PANELS, STEPS, Control
 from kinetostat.studio.elements import THROTTLE, QuantityRow
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import shown
+from kinetostat.studio.wording import shown_value
 
 OPEN = 12
 """Controls of a group up to which it is open from the start."""
@@ -101,7 +101,9 @@ class ParametersPanel:
 
     def _put(self, control: Control, value: float) -> None:
         display = self._session.machine.display
-        self._rows[control.path].put(shown(control.parameter.quantity, value, display), control.position_of(value))
+        self._rows[control.path].put(
+            shown_value(control.parameter.quantity, value, display), control.position_of(value)
+        )
 
     def go_on(self) -> None:
         """Take the latest position of a slider that had to wait; positions before it are skipped."""

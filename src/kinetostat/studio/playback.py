@@ -92,7 +92,7 @@ class Playback:
         """Add the present pose to the path; the machine moves evenly from one kept pose to the next."""
         present = values(self._session.machine)
         self._kept.append({path: float(value) for path, value in present.items() if path.startswith(POSE)})
-        self._path = between(self._kept) if len(self._kept) > 1 else {}
+        self._path = poses_between(self._kept) if len(self._kept) > 1 else {}
         self._show()
 
     def _show(self) -> None:
@@ -145,7 +145,7 @@ class Playback:
             self._on_change()
 
 
-def between(kept: list[dict[str, float]]) -> Poses:
+def poses_between(kept: list[dict[str, float]]) -> Poses:
     """Return the poses of an even movement from each kept pose to the next, the kept ones among them.
 
     Args:

@@ -12,8 +12,8 @@ import numpy as np
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
 from kinetostat.arrays import Array
+from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closure import solve_joints
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -78,11 +78,6 @@ class Pull:
     goal: Displacement
 
 
-def placed(machine: Machine) -> Configuration:
-    """Return where the parts of a machine are at its pose, without any stiffness."""
-    return machine.configure(solve_joints(machine).coordinates if machine.family.chains else ())
-
-
 def handles(configuration: Configuration, axes: tuple[str, ...]) -> list[Handle]:
     """Return what can be pulled: the platform at P along some axes, and joints of actuated legs but those on rails."""
     legs = [part for leg in configuration.legs if (part := anatomy(leg)).actuated]
@@ -93,7 +88,7 @@ def handles(configuration: Configuration, axes: tuple[str, ...]) -> list[Handle]
 
 def free_axes(machine: Machine) -> tuple[str, ...]:
     """Return the axes of the base along and about which the coordinates of the pose can move the platform."""
-    now = placed(machine)
+    now = state_of(machine).configuration
     length = float(now.length)
     slopes = _slopes(_Problem(machine, _pose(machine), length, lambda moved: _motion(moved, now.platform, length)))
     return tuple(axis for k, axis in enumerate((*MOVES, *TURNS)) if _follows(slopes, k, _weights(axis)))
@@ -111,17 +106,17 @@ def _weights(axis: str) -> Array:
     return np.array([1.0] * 3 + [HOLD] * 3 if axis in MOVES else [HOLD] * 3 + [1.0] * 3)
 
 
-def pulled(pull: Pull) -> dict[str, float]:
+def numbers_after_pull(pull: Pull) -> dict[str, float]:
     """Return the numbers, by leaf path, that bring a part as near as possible to where it is pulled.
 
     Of a platform the coordinates of the pose change, of a joint the geometry. What the pull is not about should stay: a
     machine that can turn while it moves keeps its orientation, and one that cannot lets it follow.
     """
-    machine, now = pull.machine, placed(pull.machine)
+    machine, now = pull.machine, state_of(pull.machine).configuration
     length = float(now.length)
     if pull.of == PLATFORM:
         weights = _weights(pull.axis)
-        return _solved(
+        return _solution_of(
             _Problem(machine, _pose(machine), length, lambda moved: weights * _motion(moved, pull.goal, length))
         )
     goal, base = pull.goal.translation, pull.of == BASE
@@ -134,7 +129,7 @@ def pulled(pull: Pull) -> dict[str, float]:
         point = part.foot if base else configuration.platform.inverse().apply(part.head)
         return np.array((point - wanted).components(), dtype=float) / length
 
-    return _solved(_Problem(machine, _geometry(machine, pull.leg), length, missing))
+    return _solution_of(_Problem(machine, _geometry(machine, pull.leg), length, missing))
 
 
 @dataclass(frozen=True)
@@ -148,7 +143,7 @@ class _Problem:
 
     def at(self, numbers: Array) -> Array:
         changes = dict(zip(self.unknowns, numbers.tolist(), strict=True))
-        return self.residual(placed(with_values(self.machine, changes)))
+        return self.residual(state_of(with_values(self.machine, changes)).configuration)
 
     @property
     def start(self) -> Array:
@@ -161,7 +156,7 @@ class _Problem:
         return np.array([self.length if kind == "length" else 1.0 for kind in self.unknowns.values()])
 
 
-def _solved(problem: _Problem) -> dict[str, float]:
+def _solution_of(problem: _Problem) -> dict[str, float]:
     """Go downhill by Gauss and Newton; a step that leads out of reach, or uphill, is halved."""
     numbers, units = problem.start, problem.units
     residual, effective = problem.at(numbers), np.zeros(len(numbers), dtype=bool)

@@ -13,6 +13,7 @@ from nicegui.events import GenericEventArguments
 
 from kinetostat.algebra.vector import Displacement
 from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
@@ -20,7 +21,7 @@ from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
 from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow, icon_button, refuse
 from kinetostat.studio.lanes import Lane, as_sentence
-from kinetostat.studio.pulling import PLATFORM, Pull, goal_of, placed, point_goal, pulled
+from kinetostat.studio.pulling import PLATFORM, Pull, goal_of, numbers_after_pull, point_goal
 from kinetostat.studio.session import Session, file_stem
 
 LAYERS = {
@@ -81,7 +82,7 @@ class ScenePanel:
             self.scale = QuantityRow("deflection ×", EXAGGERATION, FACTOR_STEPS, slides=True).mark("exaggeration")
             self.scale.classes("scene-scale").set_visibility(False)
         self.scale.on("slide", lambda event: self._exaggerate(factor_at(int(event.args))), throttle=THROTTLE)
-        self.scale.on("write", self._written)
+        self.scale.on("write", self._take_factor)
         with ui.element("div").classes("pose-line").props('role="status" aria-live="polite"') as self.line:
             self.status = ui.label("").classes("pose-status").mark("status")
             self.message = ui.label("").classes("pose-message").mark("message")
@@ -94,7 +95,7 @@ class ScenePanel:
         self._hidden = self._hidden - {layer} if on else self._hidden | {layer}
         self.view.hide(sorted(self._hidden))
 
-    def _written(self, event: GenericEventArguments) -> None:
+    def _take_factor(self, event: GenericEventArguments) -> None:
         try:
             factor = read_factor(str(event.args))
         except InputError as error:
@@ -214,7 +215,7 @@ class Handles:
             on_change: called after every change of the machine.
         """
         self._session, self._on_change = session, on_change
-        self._lane = Lane(pulled, self._follow)
+        self._lane = Lane(numbers_after_pull, self._follow)
         self._pull_number: object = None
         self._home: Displacement | None = None
         self._ended = False
@@ -228,7 +229,7 @@ class Handles:
         of, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
         machine = self._session.machine
         if self._home is None or number != self._pull_number:
-            self._pull_number, self._home = number, placed(machine).platform
+            self._pull_number, self._home = number, state_of(machine).configuration.platform
         self._ended = False
         target = goal_of(self._home, axis, float(goal)) if of == PLATFORM else point_goal([float(c) for c in goal])
         self._lane.ask(Pull(machine, of, leg, axis, target))

@@ -18,7 +18,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed
+from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed_handler
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.elements import refuse
 from kinetostat.studio.menus import serve_pictures
@@ -105,7 +105,7 @@ def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str
             sites, whose own names could be made to point here.
     """
     handlers = core.sio.handlers["/"]
-    handlers["event"] = timed(handlers["event"], lambda tab: core.sio.get_environ(tab)["asgi.scope"])
+    handlers["event"] = timed_handler(handlers["event"], lambda tab: core.sio.get_environ(tab)["asgi.scope"])
     for middleware in (BoundedBody, Paced, OwnOrigin):
         app.add_middleware(middleware)
     serve_pictures()

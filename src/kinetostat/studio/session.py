@@ -268,7 +268,7 @@ def address_of(memory: Memory) -> str:
     if origin.name != machine.name or origin.family.literals != machine.family.literals:
         origin = machine
     bundled_origin = memory.name and origin is memory.origin
-    start = (MACHINE, memory.name) if bundled_origin else (FILE, _packed(as_toml(origin)))
+    start = (MACHINE, memory.name) if bundled_origin else (FILE, _packed_text(as_toml(origin)))
     state = [] if origin.loaded is machine.loaded else [(STATE, machine.state)]
     query = urlencode([start, *state, *_changes(origin, machine)], quote_via=quote, safe="/*")
     return query if len(query) <= LONGEST_ADDRESS else ""
@@ -299,7 +299,7 @@ def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
         choice(text, bundled(), f"{MACHINE} in the address")
         name, origin = text, load(text)
     elif key == FILE:
-        name, origin = "", build(_unpacked(text), "the machine in the address")
+        name, origin = "", build(_unpacked_text(text), "the machine in the address")
     else:
         raise InputError(f"the address names no machine; it must begin with ?{MACHINE}=... or ?{FILE}=... .")
     if not changes:
@@ -309,11 +309,11 @@ def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
     return Memory(origin, name, read_again(replace(changed(origin, numbers), loaded=STATES[state])))
 
 
-def _packed(text: str) -> str:
+def _packed_text(text: str) -> str:
     return base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
 
 
-def _unpacked(packed: str) -> str:
+def _unpacked_text(packed: str) -> str:
     """Return the text of a file in an address; a limit keeps a short address from becoming a large text."""
     try:
         data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))

@@ -80,7 +80,7 @@ def line_of(message: str, text: str) -> int:
     return 0
 
 
-def explained(machine: Machine, path: str) -> str:
+def explanation_of(machine: Machine, path: str) -> str:
     """Return as HTML what the field of a machine file means, and what it may be; empty if it is not a field."""
     table, _, field = path.rpartition(".")
     fields = machine.family.every_table.get(table)
@@ -177,6 +177,6 @@ class TextPane:
         else:
             known = places(self._text)
             path = known[self._place - 1] if 0 < self._place <= len(known) else ""
-            lines = [explained(result.machine, path) or RIGHT, *map(escape, doubts(result.machine))]
+            lines = [explanation_of(result.machine, path) or RIGHT, *map(escape, doubts(result.machine))]
             text = f'<p class="text-good">{"<br>".join(lines)}</p>'
         self.message.set_content(text)

@@ -19,7 +19,7 @@ LEAST_GAIN = 1e-3
 """Logarithm of the gain that fills a whole bar when no gain is greater, so that tiny ones look tiny."""
 
 
-def shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
+def shown_value(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return a value as a field shows it, e.g. "220 mm", "30 deg", "20 N/µm"; `units.parse` reads it back."""
     if value == quantity.unset or math.isinf(value):
         return quantity.show(value)
@@ -28,7 +28,7 @@ def shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> s
 
 def unit_shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return the unit that a field shows beside a value; empty for "rigid", "no limit" and numbers without a unit."""
-    text = shown(quantity, value, display)
+    text = shown_value(quantity, value, display)
     return text.partition(" ")[2] if text[-1:] and text[0] in "+-.0123456789" else ""
 
 

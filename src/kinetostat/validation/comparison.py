@@ -231,7 +231,7 @@ def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, floa
     Raises:
         InputError: if the machine has a part that the engine cannot have.
     """
-    counted = frequencies(state_of(machine).relaxed)[0].tolist()
+    counted = frequencies(state_of(machine).free_equations)[0].tolist()
     ours = [frequency for frequency in counted if math.isfinite(frequency)]
     if not ours or not engine.modes:
         return ()

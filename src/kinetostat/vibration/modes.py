@@ -128,7 +128,7 @@ class Solved:
     shapes: Array
 
 
-def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
+def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
     """Solve for the modes of n states; those at which springs and loads do not hold the machine are left out.
 
     Args:
@@ -139,7 +139,7 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
     mass = mass_matrix(equations)
     left_out, starts = motions_left_out(equations, mass), starts_of(equations)
     sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    for rows, basis in _allowed(conditions, left_out, starts, np.flatnonzero(sound)):
+    for rows, basis in _allowed_motions(conditions, left_out, starts, np.flatnonzero(sound)):
         within_stiff, within_mass = (_within(part, rows, basis, starts) for part in (stiff, mass))
         holds, factors = _factors(within_stiff)
         if not holds.any():
@@ -159,7 +159,7 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
         yield Solved(rows[holds], squares, shapes)
 
 
-def _allowed(
+def _allowed_motions(
     conditions: Array, left_out: Array, starts: Integers, rows: Integers
 ) -> Iterator[tuple[Integers, list[Array]]]:
     """Poses with as many motions that obey all conditions, and these leg by leg.
@@ -168,7 +168,7 @@ def _allowed(
     cannot follow, the platform does not do.
 
     Args:
-        conditions, left_out, starts: see `solved`.
+        conditions, left_out, starts: see `solved_modes`.
         rows: of the poses at which all is finite.
 
     Returns:
@@ -291,7 +291,7 @@ def frequencies(equations: Balance, count: int = MODES) -> Array:
     Infinite where there are fewer modes with mass, NaN where springs and loads do not hold the machine.
     """
     result = np.full((len(equations.left), count), np.nan)
-    for part in solved(equations, shaped=False):
+    for part in solved_modes(equations, shaped=False):
         shown = min(count, part.squares.shape[1])
         result[part.rows] = np.inf
         result[part.rows, :shown] = hertz(part.squares[:, :shown])
@@ -303,15 +303,15 @@ def modes(equations: Balance) -> Modes | None:
 
     There are none of them where all is rigid.
     """
-    part = next(solved(equations), None)
+    part = next(solved_modes(equations), None)
     if part is None:
         return None
     motions = tool_motions(equations)
-    shapes = _settled(part.squares[0], part.shapes[0], motions, float(equations.mechanism.length[0]))
+    shapes = _settled_shapes(part.squares[0], part.shapes[0], motions, float(equations.mechanism.length[0]))
     return Modes(part.squares[0], shapes, motions @ shapes, tuple(_drives(equations, shapes)))
 
 
-def _settled(squares: Array, shapes: Array, motions: Array, length: float) -> Array:
+def _settled_shapes(squares: Array, shapes: Array, motions: Array, length: float) -> Array:
     """The same modes with what is arbitrary in them settled, so that no round-off decides what is shown.
 
     Of modes of equal frequency the first moves the tool along the first component that they move well, x y z rx ry rz,

@@ -12,7 +12,7 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.vibration.modes import Modes, damping_matrix, modes
 
 ASSUMED_RATIO = 0.02
@@ -134,10 +134,10 @@ def cut_receptances(state: MachineState) -> Array:
     Args:
         state: of a machine with its tables [cutting] and [damping], at n poses.
     """
-    machine, mechanism, count = state.machine, state.relaxed.mechanism, state.count
+    machine, mechanism, count = state.machine, state.free_equations.mechanism, state.count
     table, result = machine.tables["damping"], np.full(count, np.nan)
-    directions = stacked(machine.tables["cutting"].direction, count)
-    damping = stacked([table.ratio, table.per_mass, table.per_stiffness], count)
+    directions = stacked_columns(machine.tables["cutting"].direction, count)
+    damping = stacked_columns([table.ratio, table.per_mass, table.per_stiffness], count)
     for row in range(count):
         here = mechanism.at(np.array([row]))
         equations = balance(here, free_state(here))

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
-from kinetostat.algebra.solve import Row, eliminated
+from kinetostat.algebra.solve import Row, elimination
 from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
@@ -44,7 +44,7 @@ def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
     with np.errstate(all="ignore"):
         if platform_alone(state, varying):
             return True
-        machine_cut = cut(state.relaxed.mechanism)
+        machine_cut = cut(state.free_equations.mechanism)
         return machine_cut is not None and not leaves_plane(machine, machine_cut)
 
 
@@ -86,7 +86,7 @@ def pose_frequencies(state: MachineState) -> Array:
     """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it."""
     machine, response, count = state.machine, state.free, state.count
     if not light(machine, response.configuration):
-        return frequencies(state.relaxed)
+        return frequencies(state.free_equations)
     entries = [entry for row in platform_matrix(machine, response) for entry in row]
     size = len(machine.family.components)
     matrices = of_scalars(entries, count).reshape(count, size, size)
@@ -172,7 +172,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
         mass = mass + matrix[0]
     mass = mass + np.diag(machine.carrier.rotors[0] * length[0])
     stiff = 0.5 * (place.rates + place.rates.T)
-    return in_order(eigenvalues(relative(eliminated(stiff.tolist()), mass), sloped))
+    return in_order(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
 
 
 def _along(rod: ElasticRod, far: Array) -> Array:

@@ -25,7 +25,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF
 from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
-from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved, stiffness_matrix
+from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
 EQUALS = 5
 """Modes beyond the last one that is wanted, among which equal ones are looked for."""
@@ -43,13 +43,13 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         The unit of force, then for each mode its 1 / omega², its motion of all coordinates, and the forces that close
         the legs. NaN where springs do not hold the machine.
     """
-    equations = MachineState(machine, count).relaxed
+    equations = MachineState(machine, count).free_equations
     mechanism = equations.mechanism
     stiff, conditions = stiffness_matrix(equations)
     mass, closing = mass_matrix(equations), conditions.shape[1]
     held_still = np.concatenate([conditions, motions_left_out(equations, mass)], axis=1)
     columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
-    for part in solved(equations):
+    for part in solved_modes(equations):
         shown = min(most, part.squares.shape[1])
         squares, shapes = part.squares[:, :shown], part.shapes[:, :, :shown]
         left = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes

@@ -48,7 +48,9 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     """
     rings = modes.ringing if count is None else min(count, modes.ringing)
     friction = damping.friction
-    slow, turned = _slowed(friction[modes.ringing :, modes.ringing :], UNRESISTED * float(np.abs(friction).max()))
+    slow, turned = _slow_friction(
+        friction[modes.ringing :, modes.ringing :], UNRESISTED * float(np.abs(friction).max())
+    )
     slowed = modes.ringing + np.arange(turned.shape[1])
     kept, drag = slice(0, rings), turned[:, : len(slow)]
     at_once = np.concatenate([inputs[:, rings : modes.ringing], inputs[:, slowed] @ turned[:, len(slow) :]], axis=1)
@@ -71,7 +73,7 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     return Equations(np.block(rates), np.vstack(forced), np.hstack(motions), seen @ at_once.T, tuple(names))
 
 
-def _slowed(friction: Array, least: float) -> tuple[Array, Array]:
+def _slow_friction(friction: Array, least: float) -> tuple[Array, Array]:
     """Friction of the motions without mass along its principal directions.
 
     Args:

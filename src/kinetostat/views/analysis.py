@@ -115,7 +115,7 @@ def _loaded_parts(state: "LoadedState", _full: bool) -> Iterator[Table | str]:
             yield free.matrix_table(title, kind, state.components, rows, display)
 
 
-def _filled(parts: Iterator[Table | str]) -> list[Table | str]:
+def _filled_parts(parts: Iterator[Table | str]) -> list[Table | str]:
     """Sentences, and the tables that have a row."""
     return [part for part in parts if isinstance(part, str) or part.row_count]
 
@@ -197,7 +197,7 @@ ANALYSIS = Description(
         Field("attribution", _attribution),
     ),
     lines=first_lines,
-    tables=lambda analysis, full: _filled(_free_parts(analysis, full)),
+    tables=lambda analysis, full: _filled_parts(_free_parts(analysis, full)),
     answered=lambda analysis: analysis.status is Status.OK,
     kept=lambda analysis: all(verdict.met for verdict in analysis.requirements),
     undrawn="analyze draws figures of the machine under load only; add --loaded, or leave -o out.",
@@ -234,7 +234,7 @@ LOADED = Description(
         Field("requirements"),
     ),
     lines=_loaded_lines,
-    tables=lambda state, full: _filled(_loaded_parts(state, full)),
+    tables=lambda state, full: _filled_parts(_loaded_parts(state, full)),
     figures="views.loaded_figures.loaded_figures",
     state=lambda state: f"under load: {state.rest.word}",
     answered=lambda state: bool(state.displacement),

@@ -207,7 +207,7 @@ def remarks(analysis: Analysis) -> list[str]:
         legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
             f"Statically indeterminate internal loads: {analysis.internal_loads.degree}, in {legs}; "
-            f"elasticity {_decided(analysis.internal_loads.undecided)}."
+            f"elasticity {_internal_loads_sentence(analysis.internal_loads.undecided)}."
         )
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
@@ -229,7 +229,7 @@ def _sort_of_pose(kind: SortOfPose) -> str:
     return "Regular pose" if kind is SortOfPose.REGULAR else f"Singular pose ({kind})"
 
 
-def _decided(undecided: int) -> str:
+def _internal_loads_sentence(undecided: int) -> str:
     """Return how many internal loads follow from the compliance of the legs."""
     return f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
 

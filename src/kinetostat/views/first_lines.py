@@ -22,14 +22,17 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
     if analysis.compliance_diagonal:
         lines.append(
-            ("Stiffness", f"{_felt(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes).")
+            (
+                "Stiffness",
+                f"{_stiffnesses(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes).",
+            )
         )
     if analysis.softest:
         lines.append(("Softest", "; ".join(_softest(analysis)) + "."))
     if analysis.singularity_margin is not None:
         lines.append(("Margin", margins(analysis)))
     if analysis.load:
-        lines.append(("To first order" if analysis.machine.loaded else "Load", _loaded(analysis, analysis.load)))
+        lines.append(("To first order" if analysis.machine.loaded else "Load", _load_sentence(analysis, analysis.load)))
     return lines
 
 
@@ -41,7 +44,7 @@ def margins(analysis: Analysis) -> str:
     return f"Singularity margin {least} (0 singular, 1 best): legs {legs}, platform {platform}."
 
 
-def _felt(analysis: Analysis) -> str:
+def _stiffnesses(analysis: Analysis) -> str:
     """Say what stiffness a tool feels along and about each axis, with all other motions free to follow."""
     display = analysis.machine.display
     sentences = []
@@ -85,7 +88,7 @@ def _mainly(direction: Softest) -> str:
     return f", mainly from {named}" if named else ""
 
 
-def _loaded(analysis: Analysis, load: LoadCase) -> str:
+def _load_sentence(analysis: Analysis, load: LoadCase) -> str:
     """Say how far the load moves the tool, and which actuator carries most."""
     display = analysis.machine.display
     turned, moved = math.hypot(*load.deflection[:3]), math.hypot(*load.deflection[3:])

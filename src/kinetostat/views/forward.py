@@ -74,7 +74,7 @@ def coordinates_by_name(texts: Sequence[str]) -> Mapping[str, str]:
     return given
 
 
-def _asked(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:
+def _ask(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:
     return forward(machine, coordinates_by_name(actuators), starts, spread)
 
 
@@ -106,7 +106,7 @@ FORWARD = Description(
 )
 FORWARD_QUESTION = Question(
     example='kinetostat forward hexapod --actuators "leg 1=96 mm, leg 2=95 mm"',
-    answer=_asked,
+    answer=_ask,
     options=(
         Option(
             "actuators",

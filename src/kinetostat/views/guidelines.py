@@ -16,7 +16,7 @@ from kinetostat.studies.plain_data import stiffness_of_spring
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import ranges_option
 from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
-from kinetostat.views.tables import numeric_table, omitted, text_table
+from kinetostat.views.tables import numeric_table, text_table, words_on_omitted
 
 TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "design": "Design"}
 """Words before the sentences of a topic."""
@@ -52,7 +52,7 @@ def _left_out(answer: Guidelines) -> Iterator[str]:
     """Write sentences on the parameters that the tables omit, and why."""
     hidden = len(answer.parameters) - MOST_MOVES
     if hidden > 0:
-        yield f"{omitted(hidden)} (--full shows them)."
+        yield f"{words_on_omitted(hidden)} (--full shows them)."
     if answer.without_influence:
         yield f"No direction depends on {_few(answer.without_influence)}."
     for reason in dict.fromkeys(why for _, why in answer.left_out):

@@ -117,14 +117,14 @@ def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:
     draw = partial(design_figure, guidelines)
     effect = Drawing("Effect of each parameter on each direction.", draw, minor=True, file="guidelines-design")
     drawings = {"design": effect} if guidelines.parameters else {}
-    limited = _limited(guidelines)
+    limited = _elements_with_limits(guidelines)
     caption = "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
     if limited:
         drawings["rigid"] = Drawing(caption, partial(rigid_figure, guidelines, limited), file="guidelines-rigid")
     return drawings
 
 
-def _limited(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
+def _elements_with_limits(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
     """Return the elements that have a limit of rigidity, with its multiples of the present stiffness; the last ones."""
     if guidelines.here is None:
         return []

@@ -11,7 +11,7 @@ from kinetostat.units import KINDS, RIGID
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import quantities_option
 from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
-from kinetostat.views.tables import numeric_table, omitted
+from kinetostat.views.tables import numeric_table, words_on_omitted
 
 MOST_INFLUENCES = 40
 """Parameters that have a line unless all are wanted."""
@@ -48,7 +48,7 @@ def _tables(answer: Sensitivity, full: bool) -> Iterator[FittedTable]:
 def _lines(answer: Sensitivity) -> Lines:
     hidden = len(answer.parameters) - MOST_INFLUENCES
     if hidden > 0:
-        yield "Parameters", f"{omitted(hidden)} (--full shows them)."
+        yield "Parameters", f"{words_on_omitted(hidden)} (--full shows them)."
     if not answer.parameters:
         yield "Parameters", "No parameter has an influence here."
     meaning, *others = notes(answer)

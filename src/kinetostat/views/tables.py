@@ -123,7 +123,7 @@ def print_written(console: Console, paths: Iterable[Path]) -> None:
         console.print(f"wrote {path}", highlight=False)
 
 
-def omitted(count: int) -> str:
+def words_on_omitted(count: int) -> str:
     """Return the words for parameters that a table leaves out."""
     noun, verb = ("parameter", "is") if count == 1 else ("parameters", "are")
     return f"{count} {noun} with less effect {verb} omitted"

@@ -7,7 +7,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import Display, number
 from kinetostat.machine.loads import loads_platform
-from kinetostat.studies.attribution import ranked
+from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.views.fitted_table import FittedTable
@@ -106,7 +106,7 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTabl
     """Shares of an energy by part in each mode, the greatest parts first, in percent."""
     names = dict.fromkeys(name for mode in shares for name in mode)
     largest = {name: max(abs(mode.get(name, 0.0)) for mode in shares) for name in names}
-    order = [name for name, _ in ranked(largest)]
+    order = [name for name, _ in ranking_of(largest)]
     shown = [name for name in order if largest[name] >= LEAST_SHARE][:MOST_PARTS]
     table = numeric_table(title, "", [str(place) for place in range(1, len(shares) + 1)])
     for name in shown:

@@ -82,14 +82,14 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Po
         title = f"{title}, {shown}"
     if len(dims) == 2:
         return {"": partial(_sections, [dataset], labels, conditions, title=title)}
-    cuts = [dataset.isel({dims[2]: int(i)}) for i in _shown(dataset, dims)]
+    cuts = [dataset.isel({dims[2]: int(i)}) for i in _chosen_cuts(dataset, dims)]
     return {
         "-sections": partial(_sections, cuts, labels, conditions, title=title),
         "-solid": partial(_solid, dataset, dims[:3], _telling(conditions), title=title),
     }
 
 
-def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
+def _chosen_cuts(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
     """Choose the cuts: equally spaced values of the third coordinate, at most a step beyond the workspace."""
     reached = np.flatnonzero((dataset["verdict"] == 0).any(dims[:2]).values)
     last = dataset.sizes[dims[2]] - 1
@@ -127,7 +127,7 @@ def _sections(
             edges |= _fill(panel, cut, labels, conditions)
             if len(cuts) > 1:
                 across = str(next(dim for dim in cut.coords if dim not in cut["verdict"].dims and cut[dim].attrs))
-                panel.set_title(_at(cut, _varied(cuts, across)))
+                panel.set_title(_at(cut, _varied_coordinate(cuts, across)))
         for panel in panels[len(cuts) :]:
             panel.remove()
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
@@ -140,7 +140,7 @@ def _sections(
     return figure
 
 
-def _varied(cuts: Sequence[xr.Dataset], fallback: str) -> str:
+def _varied_coordinate(cuts: Sequence[xr.Dataset], fallback: str) -> str:
     """The coordinate that differs between cuts."""
     names = [str(n) for n in cuts[0].coords if n not in cuts[0]["verdict"].dims]
     return next((n for n in names if len({float(cut[n]) for cut in cuts}) > 1), fallback)

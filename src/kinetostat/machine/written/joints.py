@@ -149,7 +149,7 @@ def _parallelogram(name: str, data: Any) -> Sequence[Element]:
     return (Parallelogram(name, *ends, unit(data.axis), data.width, data.bar_stiffness),)
 
 
-def _fixed(_name: str, _data: Any) -> Sequence[Element]:
+def _fixed_joint(_name: str, _data: Any) -> Sequence[Element]:
     return ()
 
 
@@ -232,7 +232,7 @@ JOINT_TYPES = {
     "fixed": JointType(
         "joins two bodies at `point` and does not move",
         {"point": POINT},
-        _fixed,
+        _fixed_joint,
         in_plane="always",
         seat=tuple(SEAT),
     ),

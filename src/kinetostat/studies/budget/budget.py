@@ -26,8 +26,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
-from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
-from kinetostat.studies.attribution import ranked
+from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
+from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.budget.allocation import Allocation, allocation_for, reach_of
 from kinetostat.studies.budget.spread import (
     PARASITIC,
@@ -169,13 +169,13 @@ class Budget(Immutable):
         for part, share in zip(self.parts, row.tolist(), strict=True):
             name = getattr(part, key) or "shared by all legs"
             sums[name] = sums.get(name, 0.0) + share
-        return dict(ranked(sums))
+        return dict(ranking_of(sums))
 
     @property
     def ranking(self) -> list[int]:
         """Places of the parts, the most important for the leading measure first."""
         row = self.shares[self.measures.index(self.leading)]
-        return [place for place, _ in ranked(dict(enumerate(row.tolist())))]
+        return [place for place, _ in ranking_of(dict(enumerate(row.tolist())))]
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def budget(
     _check(poses, ranges, samples, exact, by, seed)
     state = state_of(machine)
     machine = state.machine
-    lines = joined(machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
+    lines = joined_tolerances(machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
     question = grid_question(state, ranges, ["singularity_margin"]) if ranges else None
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = _points(question, columns)

@@ -299,11 +299,11 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
         np.sqrt((sizes**2).mean(axis=0)),
         np.percentile(sizes, USUAL_PERCENT, axis=0),
         np.abs(sizes - measures.sizes(linear)).max(axis=0),
-        _unexplained(solved, linear, measures),
+        _unexplained_variance(solved, linear, measures),
     )
 
 
-def _unexplained(solved: Array, linear: Array, measures: Measures) -> Array:
+def _unexplained_variance(solved: Array, linear: Array, measures: Measures) -> Array:
     """The variance of what the first order leaves, over the variance [machines x rows] -> [measures]."""
     left, whole = (solved - linear).var(axis=0), solved.var(axis=0)
     places = [measures.places(name) for name in measures.names]

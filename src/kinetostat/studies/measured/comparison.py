@@ -20,7 +20,7 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.column import stacked
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
@@ -282,7 +282,7 @@ def validate_measured(
         line = f"line {measured.deflections.lines[bad[0]]}: " if measured.deflections else ""
         raise InputError(f'"{data}", {line}the drawn machine is not at the measured pose. {sentence}')
     response = respond(with_values(machine, pose) if pose else machine)
-    computed = stacked([entry for row in response.compliance.rows() for entry in row], count).reshape(-1, 6, 6)
+    computed = stacked_columns([entry for row in response.compliance.rows() for entry in row], count).reshape(-1, 6, 6)
     uncertain = uncertain_numbers(machine, model, Path(fit) if fit else None)
     return _comparison(machine, model, measured, computed, uncertain)
 

@@ -115,7 +115,7 @@ class FavouritesPanel:
             load: puts a machine into the session.
         """
         self._session, self._favourites, self._load = session, favourites, load
-        self._lane = Lane(_compared, self._show)
+        self._lane = Lane(_comparison_of, self._show)
         self._chosen: set[int] = set()
         with ui.element("div").classes("keep-row"):
             self.name = ui.input("name").props(f"dense outlined maxlength={LONGEST_NAME}").mark("favourite-name")
@@ -212,5 +212,5 @@ class FavouritesPanel:
         self.window.open()
 
 
-def _compared(machines: Named) -> Comparison:
+def _comparison_of(machines: Named) -> Comparison:
     return compare([Design(label, machine, analyze(machine)) for label, machine in machines])

@@ -22,7 +22,7 @@ from kinetostat.studies.optimisation.terms import ALONG
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.typed_value import typed_value
-from kinetostat.studio.wording import shown
+from kinetostat.studio.wording import shown_value
 from kinetostat.units import UNIT, UnitError
 
 AROUND = 0.2
@@ -102,14 +102,14 @@ class Draft:
         """Short descriptions of what the study has but the form does not show."""
         poses = self.rest.get("poses", {})
         parts = [f"poses over {', '.join(poses['over'])}"] if "over" in poses else []
-        parts += [_counted(len(poses["list"]), "pose")] if "list" in poses else []
+        parts += [_count_in_words(len(poses["list"]), "pose")] if "list" in poses else []
         count = len(self.rest.get("constraints", []))
-        parts += [_counted(count, "constraint")] if count else []
+        parts += [_count_in_words(count, "constraint")] if count else []
         tolerances = sum("tolerance" in table for table in self.variables)
-        return parts + ([_counted(tolerances, "tolerance")] if tolerances else [])
+        return parts + ([_count_in_words(tolerances, "tolerance")] if tolerances else [])
 
 
-def _counted(count: int, noun: str) -> str:
+def _count_in_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
@@ -165,7 +165,7 @@ def usual_bounds(control: Control, value: float) -> tuple[str, str]:
     middle = value if math.isfinite(value) and (value or not quantity.stiff) else USUAL_STIFFNESS
     around = AROUND * abs(middle) if middle else AROUND * max(control.high, 1e-9)
     low, high = middle - around, min(middle + around, quantity.most)
-    return shown(quantity, low), shown(quantity, high)
+    return shown_value(quantity, low), shown_value(quantity, high)
 
 
 def bound_text(quantity: Quantity, typed: str, shown_unit: str) -> str:

@@ -76,7 +76,7 @@ class RunPanel:
         self._shown: object = None
         self._place: int | None = None
         with ui.element("div").classes("design-head"):
-            self.choice = choice({}, "search", self._chosen, "run-choice").classes("grow")
+            self.choice = choice({}, "search", self._choose, "run-choice").classes("grow")
             self.stop = icon_button("stop", "Stop after this step; all results are kept", self._stop, "run-stop")
             self.go_on = icon_button("play_arrow", "Resume where it was stopped", self._go_on, "run-play_arrow")
             self.delete = icon_button("delete", "Delete this search", self._delete, "run-delete")
@@ -174,7 +174,7 @@ class RunPanel:
         elif progress.steps > 1:
             self.curve.run_method("show", convergence(progress))
 
-    def _chosen(self) -> None:
+    def _choose(self) -> None:
         self._place = None
         self.refresh()
 
@@ -264,13 +264,13 @@ class FrontPanel:
                     choice({}, label, self._chosen_axis, f"front-{mark}") for mark, label in AXES.items()
                 )
             self.view = FrontView("designs of the Pareto front; a click, or arrow keys and Enter, load one")
-            self.view.mark("run-front").on("pick", self._picked)
+            self.view.mark("run-front").on("pick", self._pick_row)
 
     def table(self) -> None:
         """Put the table of all designs on the page."""
         self.without = ui.label(NO_FRONT).classes("note")
         self.rows = DesignTable("designs of the Pareto front").mark("front-table")
-        self.rows.on("pick", self._picked)
+        self.rows.on("pick", self._pick_row)
 
     def reveal(self, several: bool) -> None:
         """Show plot and table where the study has several objectives, else hide them."""
@@ -319,7 +319,7 @@ class FrontPanel:
             },
         )
 
-    def _picked(self, event: GenericEventArguments) -> None:
+    def _pick_row(self, event: GenericEventArguments) -> None:
         self._pick(int(event.args))
 
 

@@ -92,7 +92,7 @@ class Runs:
             folders = numbered(self._folder)
         except OSError as error:
             raise InputError(f'the searches in "{self._folder}" cannot be read: {error.strerror}.') from None
-        listed = (self._listed(number, path) for number, path in folders.items())
+        listed = (self._entry(number, path) for number, path in folders.items())
         return [run for run in listed if run is not None]
 
     def of(self, number: int) -> Run:
@@ -102,12 +102,12 @@ class Runs:
             InputError: it has been deleted.
         """
         path = numbered(self._folder).get(number)
-        run = None if path is None else self._listed(number, path)
+        run = None if path is None else self._entry(number, path)
         if run is None:
             raise InputError(f"search {number} has been deleted; choose another one.")
         return run
 
-    def _listed(self, number: int, path: Path) -> Run | None:
+    def _entry(self, number: int, path: Path) -> Run | None:
         """Return what the list shows of a folder, which may be damaged; None if no search has begun in it."""
         try:
             return Run(number, path, self._name(path), self._stage(path)) if (path / QUESTION).exists() else None

@@ -53,7 +53,7 @@ class StudyForm:
         self.draft = self._blank()
         self._filling = False
         with ui.element("div").classes("design-head"):
-            self.source = choice({}, "study", self._chosen, "study-source").classes("grow")
+            self.source = choice({}, "study", self._choose, "study-source").classes("grow")
             icon_button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
             icon_button("download", "Save the study as a file", self._save, "study-save")
             self.upload = upload_field(self._sent, self._refuse, "study-upload")
@@ -86,7 +86,7 @@ class StudyForm:
         self.source.set_options(studies | ({SENT: self.draft.name} if chosen == SENT else {}), value=chosen)
         self._filling = False
 
-    def _chosen(self) -> None:
+    def _choose(self) -> None:
         if not self._filling and self.source.value != SENT:
             name = str(self.source.value)
             self.draft = self._blank() if name == NEW else bundled_draft(name)

@@ -185,11 +185,11 @@ def load_text(analysis: Analysis) -> str:
     if load is None:
         return paragraph("The tool carries no load. Set a force or a moment under Load on the left.")
     tool = [
-        [name, *_loaded(wrench, motion, name.startswith("r"), display)]
+        [name, *_load_cells(wrench, motion, name.startswith("r"), display)]
         for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
     ]
     springs = [
-        [spring.name, *_loaded(spring.load, spring.deformation, spring.turning, display)] for spring in load.springs
+        [spring.name, *_load_cells(spring.load, spring.deformation, spring.turning, display)] for spring in load.springs
     ]
     return (
         heading("Tool point")
@@ -241,7 +241,7 @@ def _tangents(state: LoadedState) -> str:
     return heading("Stiffness to further loads") + table("stiffness", rows.heads, rows.rows)
 
 
-def _loaded(load: float, motion: float, turning: bool, display: Display) -> list[str]:
+def _load_cells(load: float, motion: float, turning: bool, display: Display) -> list[str]:
     return [display.show(load, "N·m" if turning else "N"), display.show_deflection(motion, "rad" if turning else "m")]
 
 
@@ -255,7 +255,7 @@ class RequirementsPanel(Panel):
 
     def build(self) -> None:
         self._session: Session | None = None
-        self._lane = Lane(_judged, self._draw)
+        self._lane = Lane(_verdicts_or_mistake, self._draw)
         self.lines = ui.column().mark("requirements")
 
     def show(self, _report: Report, session: Session) -> None:
@@ -286,7 +286,7 @@ class RequirementsPanel(Panel):
             self.changed()
 
 
-def _judged(machine: Machine) -> tuple[Verdict, ...] | str:
+def _verdicts_or_mistake(machine: Machine) -> tuple[Verdict, ...] | str:
     """Judge requirements in a thread, or say what is wrong with them."""
     try:
         return requirements(machine)

@@ -15,7 +15,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Complex
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.attribution import ranked
+from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import Mode
 from kinetostat.studio.answers import Report, Ringing, SwingRequest, finite, ringing, swing, weighs
 from kinetostat.studio.controls import STEPS
@@ -23,7 +23,7 @@ from kinetostat.studio.elements import CurveView, DesignTable, QuantityRow, choi
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import bars, heading, paragraph, shown
+from kinetostat.studio.wording import bars, heading, paragraph, shown_value
 from kinetostat.views.analysis_tables import entry_unit
 from kinetostat.views.vibration import LEAST_SHARE, MOST_PARTS, cut_of, damping_of, masses_of, percent
 
@@ -125,7 +125,7 @@ class VibrationPanel(Panel):
         self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(GIVE))
         if self._session is not None:
             control = self._session.controls[MASS]
-            self.mass.put(shown(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
+            self.mass.put(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
 
     def _weigh(self, event: GenericEventArguments) -> None:
         if self._session is None:
@@ -198,12 +198,18 @@ class VibrationPanel(Panel):
         unit = entry_unit("compliance", *("x" if name == CUT else name for name in (moved, pushed)))
         scale = answer.machine.display.scale(unit)
         marks = [mode.frequency for mode in answer.modes]
-        shared = {"x": _rounded(across), "marks": marks, "here": marks[self._chosen], "log": True, "across": "Hz"}
+        shared = {
+            "x": _plot_values(across),
+            "marks": marks,
+            "here": marks[self._chosen],
+            "log": True,
+            "across": "Hz",
+        }
         for view, label, unit, values, more in (
             (self.size, scale.label("size"), scale.unit, np.abs(curve) * scale.factor, {"tall": True}),
             (self.phase, "phase (deg)", "deg", np.degrees(np.unwrap(np.angle(curve))), {"signed": True}),
         ):
-            line = {"name": "", "values": _rounded(values)}
+            line = {"name": "", "values": _plot_values(values)}
             labels = {"x": "frequency (Hz)", "y": label}
             view.run_method("show", {**shared, **more, "lines": [line], "label": labels, "unit": unit})
 
@@ -255,7 +261,7 @@ def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
     """
     text = ""
     for title, shares in ((f"Strain energy of mode {number}", mode.strain), ("Its kinetic energy", mode.kinetic)):
-        order = ranked({name: abs(share) for name, share in shares.items()})
+        order = ranking_of({name: abs(share) for name, share in shares.items()})
         rows = [(name, shares[name], f"{percent(shares[name])} %") for name, size in order if size >= LEAST_SHARE]
         of_leg = {name: leg for name in shares for part, leg in legs.items() if f"{name} ".startswith(f"{part} ")}
         more = f"{len(rows) - MOST_PARTS} parts with less are omitted."
@@ -283,6 +289,6 @@ def _between(moved: Array, receptance: Complex, pushed: Array) -> Complex:
     return np.asarray(np.einsum("i,fij,j->f", moved, receptance, pushed))
 
 
-def _rounded(values: Array) -> list[float | None]:
+def _plot_values(values: Array) -> list[float | None]:
     """Return points of a curve in the digits that a plot can show."""
     return finite(np.array([float(f"{value:.{DIGITS}g}") for value in values]))

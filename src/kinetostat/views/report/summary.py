@@ -13,7 +13,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.attribution import by_part, ranked
+from kinetostat.studies.attribution import by_part, ranking_of
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.validation.comparison import Validation
@@ -89,7 +89,7 @@ def _shown_value(value: float, quantity: str, infinite: str, display: Display) -
 def _contributors(analysis: Analysis, i: int) -> str:
     parts = by_part(analysis.attribution).items()
     shares = {name: sum(spring.compliance_share[i] or 0.0 for spring in springs) for name, springs in parts}
-    largest = [pair for pair in ranked(shares) if pair[1] >= LEAST_NAMED_SHARE]
+    largest = [pair for pair in ranking_of(shares) if pair[1] >= LEAST_NAMED_SHARE]
     named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_PARTS_NAMED])
     more = len(largest) - MOST_PARTS_NAMED
     return f"{named} and {more} more" if more > 0 else named or "nothing"
