@@ -124,7 +124,7 @@ MEASURED_STIFFNESS = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.measured_figure.measured_figures",
+    figures="views.measurement_figures.measured_figures",
     state=lambda answer: f"beside {answer.path}",
     files={"measured.json": "json"},
 )

@@ -79,7 +79,7 @@ PATH = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.path_figure.path_figures",
+    figures="views.grid_figures.path_figures",
     makers={"csv": "studies.evaluation.as_csv", "nc": "studies.datasets.as_dataset"},
     state=lambda _answer: "",
     answered=lambda answer: answer.answered,

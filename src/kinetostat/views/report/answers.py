@@ -21,9 +21,9 @@ from kinetostat.views.answers import description_of
 from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
-from kinetostat.views.identification_figures import FIT_CAPTIONS
 from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
 from kinetostat.views.loaded_tables import displacement_table, spring_table, stability_of, strut_table, tangent_table
+from kinetostat.views.measurement_figures import FIT_CAPTIONS
 from kinetostat.views.optimisation import (
     aims,
     bounds_table,
