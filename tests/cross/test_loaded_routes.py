@@ -5,7 +5,7 @@ import pytest
 
 from kinetostat import analyze
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.loaded import NUMPY_FROM, Way, loaded_fill
+from kinetostat.engine.loaded import NATIVE_FROM, Way, loaded_fill
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.kinematics.status import Status
@@ -39,18 +39,18 @@ def quantities_of(machine, *others):
     return [f"{kind}_{part}" for kind in kinds for part in parts] + list(others)
 
 
-def both_ways(machine, columns, quantities, way=Way.NUMPY):
+def both_ways(machine, columns, quantities):
     count = len(next(iter(columns.values())))
     answers = []
-    for each in (way, Way.ANY_MACHINE):
+    for each in (Way.NATIVE, Way.ANY_MACHINE):
         results, status = np.empty((len(quantities), count)), np.empty(count, dtype=np.int8)
         loaded_fill(machine, list(columns), quantities, each)(columns, results, status)
         answers.append((results, status))
     return answers
 
 
-def compare(machine, columns, quantities, way=Way.NUMPY, agreed=1e-9):
-    (fast, status), (slow, expected) = both_ways(machine, columns, quantities, way)
+def compare(machine, columns, quantities, agreed=1e-9):
+    (fast, status), (slow, expected) = both_ways(machine, columns, quantities)
     assert status.tolist() == expected.tolist()
     size = np.abs(slow)
     parts = len(machine.family.components)
@@ -85,7 +85,7 @@ def test_machine_code_gives_them_too_and_leaves_far_ones_to_the_solver():
     force = machine.tables["load"].force[2]
     columns = poses_near(machine, 4) | {"load.force.2": force * np.array([1.0, 0.0, 200.0, 30.0])}
     columns["pose.z"][0] = 9.0
-    status = compare(machine, columns, ["displacement_z", "tangent_stiffness_z"], Way.NATIVE)
+    status = compare(machine, columns, ["displacement_z", "tangent_stiffness_z"])
     assert status.tolist() == [Status.OUT_OF_REACH, Status.OK, Status.OK, Status.OK]
 
 
@@ -113,7 +113,7 @@ def test_many_points_go_through_programs(monkeypatch):
 
     machine = moved_by_about("hexapod", 1e-3)
     monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
-    count = NUMPY_FROM
+    count = NATIVE_FROM
     values = evaluate(machine, PointTable(poses_near(machine, count)), ["displacement_z"])
     assert (values.status == Status.OK).all()
 
@@ -121,4 +121,4 @@ def test_many_points_go_through_programs(monkeypatch):
 def test_gravity_without_any_mass_is_refused_by_programs_too():
     machine = load_without_limits("hexapod", ["load.gravity=[0, 0, -9.81]"])
     with refused(r"load.gravity pulls at masses, but none is known"):
-        evaluate(machine, PointTable({"pose.x": np.zeros(NUMPY_FROM)}), ["displacement_z"])
+        evaluate(machine, PointTable({"pose.x": np.zeros(NATIVE_FROM)}), ["displacement_z"])

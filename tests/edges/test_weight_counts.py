@@ -103,7 +103,7 @@ def test_loads_at_rest_are_the_same_in_all_arithmetics(name):
     draw = np.random.default_rng(7)
     poses = {path: here + draw.uniform(-0.01, 0.01, 40) for path, here in values(machine).items() if "pose." in path}
     rows = {}
-    for way in (Way.ANY_MACHINE, Way.NUMPY, Way.NATIVE):
+    for way in (Way.ANY_MACHINE, Way.NATIVE):
         fill = loaded_fill(machine, list(poses), ["actuator_force"], way)
         (rows[way],), status = in_slabs(PointTable(poses), fill, 1, way.slab, 1)
         assert not status.any()

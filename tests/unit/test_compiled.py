@@ -154,6 +154,12 @@ def test_what_cannot_be_compiled_is_refused(hexapod, inputs, quantities, words):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("count", [0, -1, 1.5, "1"])
+def test_buffers_need_a_number_of_poses(hexapod, count):
+    with pytest.raises(InputError, match="give a whole number from 1"):
+        compile(hexapod, ["x"], "stiffness_x").buffers(count)
+
+
 def test_arrays_that_do_not_fit_are_refused(hexapod):
     function = compile(hexapod, ["x", "z"], "stiffness_x")
     for given, words in (

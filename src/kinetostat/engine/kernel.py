@@ -190,7 +190,6 @@ def program_fill(
     varying: Sequence[str],
     quantities: Sequence[str],
     closed: bool,
-    native: bool = True,
     further: Further = nothing_further,
 ) -> ProgramFill:
     """Return the fill of quantities by a single program, see `ProgramFill`.
@@ -198,11 +197,10 @@ def program_fill(
     Args:
         machine, varying, quantities: as for `slab_fill`.
         closed, further: see `ProgramFill`.
-        native: whether it is compiled; otherwise it runs node by node in NumPy.
     """
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
-    program = program_of(Recipe(objectives_of, Specimen(machine), form, (objectives, None, closed)), native)
+    program = program_of(Recipe(objectives_of, Specimen(machine), form, (objectives, None, closed)))
     return ProgramFill(machine, form, fixed, program, closed, further)
 
 

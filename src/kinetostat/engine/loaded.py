@@ -47,15 +47,14 @@ ONE_STEP_AWAY = 1e-7
 class Way(Enum):
     """A route to loaded states and vibrations, and the number of points in a slab of it.
 
-    Equations of any machine fill the third cache level with some hundred poses; its modes take as long by LAPACK as the
-    formulas by Python, which more poses share. Programs by NumPy do five to ten
-    thousand poses/s after half a second of tracing, in machine code some hundred thousand after two seconds. Where the
-    platform alone is massive and nothing is loaded, columns of numbers do thirty thousand at once.
+    Equations of any machine fill the third cache level with some hundred poses, of which they do a thousand per second;
+    its modes take as long by LAPACK as the formulas by Python, which more poses share. Where the platform alone is
+    massive and nothing is loaded, columns of numbers do thirty thousand at once. Machine code does some hundred
+    thousand, after a quarter of a second to two seconds for which it is compiled.
     """
 
     ANY_MACHINE = 256
     MODES = 768
-    NUMPY = 1024
     COLUMNS = 4096
     NATIVE = 32768
 
@@ -65,10 +64,10 @@ class Way(Enum):
         return self.value
 
 
-NUMPY_FROM, NATIVE_FROM = 200, 10_000
-"""Points from which programs pay, by NumPy and in machine code."""
-COLUMNS_TO = 30_000
-"""Points up to which the vibrations of a platform alone take less time than compiling."""
+NATIVE_FROM = 200
+"""Points from which machine code pays, which is compiled once for a form of machines and then kept on disk."""
+COLUMNS_TO = 10_000
+"""Points up to which columns do for the vibrations of a platform alone: they take as long as compiling."""
 
 
 def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: float) -> Way:
@@ -83,9 +82,9 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
-    if count < NUMPY_FROM or not _over_scalars(machine, tuple(paths), quantities):
+    if count < NATIVE_FROM or not _over_scalars(machine, tuple(paths), quantities):
         return Way.ANY_MACHINE if loaded else Way.MODES
-    return Way.NATIVE if count >= NATIVE_FROM else Way.NUMPY
+    return Way.NATIVE
 
 
 def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
@@ -116,12 +115,14 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
     if plain or not _over_scalars(machine, tuple(paths), quantities):
         return solved
-    closed, native = closes_inside(machine), way is Way.NATIVE
+    closed = closes_inside(machine)
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
     further = (
-        StatePrograms(machine, form_of(machine, paths)[0], closed, native).rest_coordinates if cut else nothing_further
+        StatePrograms(machine, form_of(machine, paths)[0], closed, native=True).rest_coordinates
+        if cut
+        else nothing_further
     )
-    directly = program_fill(machine, paths, quantities, closed, native, further)
+    directly = program_fill(machine, paths, quantities, closed, further)
     every = FallingBack(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:

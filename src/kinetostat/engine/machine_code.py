@@ -114,14 +114,7 @@ class Program:
         self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, ctypes.c_int64)(address)
 
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
-        """Evaluate points; the interpreter is released, so that other threads can run.
-
-        Args:
-            fixed: values of the fixed inputs.
-            columns: values of the others [points], each contiguous.
-            results: where results go [results x points]; rows may lie apart, the points of a row may not.
-            codes: where the codes go [points].
-        """
+        """Evaluate points, see `trace.Runnable`; the interpreter is released, so that other threads can run."""
         count = len(codes)
         if count < self.lanes:
             self._run_few(fixed, columns, results, codes)

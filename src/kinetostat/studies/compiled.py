@@ -19,7 +19,7 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.studies.evaluation import MATRICES, entry_name
 from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
 
@@ -134,7 +134,12 @@ class CompiledFunction:
         """Prepare arrays for so many poses; see `Buffers`. It begins at the numbers of the machine.
 
         The rows of its results are `distinct`: the quantities, of a matrix each different entry once.
+
+        Raises:
+            InputError: the number is not one from 1 on.
         """
+        if type(count) is not int or count < 1:
+            raise InputError(f"count is {shorten(count)}; give a whole number from 1.")
         start = [float(self._numbers[field.leaves[0]]) for field in self._fields]
         return Buffers(self._function, list(self._leaves.values()), start, count)
 
