@@ -53,5 +53,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("source-read", fill)
     app.connect("autodoc-process-docstring", reference.as_markup)
     app.connect("autodoc-process-signature", reference.without_signature)
+    app.connect("build-finished", gallery.write_pages)
     app.connect("build-finished", check_alone)
     return {"parallel_read_safe": False}

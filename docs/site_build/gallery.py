@@ -5,11 +5,15 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
+from kinetostat.engine.kernel import closes_inside
+from kinetostat.exchange.formats import export
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.views.picture import Theme, machine_picture
 
-FOLDER = "generated"
+FOLDER, LIVE = "generated", "live"
 SIZE = (640, 480)
 """Pixels of a picture."""
 THEMES: tuple[Theme, ...] = ("light", "dark")
@@ -33,14 +37,31 @@ def picture(name: str, theme: Theme) -> bytes:
     return machine_picture(load(name), SIZE, theme=theme)
 
 
+def moves(name: str) -> bool:
+    """Whether a bundled machine has a page that moves it: its legs have closed forms."""
+    machine = load(name)
+    return machine.family.chains is None or closes_inside(machine)
+
+
+def write_pages(app: Sphinx, error: Exception | None) -> None:
+    """Put the pages of bundled machines beside those of the site."""
+    if error is not None or app.builder.name != "html":
+        return
+    (Path(app.outdir) / LIVE).mkdir(exist_ok=True)
+    for name in filter(moves, bundled()):
+        export(load(name), Path(app.outdir) / LIVE / f"{name}.html")
+
+
 def _section(name: str) -> str:
     found = analyze(load(name))
+    live = f'<p><a href="{LIVE}/{name}.html">Move it in your browser</a></p>\n'
     return "\n".join(
         [
             f"## {name}\n",
             *(_picture(found.machine.name, f"{FOLDER}/{name}-{theme}.png", theme) for theme in THEMES),
             f"**{found.machine.name}.** {described(bundled()[name])}\n",
             f"{_facts(found)}\n",
+            *([live] if moves(name) else []),
         ]
     )
 

@@ -13,7 +13,7 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.points import PointTable
-from kinetostat.exchange.c_source import ENTRIES
+from kinetostat.exchange.machine_functions import ENTRIES
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.result import Result
 
 EXPORT_FORMATS = (
-    "mjcf", "mjcf-vibration", "urdf", "c", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space", "nastran",
-    "abaqus", "ansys",
+    "mjcf", "mjcf-vibration", "urdf", "c", "page", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space",
+    "nastran", "abaqus", "ansys",
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
@@ -66,7 +66,10 @@ def _add_export_command(commands: "Commands") -> None:
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
     )
-    in_c = {"inputs": "of c: parameters that become arguments", "outputs": "of c: quantities, as compliance_x"}
+    in_c = {
+        "inputs": "of c and page: parameters that become arguments",
+        "outputs": "of c and page: quantities, as compliance_x",
+    }
     for kind, names in (("inputs", "forces fx,fy,fz,mx,my,mz"), ("outputs", "motions x,y,z,rx,ry,rz")):
         command.add_argument(
             f"--{kind}", metavar="NAMES", type=_names,

@@ -17,7 +17,7 @@ from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints, closing_equations, platform_placement, within_reach
+from kinetostat.kinematics.closing import Joints, closing_equations, within_reach
 from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
@@ -231,39 +231,51 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
     return _formula(given, columns, results, 0.0, coordinates=coordinates)
 
 
-def placement_of(
-    kind: Specimen, form: Form, paths: Sequence[str], closed: bool
-) -> tuple[TracedFormula, list[Actuator]]:
-    """Trace where a machine is: coordinates of actuators, the tool point T (m) and the columns of Q, in the base frame.
+@dataclass(frozen=True)
+class Placement:
+    """Where a traced machine is.
+
+    Attributes:
+        formula: whose results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
+            and the points of the legs (m), in the base frame; its code is the `Status` by reach alone.
+        actuators: with traced coordinates.
+        legs: name of each leg, and number of its points, from base to platform.
+    """
+
+    formula: TracedFormula
+    actuators: tuple[Actuator, ...]
+    legs: tuple[tuple[str, int], ...]
+
+
+def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool) -> Placement:
+    """Trace where actuators, platform and legs of a machine are.
 
     Args:
         kind: of a machine whose joints have closed forms.
         form: how its parameters enter; numbers of joints in the drawing are constant.
         paths: leaf paths of the parameters to differentiate by.
         closed: whether joints are computed inside the program, as legs written leg by leg need it.
-
-    Returns:
-        The formula, whose code is the `Status` by reach alone, and the actuators with traced coordinates.
     """
     given = traced_machine(kind, form)
-    status: Scalar = int(Status.OK)
-    if closed:
-        chains = given.machine.chains()
-        joints = CLOSED_FORMS.over_scalars(chains)
-        platform, status = platform_placement(chains), joints.status
+    joints = CLOSED_FORMS.over_scalars(given.machine.chains()) if closed else None
+    configuration = given.machine.configure(joints.coordinates if joints else ())
+    status: Scalar = joints.status if joints else int(Status.OK)
+    if joints:
         at_home = joint_actuators(kind.machine.chains(), leg_names(kind.machine))
         actuators = [actuator.at(joints.coordinates) for actuator in at_home]
     else:
-        configuration = given.machine.configure()
-        platform, actuators = configuration.platform, actuators_of(configuration)
+        actuators = actuators_of(configuration)
         status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
+    platform = configuration.platform
     tool = platform.apply(Vector(*given.machine.tables["tool"].offset))
-    turn = (platform.rotation.x, platform.rotation.y, platform.rotation.z)
-    places = [c for vector in (tool, *turn) for c in vector.components()]
+    points = [[point for element in leg.chain for point in element.path] for leg in configuration.legs]
+    vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *(p for row in points for p in row)]
+    wanted = [actuator.coordinate for actuator in actuators] + [c for vector in vectors for c in vector.components()]
     accepted = status < Status.OK + 0.5
-    wanted = [actuator.coordinate for actuator in actuators] + places
     results = [_number(where(accepted, value, math.nan)) for value in wanted]
-    return _formula(given, (), results, _number(status), paths), actuators
+    formula = _formula(given, (), results, _number(status), paths)
+    legs = zip((leg.name for leg in configuration.legs), map(len, points), strict=True)
+    return Placement(formula, tuple(actuators), tuple(legs))
 
 
 def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:

@@ -77,6 +77,13 @@ KNOWN = (
         "functions in C99: K, C, actuators, derivatives, the way back, the command under load",
         channels=True,
     ),
+    Format(
+        "page",
+        ".html",
+        "page.write",
+        "one file for a browser: picture, sliders, K, C, actuators and a map, by the machine's own formulas",
+        channels=True,
+    ),
     Format("glb", ".glb", "solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
     Format(
         "step",

@@ -1,6 +1,6 @@
 /* section: always */
 $note
-#include "${stem}.h"
+#include "@stem@.h"
 
 #include <math.h>
 
