@@ -21,7 +21,9 @@ def main() -> int:
     if obeyed:
         signal.signal(signal.SIGINT, lambda *_: os._exit(CODE))
     from kinetostat.cli import main as run
+    from kinetostat.late import hide_array_libraries
 
+    hide_array_libraries()
     if obeyed:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     code = run()

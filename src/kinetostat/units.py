@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.frozen import dataclass
+from kinetostat.late import show_array_libraries
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -284,6 +285,7 @@ def _usual(unit: str, si: str) -> float:
 
 @cache
 def _registry() -> "UnitRegistry[float]":
+    show_array_libraries("pint")
     import pint
 
     return pint.UnitRegistry(str(UNITS))
@@ -291,6 +293,7 @@ def _registry() -> "UnitRegistry[float]":
 
 def _in_root_units(unit: str) -> "PlainQuantity[float] | None":
     """Return one `unit` in pint's root units; None if there is no such unit."""
+    show_array_libraries("pint")
     from pint import PintError
 
     try:

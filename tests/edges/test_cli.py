@@ -274,6 +274,17 @@ def test_one_pose_needs_no_compiler_and_no_datasets(command):
         assert f"'{heavy}'" not in loaded
 
 
+def test_a_map_imports_no_array_library_that_xarray_finds():
+    """Dask and pint take longer to import than the map to compute; with a rare unit, pint is there all the same."""
+    map_of = [sys.executable, "-X", "importtime", "-m", "kinetostat", "map", "hexapod", "--over"]
+    ranges = {"x=-2 cm:2 cm:3": set(), "x=-0.02 yard:0.02 yard:3": {"pint"}}
+    for text, wanted in ranges.items():
+        done = subprocess.run([*map_of, text, "--over", "y=-2 cm:2 cm:3"], capture_output=True, text=True, check=True)
+        imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+        assert "xarray" in imported
+        assert imported & {"dask", "dask.array", "pint"} == wanted
+
+
 def test_what_takes_long_is_said_on_a_terminal(monkeypatch):
     class Terminal(io.StringIO):
         """Standard error on a terminal that tells when something has been written."""

@@ -17,6 +17,7 @@ from typing import Any
 from kinetostat.engine.batch import NATIVE_SLAB, Evaluation, evaluate
 from kinetostat.engine.points import Points
 from kinetostat.frozen import dataclass
+from kinetostat.late import show_array_libraries
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import parse
@@ -105,6 +106,7 @@ def compute_with(crew: Crew) -> Iterator[Compute]:
     if crew.workers is None and crew.address is None:
         yield in_this_process
         return
+    show_array_libraries("dask")
     try:
         import distributed
     except ModuleNotFoundError:

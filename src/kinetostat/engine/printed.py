@@ -9,9 +9,9 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed
+from kinetostat.frozen import dataclass
 
 LONGEST_EXPRESSION = 92
 """Characters up to which an expression takes in another one."""

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.frozen import dataclass
+from kinetostat.late import ARRAY_LIBRARIES, show_array_libraries
 from kinetostat.spec.installation import adding, installing
 from kinetostat.spec.renamed import with_former_keys
 
@@ -95,6 +96,7 @@ def reinstall(packages: str) -> str:
 
 def diagnose() -> Iterator[InstallationCheck]:
     """Checks as they are made: packages and extras, the computer, known numbers computed again."""
+    show_array_libraries(*ARRAY_LIBRARIES)
     for group, checks in DIAGNOSIS_PARTS.items():
         try:
             yield from checks()
