@@ -232,8 +232,8 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
 
 
 @dataclass(frozen=True)
-class Placement:
-    """Where a traced machine is.
+class TracedPlacement:
+    """Places of the actuators, the tool and the legs of a traced machine.
 
     Attributes:
         formula: whose results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
@@ -247,8 +247,8 @@ class Placement:
     legs: tuple[tuple[str, int], ...]
 
 
-def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool) -> Placement:
-    """Trace where actuators, platform and legs of a machine are.
+def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool) -> TracedPlacement:
+    """Trace the places of actuators, tool and legs of a machine.
 
     Args:
         kind: of a machine whose joints have closed forms.
@@ -275,7 +275,7 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
     results = [_number(where(accepted, value, math.nan)) for value in wanted]
     formula = _formula(given, (), results, _number(status), paths)
     legs = zip((leg.name for leg in configuration.legs), map(len, points), strict=True)
-    return Placement(formula, tuple(actuators), tuple(legs))
+    return TracedPlacement(formula, tuple(actuators), tuple(legs))
 
 
 def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:

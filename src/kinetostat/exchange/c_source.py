@@ -29,7 +29,7 @@ from kinetostat.engine.printed import C, literal, print_graph
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.exchange.formats import ascii_line
-from kinetostat.exchange.machine_functions import ENTRIES, MachineFunctions, evaluated, functions_of, sample_points
+from kinetostat.exchange.machine_functions import ENTRIES, MachineFunctions, functions_of, quantities_at, sample_points
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
@@ -249,10 +249,10 @@ def _test(functions: MachineFunctions) -> str:
     blocks = {"MATRICES": np.array(matrices, dtype=float)}
     blocks["COORDINATES"] = np.array([[a.coordinate for a in stand(machine)] for machine in machines], dtype=float)
     if functions.rests:
-        blocks["DISPLACEMENT"] = evaluated(functions, columns, DISPLACEMENTS)
+        blocks["DISPLACEMENT"] = quantities_at(functions, columns, DISPLACEMENTS)
         blocks["COMMAND"] = _commanded(functions, columns, count)
     if functions.quantities:
-        blocks["QUANTITIES"] = evaluated(functions, columns, functions.quantities)
+        blocks["QUANTITIES"] = quantities_at(functions, columns, functions.quantities)
         points = PointTable(columns)
         sloped = evaluate_gradient(functions.machine, points, functions.quantities, functions.inputs).gradients
         blocks["SLOPES"] = np.moveaxis(sloped, 2, 0).reshape(count, -1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.form import Form, Placement, Specimen, form_with_numbers, placement_of
+from kinetostat.engine.form import Form, Specimen, TracedPlacement, form_with_numbers, placement_of
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
@@ -53,7 +53,7 @@ class MachineFunctions:
     quantities: tuple[str, ...]
     form: Form
     closed: bool
-    placement: Placement
+    placement: TracedPlacement
     rests: bool
 
     @cached_property
@@ -129,10 +129,10 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     return MachineFunctions(machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests)
 
 
-def evaluated(functions: MachineFunctions, columns: Mapping[str, Array], names: Sequence[str]) -> Array:
+def quantities_at(functions: MachineFunctions, columns: Mapping[str, Array], names: Sequence[str]) -> Array:
     """Compute quantities at points without the printed formulas [points x names]; columns are values by leaf path."""
-    found = evaluate(functions.machine, PointTable(columns), names).values
-    return np.stack([found[name] for name in names], axis=1)
+    answers = evaluate(functions.machine, PointTable(columns), names).values
+    return np.stack([answers[name] for name in names], axis=1)
 
 
 def sample_points(functions: MachineFunctions) -> dict[str, Array]:

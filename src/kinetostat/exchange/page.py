@@ -94,7 +94,7 @@ def _program(name: str, body: Body) -> str:
 
 
 def _data(functions: MachineFunctions, programs: Mapping[str, Body], stem: str) -> dict[str, object]:
-    """What the page knows beside its programs."""
+    """The data of the page beside its programs."""
     machine = functions.machine
     known = values(machine)
     rows = []
