@@ -9,7 +9,11 @@ from typing import Any, get_type_hints
 from matplotlib.figure import Figure
 
 import kinetostat
+from kinetostat.engine.buffers import Buffers
 from kinetostat.studies.compiled import CompiledFunction
+
+COMPILED = (CompiledFunction, Buffers)
+"""What `compile` returns, and what that returns: classes that are no data."""
 
 
 def reference(_folder: Path) -> str:
@@ -30,16 +34,15 @@ def answers() -> list[type]:
     functions = (inspect.unwrap(getattr(kinetostat, name)) for name in kinetostat.__all__)
     drawn = {"Figure": Figure}  # which the module of `plot` does not import
     returned = {get_type_hints(one, localns=drawn).get("return") for one in functions if inspect.isfunction(one)}
-    returned |= {get_type_hints(method).get("return") for method in vars(CompiledFunction).values() if callable(method)}
-    ours = (one for one in returned if inspect.isclass(one) and one.__module__.startswith("kinetostat."))
-    return sorted((one for one in ours if one.__name__ not in kinetostat.__all__), key=lambda one: one.__name__)
+    ours = (one for one in returned if is_dataclass(one) and one.__name__ not in kinetostat.__all__)
+    return sorted([*ours, *COMPILED], key=lambda one: one.__name__)
 
 
 def without_signature(
     _app: Any, what: str, _name: str, found: Any, _options: Any, _signature: str, _returns: str
 ) -> tuple[str, None] | None:
     """Answers are made by functions: how they would be called is nobody's business."""
-    return ("", None) if what == "class" and (is_dataclass(found) or found in answers()) else None
+    return ("", None) if what == "class" and (is_dataclass(found) or found in COMPILED) else None
 
 
 def as_markup(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
