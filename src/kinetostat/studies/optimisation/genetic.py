@@ -9,17 +9,25 @@ efficient constraint handling method for genetic algorithms, Comput. Methods App
 fast and elitist multiobjective genetic algorithm: NSGA-II, IEEE Trans. Evolutionary Computation 6 (2002).
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pymoo.operators.crossover.sbx import cross_sbx
 from pymoo.operators.mutation.pm import mut_pm
-from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
-from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, join_outcomes
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
+
+if TYPE_CHECKING:
+    from pymoo.operators.survival.rank_and_crowding import metrics
+    from pymoo.util.nds import non_dominated_sorting as sorting
+else:  # several objectives need them; they import much of SciPy
+    metrics = LateModule("pymoo.operators.survival.rank_and_crowding.metrics")
+    sorting = LateModule("pymoo.util.nds.non_dominated_sorting")
 
 CROSSED = 0.9
 """Share of the couples whose children are not copies of them."""
@@ -89,8 +97,8 @@ class Genetic:
         else:
             feasible = np.flatnonzero(outcome.violation == 0.0)
             front[:], lonely = len(wanted), np.zeros(len(wanted))
-            crowding = get_crowding_function("cd")
-            for rank, members in enumerate(NonDominatedSorting().do(wanted[feasible]) if feasible.size else []):
+            crowding = metrics.get_crowding_function("cd")
+            for rank, members in enumerate(sorting.NonDominatedSorting().do(wanted[feasible]) if feasible.size else []):
                 front[feasible[members]] = rank
                 lonely[feasible[members]] = crowding.do(wanted[feasible[members]], n_remove=0)
             order = np.lexsort([-lonely, front, outcome.violation])

@@ -12,16 +12,21 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
+
+if TYPE_CHECKING:
+    from scipy import optimize
+else:  # a genetic search does not descend
+    optimize = LateModule("scipy.optimize")
 from kinetostat.studies.optimisation.slopes import Local, Surveyor
 from kinetostat.studies.optimisation.terms import PoseTerm
 
@@ -180,7 +185,7 @@ class _Descent:
             bounds = [*bounds, (-BLOCKED, BLOCKED)]
             conditions.append({"type": "ineq", "fun": lambda x: pieces(x)[0], "jac": lambda x: pieces(x)[1]})
             function = _last_unknown
-        solution = minimize(
+        solution = optimize.minimize(
             function,
             unknowns,
             jac=True,
