@@ -9,8 +9,8 @@ import pytest
 from studio_page import on_page
 
 from kinetostat.cli import main
+from kinetostat.kinematics import nearest
 from kinetostat.kinematics.nearest import nearest_pose
-from kinetostat.kinetostatics import refusal
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studio import answers, lanes
@@ -111,7 +111,7 @@ def test_a_pose_out_of_reach_says_at_once_that_the_nearest_is_looked_for(monkeyp
         answered.wait(RESCUE)
         return nearest_pose(machine)
 
-    monkeypatch.setattr(refusal, "nearest_pose", patient)
+    monkeypatch.setattr(nearest, "nearest_pose", patient)
 
     async def steps(page):
         try:

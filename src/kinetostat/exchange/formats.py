@@ -50,7 +50,7 @@ class Format:
         chosen = {kind: names for kind, names in channels.items() if names is not None}
         if chosen and not self.channels:
             able = ", ".join(form.name for form in KNOWN if form.channels)
-            raise InputError(f"The format {self.name} has no {' and '.join(chosen)} to choose; {able} has: use --to.")
+            raise InputError(f"The format {self.name} has no {' and '.join(chosen)} to choose; {able} have: use --to.")
         module, _, function = self.writer.partition(".")
         write: Callable[..., list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
         return write(analysis, path, **chosen)

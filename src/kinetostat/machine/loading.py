@@ -203,7 +203,7 @@ def _write_out(document: Document, path: str) -> None:
 
 def _validated_machine(family: Family, document: Document, origin: str, display: Display) -> Machine:
     tables = family.every_table
-    name, instances = validated_tables(document, origin, tables)
+    name, instances = validated_tables(document, origin, family.name, tables)
     machine = Machine(name, family, instances, display)
     check_contrast(machine, origin)
     check_inertia(machine.tables, origin)

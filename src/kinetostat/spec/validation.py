@@ -52,12 +52,15 @@ class Mistake:
     reason: str = ""
 
 
-def validated_tables(document: Document, origin: str, tables: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
+def validated_tables(
+    document: Document, origin: str, family: str, tables: Mapping[str, type]
+) -> tuple[str, dict[str, Any]]:
     """Read what a machine file says, without its table [display], into the tables of its family.
 
     Args:
-        document: what was written; its family has been looked up.
+        document: what was written; its family has been looked up before overrides.
         origin: name of the file, for messages.
+        family: the name of the family, which no override may change.
         tables: classes of the tables, by dotted name.
 
     Returns:
@@ -67,15 +70,15 @@ def validated_tables(document: Document, origin: str, tables: Mapping[str, type]
         InputError: one sentence for each mistake, at most five.
     """
     reader = _Reader(tables)
-    mistakes = [*_mistakes_in_head(document), *reader.read(document)]
+    mistakes = [*_mistakes_in_head(document, family), *reader.read(document)]
     if mistakes:
         sentences = first_mistakes(mistakes, lambda mistake: _sentence(mistake, document, reader))
         raise InputError(f'"{origin}": {sentences}')
     return document["name"], {path: reader.instances[path] for path in tables}
 
 
-def _mistakes_in_head(document: Document) -> Iterator[Mistake]:
-    """Check the version of the format and the name of the machine."""
+def _mistakes_in_head(document: Document, family: str) -> Iterator[Mistake]:
+    """Check the version of the format, the name of the machine and its family."""
     version, name = document.get("schema", SCHEMA_VERSION), document.get("name")
     if version != SCHEMA_VERSION:
         yield Mistake("wrong", ("schema",))
@@ -83,6 +86,8 @@ def _mistakes_in_head(document: Document) -> Iterator[Mistake]:
         yield Mistake("missing", ("name",))
     elif not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and re.fullmatch(PRINTABLE, name)):
         yield Mistake("wrong", ("name",))
+    if document.get("family") != family:
+        yield Mistake("wrong", ("family",), f'an override cannot change it from "{family}"; start from another machine')
 
 
 class _Reader:
