@@ -2,13 +2,15 @@
 
 import ctypes
 import math
+import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinetostat import export, load
+from kinetostat import build, export, load
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.kernel import closes_inside
@@ -256,3 +258,17 @@ def test_a_leg_without_a_closed_form_is_refused(tmp_path):
 def test_a_name_that_make_cannot_take_is_refused(tmp_path):
     with pytest.raises(InputError, match="letters"):
         export(load("hexapod"), tmp_path / "my machine.c")
+
+
+def test_names_in_a_file_are_never_code(tmp_path):
+    """A joint's name that would end a comment, and begin a program."""
+    text = bundled()["tripteron"].replace('name = "slide"', 'name = "a */ int x; /* b"')
+    text = text.replace('name      = "slide"', 'name = "a */ int x; /* b"')
+    machine = replace(build(text), name="b */ int y; /* c ??/")
+    source, header, *_ = export(machine, tmp_path / "pkm.c")
+    for file in (source, header):
+        words = file.read_text()
+        assert words.count("/*") == words.count("*/")
+        assert "int x;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
+        assert "int y;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
+    subprocess.run([COMPILERS[0], *WARNINGS, "-c", str(source), "-o", str(tmp_path / "pkm.o")], check=True)

@@ -138,3 +138,23 @@ def test_nothing_sticks_out_at_any_width(pages, width):
             watched.tab.wait_for_function("document.documentElement.dataset.mapTime")
             assert watched.tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
         assert not watched.complaints
+
+
+@needs_chromium
+def test_a_name_in_a_file_is_never_markup(tmp_path):
+    evil = "<img src=x onerror=document.title=1>"
+    machine = load("tripteron")
+    page = export(machine, tmp_path / "page.html")[0]
+    actuator = json.loads(page.read_text("utf-8").split('id="machine">')[1].split("</script>")[0])["actuators"][0][
+        "name"
+    ]
+    page.write_text(
+        page.read_text("utf-8").replace(json.dumps(actuator), json.dumps(evil).replace("<", "\\u003c"), 1), "utf-8"
+    )
+    with browser() as new_tab:
+        watched = new_tab()
+        watched.tab.goto(page.as_uri())
+        watched.tab.wait_for_function("document.querySelectorAll('#actuators tr').length === 3")
+        assert watched.text("#actuators td") == evil
+        assert watched.tab.locator("#actuators img").count() == 0
+        assert not watched.complaints

@@ -18,10 +18,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.form import (
-    objectives_of,
-    step_of,
-)
+from kinetostat.engine.form import objectives_of, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.points import PointTable
@@ -84,11 +81,11 @@ def write(
         path.with_suffix(".mk"): (TEMPLATES / "makefile.mk").read_text("utf-8"),
     }
     for place, text in texts.items():
-        write_text(place, _named(text, path.stem))
+        write_text(place, _with_names(text, path.stem))
     return list(texts)
 
 
-def _named(text: str, stem: str) -> str:
+def _with_names(text: str, stem: str) -> str:
     """Name files, functions and constants of a text, which are templates, after the stem of the files."""
     word = re.sub(r"\W", "_", stem).strip("_").lower() or "pkm"
     prefix = f"m{word}" if word[0].isdigit() else word
@@ -168,8 +165,7 @@ def _text(functions: MachineFunctions, template: str, words: Mapping[str, object
 
 
 def _note(functions: MachineFunctions, made: str) -> str:
-    name = ascii_line(functions.machine.name).replace("*/", "* /")
-    return f"/* {name}. {made} kinetostat {version('kinetostat')}; do not edit. */"
+    return f"/* {_in_comment(functions.machine.name)}. {made} kinetostat {version('kinetostat')}; do not edit. */"
 
 
 def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
@@ -206,8 +202,8 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
         work["command"] = STEPS_OF_COMMAND * (work["rest"] + work["placement_at"])
-    given = [f"in[{k}]: {path}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.given)]
-    driven = [f"[{k}]: {ascii_line(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
+    given = [f"in[{k}]: {_in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.given)]
+    driven = [f"[{k}]: {_in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
     sizes = (len(functions.inputs), functions.coordinates, len(functions.actuators), len(functions.quantities))
     names = ("INPUTS", "COORDINATES", "ACTUATORS", "QUANTITIES")
@@ -215,7 +211,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         "note": _note(functions, "Made by"),
         "sizes": ", ".join(f"MACHINE_{name} = {size}" for name, size in zip(names, sizes, strict=True)),
         "statuses": ",\n    ".join(f"MACHINE_{status.name} = {int(status)}" for status in Status),
-        "sentences": "\n".join(_wrapped(f"{status.name}: {status.sentence}") for status in Status),
+        "sentences": "\n".join(_wrap(f"{status.name}: {status.sentence}") for status in Status),
         "given": _listing(given),
         "driven": _listing(driven),
         "listed": _listing(listed),
@@ -223,11 +219,16 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     return _text(functions, "header.h", words | work)
 
 
+def _in_comment(text: str) -> str:
+    """Write a name of a machine file in one line of ASCII that neither ends a comment nor begins one."""
+    return ascii_line(text).replace("*", "x").replace("/", "|").replace("\\", "|").replace("?", ".")
+
+
 def _listing(rows: Sequence[str]) -> str:
     return "".join(f"   {ascii_units(row)}\n" for row in rows)
 
 
-def _wrapped(text: str) -> str:
+def _wrap(text: str) -> str:
     return fill(text, 117, initial_indent="   ", subsequent_indent="     ")
 
 
@@ -250,7 +251,7 @@ def _test(functions: MachineFunctions) -> str:
     blocks["COORDINATES"] = np.array([[a.coordinate for a in stand(machine)] for machine in machines], dtype=float)
     if functions.rests:
         blocks["DISPLACEMENT"] = quantities_at(functions, columns, DISPLACEMENTS)
-        blocks["COMMAND"] = _commanded(functions, columns, count)
+        blocks["COMMAND"] = _command_coordinates(functions, columns, count)
     if functions.quantities:
         blocks["QUANTITIES"] = quantities_at(functions, columns, functions.quantities)
         points = PointTable(columns)
@@ -266,7 +267,7 @@ def _test(functions: MachineFunctions) -> str:
     return _text(functions, "test.c", words)
 
 
-def _commanded(functions: MachineFunctions, columns: dict[str, Array], count: int) -> Array:
+def _command_coordinates(functions: MachineFunctions, columns: dict[str, Array], count: int) -> Array:
     """Coordinates of the actuators of the loaded machine [n x actuators]; NaN where it comes to no rest."""
     try:
         return actuator_targets(functions.machine, columns, count).coordinates

@@ -25,6 +25,7 @@ function shown(value, digits = 4) {
     : String(Number(value.toPrecision(digits)));
   return text.replace("-", "−");
 }
+const escaped = (text) => text.replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
 const raised = (text) => [...text].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
 
 const angle = (value) => (Math.abs(value) > 1e6 ? Math.atan2(Math.sin(value), Math.cos(value)) : value);
@@ -112,7 +113,7 @@ function showMatrix() {
 function showActuators() {
   $("actuators").innerHTML = actuators.map(({ name, si }, k) => {
     const [factor, word] = unit(si);
-    return `<tr><td>${name}</td><td class="n">${shown(places[k] * factor, 7)}</td><td>${word}</td></tr>`;
+    return `<tr><td>${escaped(name)}</td><td class="n">${shown(places[k] * factor, 7)}</td><td>${word}</td></tr>`;
   }).join("");
 }
 function showQuantities() {
