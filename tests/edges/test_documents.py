@@ -1,5 +1,6 @@
 """What the documentation says, done: every command runs, every file is read, every answer is the printed one."""
 
+import configparser
 import io
 import re
 import subprocess
@@ -95,6 +96,20 @@ class Reader:
         compiled = ["cc", "-x", "c", str(source), *beside, "-I", str(self.folder), "-o", "program", "-lm"]
         subprocess.run(compiled, cwd=self.folder, check=True)
         self.said = subprocess.run(["./program"], cwd=self.folder, check=True, capture_output=True, text=True).stdout
+
+    def do_matlab(self, block):
+        """Calls of a MEX function that the page has written: its sources are there, and have the functions."""
+        for name in re.findall(r"^mex (.+)", block.text, re.MULTILINE)[0].split():
+            assert (self.folder / name).is_file()
+        adapter = next(self.folder.glob("*_mex.c"))
+        for function, task in re.findall(r"(\w+)\('(\w+)'", block.text):
+            assert function == adapter.stem
+            assert f'{{"{task}", ' in adapter.read_text("utf-8")
+
+    def do_ini(self, block):
+        settings = configparser.ConfigParser()
+        settings.read_string(block.text)
+        assert settings.sections()
 
     def do_xml(self, block):
         ElementTree.fromstring(f"<robot>{block.text}</robot>")

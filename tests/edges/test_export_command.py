@@ -1,17 +1,21 @@
 """`kinetostat export` and `kinetostat new --from`, as a new user types them."""
 
+import configparser
 import struct
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from cad import needs_cad
+from kinetostat import load, under_load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.commands.report import EXPORT_FORMATS
 from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
+from kinetostat.machine.parameters import with_values
 from kinetostat.spec.installation import adding
 
 MACHINE = "zhang-gosselin-4dof"
@@ -23,7 +27,9 @@ FORMS = [pytest.param(one, marks=needs_cad if one.name == "step" else (), id=one
 @pytest.mark.parametrize("one", FORMS)
 def test_every_format_is_written(one, tmp_path, capsys):
     path = tmp_path / f"out{one.suffix}"
-    assert main(["export", MACHINE, "--set", "tool.mass=5 kg", "--to", one.name, "-o", str(path)]) == DONE
+    loads = ["--set", "tool.mass=5 kg", "--set", "load.gravity=[0, 0, -9.81]"]
+    machine = "delta" if "over" in one.options else MACHINE
+    assert main(["export", machine, *loads, "--to", one.name, "-o", str(path)]) == DONE
     assert str(path) in capsys.readouterr().out.replace("\n", "")
     assert path.stat().st_size > 100
     assert not [other for other in tmp_path.iterdir() if other.name.startswith(".")]
@@ -138,3 +144,45 @@ def test_new_wants_a_family_or_a_file(capsys):
     assert "FAMILY --from --legs-of is required" in capsys.readouterr().err
     assert main(["new", "--from", "missing.urdf"]) == BAD_INPUT
     assert '"missing.urdf" cannot be read' in capsys.readouterr().err
+
+
+HEIGHTS = ["--set", "tool.mass=2 kg", "--set", "load.gravity=[0, 0, -9.81]", "--over", "x=-10 cm:10 cm:3"]
+HEIGHTS += ["--over", "y=-6 cm:9 cm:4"]
+
+
+def test_a_tool_that_is_raised_by_the_map_is_at_its_height(tmp_path):
+    mesh, chart = tmp_path / "bed.cfg", tmp_path / "heightmap.csv"
+    assert main(["export", "delta", *HEIGHTS, "-o", str(mesh)]) == DONE
+    assert main(["export", "delta", *HEIGHTS, "--to", "reprapfirmware", "-o", str(chart)]) == DONE
+    settings = configparser.ConfigParser()
+    settings.read(mesh)
+    profile = settings["bed_mesh bed"]
+    heights = np.array([row.split(",") for row in profile["points"].split("\n") if row], dtype=float)
+    assert heights.shape == (int(profile["y_count"]), int(profile["x_count"])) == (4, 3)
+    assert [float(profile[name]) for name in ("min_x", "max_x", "min_y", "max_y")] == [-100, 100, -60, 90]
+    assert profile["algo"] == "lagrange"
+    lines = chart.read_text().splitlines()
+    assert lines[0].startswith("RepRapFirmware height map file v2")
+    assert lines[2] == "-100.000,100.000,-60.000,90.000,-1.000,100.000,50.000,3,4"
+    assert np.allclose(np.array([row.split(",") for row in lines[3:]], dtype=float), heights, atol=6e-5)
+    machine = load("delta", ["tool.mass=2 kg", "load.gravity=[0, 0, -9.81]", "load.state=loaded"])
+    for row, y in enumerate([-0.06, -0.01, 0.04, 0.09]):
+        raised = with_values(machine, {"pose.x": 0.1, "pose.y": y, "pose.z": -0.75 + 1e-3 * heights[row, 2]})
+        assert under_load(raised).displacement[5] == pytest.approx(-1e-3 * heights[row, 2], abs=1e-9)
+    assert heights.min() > 0.05, "mm, upwards"
+
+
+@pytest.mark.parametrize(
+    ("machine", "options", "says"),
+    [
+        ("delta", [], "Nothing loads the machine"),
+        ("tricept", [], "has no coordinate z"),
+        ("delta", ["--over", "x=0 mm:1 mm:3"], "ranges of x and of y with at least three points"),
+        ("delta", [*HEIGHTS[:4], "--over", "x=0 m:0.9 m:3", "--over", "y=0 m:0.1 m:3"], "no mesh with holes"),
+        ("delta", ["--inputs", "x"], "The format klipper has no inputs to choose"),
+    ],
+)
+def test_what_no_map_of_heights_can_hold_is_refused(machine, options, says, tmp_path, capsys):
+    assert main(["export", machine, *options, "--to", "klipper", "-o", str(tmp_path / "bed.cfg")]) == BAD_INPUT
+    assert says in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.result import Result
 
 EXPORT_FORMATS = (
-    "mjcf", "mjcf-vibration", "urdf", "c", "page", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space",
-    "nastran", "abaqus", "ansys",
+    "mjcf", "mjcf-vibration", "urdf", "c", "mex", "linuxcnc", "fmu", "page", "glb", "step", "csv", "netcdf", "mat",
+    "modes", "state-space", "klipper", "reprapfirmware", "nastran", "abaqus", "ansys",
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
@@ -67,14 +67,15 @@ def _add_export_command(commands: "Commands") -> None:
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
     )
     in_c = {
-        "inputs": "of c and page: parameters that become arguments",
-        "outputs": "of c and page: quantities, as compliance_x",
+        "inputs": "of c, mex, fmu and page: parameters that become arguments",
+        "outputs": "of c, mex, fmu and page: quantities, as compliance_x",
     }
     for kind, names in (("inputs", "forces fx,fy,fz,mx,my,mz"), ("outputs", "motions x,y,z,rx,ry,rz")):
         command.add_argument(
             f"--{kind}", metavar="NAMES", type=_names,
             help=f"of a state space: {names} of the tool, or names of actuators (default: the tool's); {in_c[kind]}",
         )  # fmt: skip
+    takes_ranges(command, "of klipper and reprapfirmware: the ranges of x and of y; default: about the pose")
 
 
 def _names(text: str) -> list[str]:
@@ -174,7 +175,7 @@ def _export(options: argparse.Namespace) -> int:
         return no_answer(analysis.message)
     stem = re.sub(r"[^\w.-]+", "-", Path(options.machine).stem if options.output is None else "").strip("-")
     path = options.output or Path(f"{stem}{chosen.suffix}")
-    written = chosen.write(analysis, path, inputs=options.inputs, outputs=options.outputs)
+    written = chosen.write(analysis, path, inputs=options.inputs, outputs=options.outputs, over=options.ranges or None)
     print_written(terminal(), written)
     return DONE
 

@@ -67,28 +67,42 @@ def write(
     Raises:
         InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
     """
+    functions = functions_of(analysis.machine, inputs or (), outputs or ())
+    texts = {
+        **library_texts(functions, path),
+        path.with_name(f"{path.stem}_test.c"): with_names(_test(functions), path.stem),
+        path.with_suffix(".mk"): with_names((TEMPLATES / "makefile.mk").read_text("utf-8"), path.stem),
+    }
+    for place, text in texts.items():
+        write_text(place, text)
+    return list(texts)
+
+
+def library_texts(functions: MachineFunctions, path: Path) -> dict[Path, str]:
+    """Return the source and the header of the functions, by their paths, of which one is given.
+
+    Raises:
+        InputError: the name of the file cannot be a name in C.
+    """
     if not FILE_NAME.match(path.stem):
         raise InputError(
             f'The name of "{path.name}" becomes a name in C and in a make file: use letters of the English alphabet, '
             "digits, -, . and _ for it."
         )
-    functions = functions_of(analysis.machine, inputs or (), outputs or ())
     programs = list(_programs(functions))
-    texts = {
-        path: _source(functions, programs),
-        path.with_suffix(".h"): _header(functions, programs),
-        path.with_name(f"{path.stem}_test.c"): _test(functions),
-        path.with_suffix(".mk"): (TEMPLATES / "makefile.mk").read_text("utf-8"),
-    }
-    for place, text in texts.items():
-        write_text(place, _with_names(text, path.stem))
-    return list(texts)
+    texts = {".c": _source(functions, programs), ".h": _header(functions, programs)}
+    return {path.with_suffix(suffix): with_names(text, path.stem) for suffix, text in texts.items()}
 
 
-def _with_names(text: str, stem: str) -> str:
-    """Name files, functions and constants of a text, which are templates, after the stem of the files."""
+def prefix_of(stem: str) -> str:
+    """Return the beginning of all names in the source code of a file."""
     word = re.sub(r"\W", "_", stem).strip("_").lower() or "pkm"
-    prefix = f"m{word}" if word[0].isdigit() else word
+    return f"m{word}" if word[0].isdigit() else word
+
+
+def with_names(text: str, stem: str) -> str:
+    """Name files, functions and constants of a text, which are templates, after the stem of the files."""
+    prefix = prefix_of(stem)
     text = text.replace("machine_", f"{prefix}_").replace("MACHINE_", f"{prefix.upper()}_")
     return text.replace("@stem@", stem)
 
@@ -149,13 +163,15 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
     return PrintedProgram(name, f"{head}{{\n{text}}}\n", printed.operations)
 
 
-def _text(functions: MachineFunctions, template: str, words: Mapping[str, object]) -> str:
-    """A file from its template: the sections that a machine needs, with words filled in."""
+def filled(functions: MachineFunctions, template: str, words: Mapping[str, object]) -> str:
+    """Return a file from its template: the sections that a machine needs, with words filled in."""
     needed = {
         "always": True,
         "solve": functions.square or functions.rests,
         "forward": functions.square,
+        "no_forward": not functions.square,
         "rest": functions.rests,
+        "loaded_forward": functions.square and functions.rests,
         "quantities": bool(functions.quantities),
         "scale": functions.rests or bool(functions.quantities),
     }
@@ -164,8 +180,9 @@ def _text(functions: MachineFunctions, template: str, words: Mapping[str, object
     return Template(text).substitute(words)
 
 
-def _note(functions: MachineFunctions, made: str) -> str:
-    return f"/* {_in_comment(functions.machine.name)}. {made} kinetostat {version('kinetostat')}; do not edit. */"
+def note(functions: MachineFunctions, made: str) -> str:
+    """Return the comment with which a file begins."""
+    return f"/* {in_comment(functions.machine.name)}. {made} kinetostat {version('kinetostat')}; do not edit. */"
 
 
 def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
@@ -185,13 +202,13 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         numbers |= {"COMMANDED": COMMANDED, "STEPS_OF_COMMAND": STEPS_OF_COMMAND}
     constants += [f"#define {name} {number!r}" for name, number in numbers.items()]
     words = {
-        "note": _note(functions, "Made by"),
+        "note": note(functions, "Made by"),
         "constants": "\n".join(constants) + "\n",
         "programs": "\n".join(program.text for program in programs),
         "rest_first": "double state[STATES];\n    rest_of(at, state);" if functions.needs_state else "",
         "state": "state, " if functions.needs_state else "",
     }
-    return _text(functions, "source.c", words).replace("\n    \n", "\n")
+    return filled(functions, "source.c", words).replace("\n    \n", "\n")
 
 
 def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
@@ -202,29 +219,30 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
         work["command"] = STEPS_OF_COMMAND * (work["rest"] + work["placement_at"])
-    given = [f"in[{k}]: {_in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.given)]
-    driven = [f"[{k}]: {_in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
+    given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.given)]
+    driven = [f"[{k}]: {in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
     sizes = (len(functions.inputs), functions.coordinates, len(functions.actuators), len(functions.quantities))
     names = ("INPUTS", "COORDINATES", "ACTUATORS", "QUANTITIES")
     words: dict[str, object] = {
-        "note": _note(functions, "Made by"),
+        "note": note(functions, "Made by"),
         "sizes": ", ".join(f"MACHINE_{name} = {size}" for name, size in zip(names, sizes, strict=True)),
         "statuses": ",\n    ".join(f"MACHINE_{status.name} = {int(status)}" for status in Status),
         "sentences": "\n".join(_wrap(f"{status.name}: {status.sentence}") for status in Status),
-        "given": _listing(given),
-        "driven": _listing(driven),
-        "listed": _listing(listed),
+        "given": listing(given),
+        "driven": listing(driven),
+        "listed": listing(listed),
     }
-    return _text(functions, "header.h", words | work)
+    return filled(functions, "header.h", words | work)
 
 
-def _in_comment(text: str) -> str:
-    """Write a name of a machine file in one line of ASCII that neither ends a comment nor begins one."""
+def in_comment(text: str) -> str:
+    """Return a name of a machine file in one line of ASCII that neither ends a comment nor begins one."""
     return ascii_line(text).replace("*", "x").replace("/", "|").replace("\\", "|").replace("?", ".")
 
 
-def _listing(rows: Sequence[str]) -> str:
+def listing(rows: Sequence[str]) -> str:
+    """Return rows as lines of a comment."""
     return "".join(f"   {ascii_units(row)}\n" for row in rows)
 
 
@@ -259,12 +277,12 @@ def _test(functions: MachineFunctions) -> str:
         blocks["SLOPES"] = np.moveaxis(sloped, 2, 0).reshape(count, -1)
     arrays = [_array("POSES", rows), *(_array(f"REFERENCE_{name}", block) for name, block in blocks.items())]
     words = {
-        "note": _note(functions, "Test of the functions, made by"),
+        "note": note(functions, "Test of the functions, made by"),
         "arrays": "\n".join(arrays),
         "agreed": AGREED,
         "rows": count,
     }
-    return _text(functions, "test.c", words)
+    return filled(functions, "test.c", words)
 
 
 def _command_coordinates(functions: MachineFunctions, columns: dict[str, Array], count: int) -> Array:

@@ -26,7 +26,7 @@ class Format:
             paths of the files it made.
         summary: what is in it, for lists.
         other_suffixes: suffixes that are also common for its files.
-        channels: whether inputs and outputs can be chosen.
+        options: what can be chosen: "inputs" and "outputs" by their names, "over" by ranges.
     """
 
     name: str
@@ -34,28 +34,30 @@ class Format:
     writer: str
     summary: str
     other_suffixes: tuple[str, ...] = ()
-    channels: bool = False
+    options: tuple[str, ...] = ()
 
-    def write(self, analysis: Analysis, path: Path, **channels: Sequence[str] | None) -> list[Path]:
+    def write(self, analysis: Analysis, path: Path, **options: Sequence[str] | None) -> list[Path]:
         """Write the machine, or its results at the pose, whole or not at all, and return the paths of the files.
 
         Args:
             analysis: the analysis of the machine, at a pose where its status is OK.
             path: the path of the file; one that is there is replaced.
-            channels: names of `inputs` and of `outputs`; None for all that the format has by itself.
+            options: names of `inputs` and of `outputs`, ranges `over`; None for what the format has by itself.
 
         Raises:
-            InputError: the format cannot hold this machine, has no inputs and outputs, or the file cannot be written.
+            InputError: the format cannot hold this machine, has no such option, or the file cannot be written.
         """
-        chosen = {kind: names for kind, names in channels.items() if names is not None}
-        if chosen and not self.channels:
-            able = ", ".join(form.name for form in KNOWN if form.channels)
-            raise InputError(f"The format {self.name} has no {' and '.join(chosen)} to choose; {able} have: use --to.")
+        chosen = {kind: names for kind, names in options.items() if names is not None}
+        for kind in chosen:
+            if kind not in self.options:
+                able = ", ".join(form.name for form in KNOWN if kind in form.options)
+                raise InputError(f"The format {self.name} has no {kind} to choose; {able} have: use --to.")
         module, _, function = self.writer.partition(".")
         write: Callable[..., list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
         return write(analysis, path, **chosen)
 
 
+CHANNELS = ("inputs", "outputs")
 KNOWN = (
     Format("mjcf", ".xml", "mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format(
@@ -75,14 +77,34 @@ KNOWN = (
         ".c",
         "c_source.write",
         "functions in C99: K, C, actuators, derivatives, the way back, the command under load",
-        channels=True,
+        options=CHANNELS,
+    ),
+    Format(
+        "mex",
+        ".c",
+        "c_programs.write_mex",
+        "the same functions for MATLAB and Octave: C with the adapter that mex compiles",
+        options=CHANNELS,
+    ),
+    Format(
+        "linuxcnc",
+        ".comp",
+        "c_programs.write_linuxcnc",
+        "kinematics for LinuxCNC, compensated under load if wanted: a component for halcompile",
+    ),
+    Format(
+        "fmu",
+        ".fmu",
+        "c_programs.write_fmu",
+        "model of FMI 3.0 for co-simulation: K, C, actuators and the way back, from pose and parameters",
+        options=CHANNELS,
     ),
     Format(
         "page",
         ".html",
         "page.write",
         "one file for a browser: picture, sliders, K, C, actuators and a map, by the machine's own formulas",
-        channels=True,
+        options=CHANNELS,
     ),
     Format("glb", ".glb", "solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
     Format(
@@ -108,7 +130,21 @@ KNOWN = (
         "vibration_files.write_state_space",
         "A, B, C, D of the vibrating machine, from chosen forces to chosen motions",
         (".nc",),
-        channels=True,
+        options=CHANNELS,
+    ),
+    Format(
+        "klipper",
+        ".cfg",
+        "height_map.write_klipper",
+        "heights over x and y that keep the loaded tool at its z, as a mesh of Klipper",
+        options=("over",),
+    ),
+    Format(
+        "reprapfirmware",
+        ".csv",
+        "height_map.write_reprapfirmware",
+        "the same as a height map of RepRapFirmware",
+        options=("over",),
     ),
     Format("nastran", ".bdf", "finite_elements.write_nastran", "K at the tool point as DMIG"),
     Format("abaqus", ".inp", "finite_elements.write_abaqus", "K at the tool point as a linear user element"),
@@ -143,6 +179,7 @@ def export(
     to: str | None = None,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
+    over: Sequence[str] | None = None,
 ) -> list[Path]:
     """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
 
@@ -150,8 +187,10 @@ def export(
         machine: the machine at a pose where it can be analysed.
         path: the path of the file; one that is there is replaced.
         to: name of the format, as in `kinetostat export --to`; None to go by the suffix of the path.
-        inputs, outputs: the inputs and outputs of a state space: names of forces fx fy fz mx my mz at the tool point,
-            of motions x y z rx ry rz there, and of actuators in both; forces and motions of the tool point if None.
+        inputs, outputs: of a state space, names of forces fx fy fz mx my mz at the tool point, of motions
+            x y z rx ry rz there, and of actuators in both; forces and motions of the tool point if None. Of C, a page
+            and their like, leaf paths of parameters that become arguments, and names of quantities.
+        over: of maps of heights, ranges of x and y, as "x=-100 mm:100 mm:9".
 
     Returns:
         The paths of the files: some formats need several.
@@ -163,7 +202,7 @@ def export(
     form, analysis = choose(to, Path(path)), analyze(machine)
     if analysis.status is not Status.OK:
         raise InputError(analysis.message)
-    return form.write(analysis, Path(path), inputs=inputs, outputs=outputs)
+    return form.write(analysis, Path(path), inputs=inputs, outputs=outputs, over=over)
 
 
 def one_line(text: str) -> str:
