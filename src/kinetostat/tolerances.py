@@ -116,6 +116,11 @@ UNMOVED_TOOL = 1e-13
 tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
+DEGENERATE_FACE = 1e-10
+"""Product of unit wrenches below which they are dependent and span no face: their round-off is then its direction."""
+SURELY_REGULAR = 1e-6
+"""Share of the largest pivot of conditions above which all of them are surely independent, and reflections without
+exchanges keep ten digits; singular values decide below it."""
 STIFFEST_LEG = 1e6
 """Stiffness of a leg, in units of the typical one of the machine's springs, and beside the softest direction of all
 legs together, beyond which it counts as rigid where legs are eliminated: the sum of all legs keeps ten digits."""

@@ -16,7 +16,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import senses_of
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.studies.under_load import under_load
-from machines import every_machine
+from machines import two_sided
 
 SMALL = 1e-6
 """Greatest displacement under the load, rad or lengths of the machine: balance at the free state errs by so much."""
@@ -60,7 +60,7 @@ def place(machine):
     return columns, np.array(response.reference.components(), dtype=float), drives
 
 
-@every_machine
+@two_sided
 @settings(max_examples=4)
 @given(wrench=directions)
 def test_drives_of_bundled_machines_balance_every_load(case, wrench):

@@ -26,12 +26,14 @@ from kinetostat.engine.kernel import (
     program_of,
 )
 from kinetostat.engine.trace import Runnable
+from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.numbers import loaded_numbers
 from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.vibration.modes import frequencies
@@ -50,12 +52,14 @@ class Way(Enum):
     Equations of any machine fill the third cache level with some hundred poses, of which they do a thousand per second;
     its modes take as long by LAPACK as the formulas by Python, which more poses share. Where the platform alone is
     massive and nothing is loaded, columns of numbers do thirty thousand at once. Machine code does some hundred
-    thousand, after a quarter of a second to two seconds for which it is compiled.
+    thousand, after a quarter of a second to two seconds for which it is compiled; so do columns for the tensions of
+    straight cables, which follow from where the platform is.
     """
 
     ANY_MACHINE = 256
     MODES = 768
     COLUMNS = 4096
+    CABLES = 2048
     NATIVE = 32768
 
     @property
@@ -79,6 +83,8 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
         quantities: names from `QUANTITIES`.
         count: of points; infinity if the same will be asked many times, so that compiling pays for few points too.
     """
+    if all(QUANTITIES[name].cables for name in quantities) and not limits_set(machine.tables["limits"]):
+        return Way.CABLES
     loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
@@ -111,6 +117,8 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
 
 def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
     """Return the fill of such quantities, which may leave vibrations unknown at poses that are said to be OK."""
+    if way is Way.CABLES:
+        return partial(_fill_of_cables, machine, tuple(quantities))
     plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
     if plain or not _over_scalars(machine, tuple(paths), quantities):
@@ -131,6 +139,17 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
         every(columns, results, status)
 
     return fill
+
+
+def _fill_of_cables(
+    machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], results: Array, status: Codes
+) -> None:
+    """Fill with numbers of cables alone, for which no leg has to be placed."""
+    with np.errstate(all="ignore"):
+        numbers, status[:] = cable_numbers(with_values(machine, columns), quantities, len(status))
+    for row, name in zip(results, quantities, strict=True):
+        row[:] = numbers[name]
+    results[:, status != Status.OK] = np.nan
 
 
 def _solve_in_parts(
@@ -160,9 +179,18 @@ def _response_with_states(
     if any(quantity.cut for quantity in wanted):
         pressure = state.machine.tables["cutting"].pressure
         response = replace(response, softest=cut_receptances(state), cutting_pressure=pressure)
+    of_cables = [quantity.name for quantity in wanted if quantity.cables]
+    if of_cables:
+        numbers, cable_status = cable_numbers(state.machine, of_cables, count)
+        free = np.broadcast_to(response.status, (count,))
+        status = np.where(
+            (free == Status.OK) | (free == Status.SINGULAR) & (cable_status == Status.NO_REST), cable_status, free
+        )
+        response = replace(response, cables=numbers, status=status)
     if at_rest := rest_numbers(machine, quantities):
         further = {"frequency": frequencies} if "frequency" in at_rest else None
-        loaded, status = loaded_numbers(state, further)
+        loaded, at_rest_status = loaded_numbers(state, further)
+        status = np.where(np.isin(response.status, (Status.NO_REST,)), response.status, at_rest_status)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
     return response
 
@@ -222,7 +250,7 @@ _reducible = lru_cache(PROGRAMS_KEPT)(reducible)
 def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
     """Whether programs can compute all that these quantities need."""
     wanted, needed = [QUANTITIES[name] for name in quantities], rest_numbers(machine, quantities)
-    if any(quantity.cut for quantity in wanted):
+    if any(quantity.cut or quantity.cables for quantity in wanted):
         return False
     machine_cut = _cut(machine, paths) if needed else None
     at_rest = not needed or machine_cut is not None

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.balance import Balance, balance, free_state, platform_load
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Equilibria, at_rest
 from kinetostat.equilibrium.tangent import solve
 from kinetostat.frozen import dataclass
+from kinetostat.numerics.distribution import Balancing, Rule, distribution, within_bounds
 from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import BALANCED, COMMANDED, UNRESISTED
@@ -64,30 +65,69 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
     )
 
 
-def with_tensions(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, Mask]:
+def with_tensions(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -> tuple[Mechanism, Mask]:
     """Choose the preloads of all springs so that the machine is at rest at its pose.
 
     Args:
         mechanism: the mechanism with its loads; its own preloads are left out, but for flexure hinges, which carry what
             they do.
         least, most: bounds of what its one-sided springs pull (or push), in its units of force [n].
+        rule: the choice among the loads within them, in the same units.
 
     Returns:
         The mechanism with these preloads, and where there are any within the bounds [n]; elsewhere they are zero.
     """
     bare = replace(mechanism, legs=tuple(replace(leg, preload=leg.preload * leg.hinged) for leg in mechanism.legs))
-    equations = balance(bare, free_state(bare))
-    chosen = [_tensions_at(equations, i, float(least[i]), float(most[i])) for i in range(len(least))]
-    known = np.array([loads is not None for loads in chosen])
-    size = sum(leg.size for leg in mechanism.legs)
-    table = np.array([np.zeros(size) if loads is None else loads for loads in chosen])
+    table, known = (_tensions_of_cables if _only_cables(bare) else _tensions)(bare, least, most, rule)
     ends = np.cumsum([leg.size for leg in mechanism.legs])[:-1]
     parts = zip(bare.legs, np.split(table, ends, axis=1), strict=True)
     legs = [replace(leg, preload=leg.preload + part) for leg, part in parts]
     return replace(bare, legs=tuple(legs)), known
 
 
-def _tensions_at(equations: Balance, pose: int, least: float, most: float) -> Array | None:
+def _only_cables(mechanism: Mechanism) -> bool:
+    """Whether each leg carries a single wrench, by a spring that only pulls or only pushes, and weighs nothing."""
+    return all(
+        leg.size == mechanism.ways.shape[1]
+        and sum(spring is not None for spring in leg.springs) == 1
+        and leg.sign.any()
+        and not (leg.hinged.any() or leg.masses.mass.any())
+        for leg in mechanism.legs
+    )
+
+
+def _tensions_of_cables(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
+    """Loads of all coordinates of cables at n poses [n x coordinates], and where there are any within bounds [n]."""
+    wrenches = []
+    for leg in mechanism.legs:  # that which does no work on its passive motions, and as much as it pulls on its own
+        motions = mechanism.ways.T @ np.swapaxes(leg.chain.twists, 1, 2) @ leg.chain.follows
+        wrenches.append(_solution(np.swapaxes(motions, 1, 2), leg.sign))
+    load = platform_load(mechanism, free_state(mechanism).platform)[0] @ mechanism.ways
+    tensions, known = distribution(np.stack(wrenches, axis=2), load, least, most, rule)
+    parts = [tensions[:, [place]] * leg.sign for place, leg in enumerate(mechanism.legs)]
+    return np.where(known[:, None], np.concatenate(parts, axis=1), 0.0), known
+
+
+def _solution(matrices: Array, right: Array) -> Array:
+    """Solutions of n equations with one right side [n x size]; NaN where they are singular or have no place."""
+    finite: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    here = np.where(finite[:, None, None], matrices, np.eye(len(right)))
+    regular = finite & (np.abs(np.linalg.det(here)) > UNRESISTED)
+    here = np.where(regular[:, None, None], here, np.eye(len(right)))
+    solved = np.linalg.solve(here, np.broadcast_to(right[:, None], (len(here), len(right), 1)))[:, :, 0]
+    return np.where(regular[:, None], solved, np.nan)
+
+
+def _tensions(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
+    """The same of any machine, pose by pose."""
+    equations, count = balance(mechanism, free_state(mechanism)), len(least)
+    chosen = [_tensions_at(equations, i, float(least[i]), float(most[i]), rule.at(np.array([i]))) for i in range(count)]
+    nothing = np.zeros(sum(leg.size for leg in mechanism.legs))
+    table = np.array([nothing if loads is None else loads for loads in chosen])
+    return table, np.array([loads is not None for loads in chosen])
+
+
+def _tensions_at(equations: Balance, pose: int, least: float, most: float, rule: Rule) -> Array | None:
     """Loads of all coordinates at one pose, 0 of passive ones; None where none within the bounds balance."""
     ways, legs = equations.mechanism.ways, equations.mechanism.legs
     size = ways.shape[1]
@@ -114,39 +154,16 @@ def _tensions_at(equations: Balance, pose: int, least: float, most: float) -> Ar
     every, sign = np.concatenate(felt), np.concatenate(signs)
     base, turn = every @ start - np.concatenate(weight), every @ free
     pulls = sign != 0.0
-    inner = _least_norm(sign[pulls] * base[pulls], sign[pulls, None] * turn[pulls], least, most)
+    inner = _inner_loads(sign[pulls] * base[pulls], sign[pulls, None] * turn[pulls], least, most, rule)
     return None if inner is None else base + turn @ inner
 
 
-def _within(loads: Array, least: float, most: float, slack: float) -> bool:
-    return bool(((loads >= least - slack) & (loads <= most + slack)).all())
-
-
-def _least_norm(base: Array, turn: Array, least: float, most: float) -> Array | None:
-    """The z of least norm of base + turn z within bounds; None where there is none.
-
-    In the coordinates in which the norm is that of a vector, it is the point of a polyhedron that is nearest to the
-    origin, which one problem of least squares with non-negative unknowns gives.
-
-    Source: C. Lawson and R. Hanson, Solving Least Squares Problems (1974), chapter 23, algorithm LDP.
-    """
-    from scipy.optimize import nnls  # half a second to import: only for machines that need it
-
-    scale = max(np.abs(base).max(initial=0.0), least, UNRESISTED)
-    if not turn.shape[1]:
-        return np.zeros(0) if _within(base, least, most, BALANCED * scale) else None
+def _inner_loads(base: Array, turn: Array, least: float, most: float, rule: Rule) -> Array | None:
+    """The z for which base + turn z is within bounds and as the rule says; None where there is none."""
     across, sizes, along = np.linalg.svd(turn, full_matrices=False)
     kept = sizes > UNRESISTED * max(sizes.max(initial=0.0), UNRESISTED)
     across, back = across[:, kept], along[kept].T / sizes[kept]
-    # base + turn z = fixed + across y with y = across^T (base + turn z), and fixed is at right angles to it.
-    fixed = base - across @ (across.T @ base)
-    sides, ends = across, (least - fixed) / scale
-    if np.isfinite(most):
-        sides, ends = np.concatenate([across, -across]), np.concatenate([ends, (fixed - most) / scale])
-    matrix, wanted = np.vstack([sides.T, ends]), np.append(np.zeros(sides.shape[1]), 1.0)
-    amounts, missed = nnls(matrix, wanted)
-    if missed <= BALANCED:
-        return None
-    left = matrix @ amounts - wanted
-    nearest = -scale * left[:-1] / left[-1]
-    return np.asarray(back @ (nearest - across.T @ base))
+    # base + turn z = given + across y with y = across^T (base + turn z), and given is at right angles to it.
+    every = Balancing((base - across @ (across.T @ base))[None], across[None], np.array([True]))
+    loads, exist = within_bounds(every, np.array([least]), np.array([most]), rule)
+    return np.asarray(back @ (across.T @ (loads[0] - base))) if exist[0] else None

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from kinetostat.equilibrium.mechanism import Mechanism
     from kinetostat.equilibrium.tangent import Stability
     from kinetostat.kinematics import closure
+    from kinetostat.numerics import distribution
 else:
     actuation = LateModule("kinetostat.equilibrium.actuation")
     balance = LateModule("kinetostat.equilibrium.balance")
@@ -53,6 +54,7 @@ else:
     solving = LateModule("kinetostat.equilibrium.solving")
     tangent = LateModule("kinetostat.equilibrium.tangent")
     closure = LateModule("kinetostat.kinematics.closure")
+    distribution = LateModule("kinetostat.numerics.distribution")
 
 HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
 """Statuses without loads at which a machine may come to rest: tension and weight hold where springs do not."""
@@ -300,7 +302,10 @@ def _loaded_mechanism(
             f"{machine.name}: load.min_tension and load.max_tension bound what only pulls or only pushes, which no "
             'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
         )
-    return actuation.with_tensions(mechanism, least / mechanism.force, most / mechanism.force)
+    table = machine.tables["cables"]
+    level, exponent = stacked_columns([table.level, table.exponent], count).T
+    rule = distribution.Rule(level / mechanism.force, exponent)
+    return actuation.with_tensions(mechanism, least / mechanism.force, most / mechanism.force, rule)
 
 
 def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:

@@ -29,9 +29,13 @@ from kinetostat.machine.limits import LIMITS, limits_loads
 from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import UNMOVED_TOOL
 
+MOST_CABLES = 24
+"""Cables of a machine whose tensions are quantities: as many as a machine may have legs."""
 MODES = 6
 """Natural frequencies that are quantities, from the lowest."""
 
+CABLES = "cables alone as legs"
+"""Parts that a machine must have for tensions to be chosen."""
 Better: TypeAlias = Literal["more", "less"] | None
 
 
@@ -51,6 +55,7 @@ class MapQuantity:
         whole: whether it counts, so that its values are whole numbers.
         modal: whether it is about natural vibrations, so that the machine must have masses.
         cut: whether it is about the receptance across a cut, which is computed pose by pose and has no derivatives.
+        cables: whether it is about the tensions of cables, or what they can hold; it has no derivatives.
     """
 
     name: str
@@ -64,6 +69,7 @@ class MapQuantity:
     whole: bool = False
     modal: bool = False
     cut: bool = False
+    cables: bool = False
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -185,6 +191,36 @@ def _of_the_cut() -> list[MapQuantity]:
     ]
 
 
+def _of_cable(response: Response, name: str) -> Scalar:
+    """A number of cables; NaN where it has not been computed."""
+    return float("nan") if response.cables is None else response.cables[name]
+
+
+def _of_cables() -> list[MapQuantity]:
+    tensions = [(f"tension_{number}", rf"$\tau_{{{number}}}$", None) for number in range(1, MOST_CABLES + 1)]
+    others: list[tuple[str, str, Better]] = [
+        ("least_tension", r"$\tau_\mathrm{min}$", "more"),
+        ("greatest_tension", r"$\tau_\mathrm{max}$", "less"),
+        ("tension_reserve", "reserve of the tensions", "more"),
+        ("capacity", "capacity", "more"),
+    ]
+    return [
+        *(
+            MapQuantity(name, "N", symbol, partial(_of_cable, name=name), better=better, needs=CABLES, cables=True)
+            for name, symbol, better in (*tensions, *others)
+        ),
+        MapQuantity(
+            "wrench_closure",
+            "1",
+            "wrench closure",
+            partial(_of_cable, name="wrench_closure"),
+            better="more",
+            needs=CABLES,
+            cables=True,
+        ),
+    ]
+
+
 def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
@@ -248,6 +284,7 @@ QUANTITIES = {
         *_frequencies("frequency"),
         *_of_the_cut(),
         *_of_loaded_state(),
+        *_of_cables(),
     )
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
@@ -275,13 +312,14 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
 
 
 def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) -> bool:
-    """Whether quantities need more of a pose than its linear response: a state of rest, or natural vibrations.
+    """Whether quantities need more of a pose than its linear response: a state of rest, vibrations, or tensions.
 
     Args:
         machine, names, limited: see `rest_numbers`.
     """
-    names = list(names)
-    return bool(rest_numbers(machine, names, limited)) or any(QUANTITIES[name].modal for name in names)
+    wanted = [QUANTITIES[name] for name in names]
+    beyond = any(quantity.modal or quantity.cables for quantity in wanted)
+    return beyond or bool(rest_numbers(machine, [quantity.name for quantity in wanted], limited))
 
 
 GROUPS = {
@@ -291,6 +329,7 @@ GROUPS = {
     "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
     "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),
     "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),
+    "tension": tuple(f"tension_{number}" for number in range(1, MOST_CABLES + 1)),
     "tangent_stiffness": tuple(f"tangent_stiffness_{name}" for name in COMPONENTS),
     "tangent_free_stiffness": tuple(f"tangent_free_stiffness_{name}" for name in COMPONENTS),
 }

@@ -58,6 +58,7 @@ class Response:
             what they carry there, and limits of their loads are judged there.
         softest: the least real part of the receptance across the cut, m/N, where it has been computed.
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
+        cables: numbers of cables (`equilibrium.cables`), where they have been computed.
     """
 
     configuration: Configuration
@@ -79,6 +80,7 @@ class Response:
     frequencies: Sequence[Scalar] | None = None
     cutting_pressure: Scalar = 0.0
     softest: Scalar | None = None
+    cables: Mapping[str, Any] | None = None
     regularity = renamed_property("singularity_margin")
 
     @property

@@ -108,6 +108,30 @@ class Load:
 
 
 @table
+class CableTable:
+    """Table [cables], in any machine file: which tensions are chosen, what they must hold, and what the cables are.
+
+    How tensions are distributed counts wherever they are chosen; the box, where capacity is asked for.
+    """
+
+    level: Annotated[float, Quantity("force", "tension to which all are brought as near as can be; 0: the least")] = 0.0
+    exponent: Annotated[
+        float,
+        Quantity(
+            "ratio", "power of the distances from it whose sum is least, 2 to 50", positive=True, least=2.0, most=50.0
+        ),
+    ] = 2.0
+    force_box: Annotated[
+        tuple[float, float, float],
+        Quantity("force", "by which forces x, y, z about the load must be held too, base axes", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    moment_box: Annotated[
+        tuple[float, float, float],
+        Quantity("moment", "by which moments x, y, z about the load must be held too, base axes", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+
+
+@table
 class NamedLoad:
     """Table [load.NAME], in any machine file: another wrench on the platform, at a point of it; base axes."""
 
@@ -122,7 +146,15 @@ class NamedLoad:
 STATES = {"free": False, "loaded": True}
 """Words of `state` in the table [load], and whether the machine is then shown at rest under its loads."""
 
-COMMON = {"tool": Tool, "drives": Drives, "damping": Damping, "cutting": Cutting, "load": Load, "limits": Limits}
+COMMON = {
+    "tool": Tool,
+    "drives": Drives,
+    "damping": Damping,
+    "cutting": Cutting,
+    "load": Load,
+    "cables": CableTable,
+    "limits": Limits,
+}
 OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "damping.", "cutting.")
 """Beginnings of the fields on which nothing depends but vibrations."""
 ROUND_OFF_OF_TENSOR = 1e-4

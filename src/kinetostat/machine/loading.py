@@ -25,7 +25,7 @@ from kinetostat.machine.orientation import form_of, make_room, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
-from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
+from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import Document
@@ -346,7 +346,8 @@ def template(family: str) -> str:
     if family in bundled() and family not in families():
         return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
-    simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
+    only_cables = f'type      = "{CABLE}"'  # which show one kind of leg, and no joint
+    simplest = sorted(bundled().items(), key=lambda item: (only_cables in item[1], len(item[0])))
     texts = [text for _, text in simplest if documents.parse(text, "")["family"] == wanted]
     if not texts:
         raise InputError(

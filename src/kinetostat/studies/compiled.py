@@ -21,7 +21,7 @@ from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.studies.evaluation import MATRICES, entry_name
-from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
+from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_loaded, resolve_quantities
 
 
 @checked
@@ -188,5 +188,5 @@ def _named_quantities(machine: Machine, given: str | Sequence[str]) -> tuple[tup
     names = [given] if isinstance(given, str) else several(given)
     if any(name in MATRICES for name in names):
         raise InputError('quantities has a matrix among others; compile it alone, e.g. quantities="K".')
-    resolved = tuple(resolve_quantities(names, parts))
+    resolved = tuple(resolve_quantities(names, parts, cable_count(machine)))
     return resolved, () if isinstance(given, str) and len(resolved) == 1 else (len(resolved),)

@@ -19,7 +19,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import several
 from kinetostat.studies.poses import PoseColumns
-from kinetostat.studies.quantities import refuse_absent, resolve_quantities, uncounted_loads
+from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Whole matrices by name, and how the names of their entries begin."""
@@ -86,7 +86,7 @@ def answers_at(
     """
     wanted, parts = several(quantities), machine.family.component_names
     matrices = tuple(dict.fromkeys(name for name in wanted if name in MATRICES))
-    names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts))
+    names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts, cable_count(machine)))
     state = state_of(machine)
     refuse_absent(state, names, poses.fields)
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]

@@ -19,7 +19,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range
 from kinetostat.studies.datasets import ABOUT_STATUS, about_field, about_quantity, origin_of
 from kinetostat.studies.poses import chosen_axes, grid_of
-from kinetostat.studies.quantities import refuse_absent, resolve_quantities, uncounted_loads
+from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
 
 IN_MEMORY = 5_000_000
 """Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
@@ -67,7 +67,7 @@ def grid_question(machine: Machine | MachineState, ranges: Sequence[str], quanti
     chosen = [parameter for _, parameter in pairs]
     taken = [leaf for parameter in chosen for leaf in parameter.leaves]
     grid = grid_of(pairs)
-    names = resolve_quantities(quantities, machine.family.component_names)
+    names = resolve_quantities(quantities, machine.family.component_names, cable_count(machine))
     refuse_absent(state, names, chosen)
     varied = [(parameter, axis.values) for parameter, axis in zip(chosen, grid.axes, strict=True)]
     about = origin_of(machine, taken, uncounted_loads(state, names, varied))

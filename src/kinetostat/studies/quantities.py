@@ -11,9 +11,10 @@ import numpy as np
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
+from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
+from kinetostat.kinetostatics.quantities import GROUPS, MOST_CABLES, QUANTITIES, rest_numbers
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
@@ -22,6 +23,7 @@ from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
+TENSIONS = GROUPS["tension"]
 ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
 LOADING_KINDS = ("force", "acceleration", "density", "linear density", "temperature difference", "thermal expansion")
 """Kinds of parameters that may bring in a load which an answer to first order leaves out."""
@@ -48,23 +50,34 @@ def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterabl
         return state.left_out
 
 
-def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
+def resolve_quantities(
+    names: Sequence[str], components: Sequence[str] = COMPONENTS, cables: int = MOST_CABLES
+) -> list[str]:
     """Names of quantities, with groups replaced by their members and repetitions dropped.
 
     Args:
         names: of quantities or groups.
         components: that the machine has: rx ry rz x y z, or rz x y of a planar one.
+        cables: number of cables that it has, so that "tension" stands for so many.
 
     Raises:
         InputError: an unknown name, or one of a component that the machine does not have.
     """
-    groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
+    groups = {
+        group: [name for name in members if _exists(name, components) and name not in TENSIONS[cables:]]
+        for group, members in GROUPS.items()
+    }
     resolved: list[str] = []
     for name in (current_name(given, "quantity") for given in several(names)):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             raise InputError(_no_quantity(name, groups, components))
         resolved += groups.get(name, [name])
     return list(dict.fromkeys(resolved))
+
+
+def cable_count(machine: Machine) -> int:
+    """Count the cables of a machine; all that there can be if its legs are no cables, which is refused elsewhere."""
+    return len(cable_signs(machine)) or MOST_CABLES
 
 
 def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
@@ -102,9 +115,9 @@ def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence
         varied: leaf paths of parameters that vary.
     """
     known = [name for name in names if name in QUANTITIES]
-    across = [name for name in known if QUANTITIES[name].cut]
-    if across:
-        return across[0]
+    unknown = [name for name in known if QUANTITIES[name].cut or QUANTITIES[name].cables]
+    if unknown:
+        return unknown[0]
     loaded = [name for name in known if rest_numbers(machine, [name], limited=False)]
     return loaded[0] if loaded and cut_machine(machine, varied) is None else None
 
@@ -116,6 +129,11 @@ def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] 
         InputError: names the first such quantity.
     """
     name = without_derivatives(machine, names, varied)
+    if name is not None and QUANTITIES[name].cables:
+        raise InputError(
+            f'"{name}" has no derivatives: which tensions are at their bounds changes from pose to pose; look at it in '
+            "a sweep or map, or search without derivatives, optimizer.method = genetic."
+        )
     if name is not None and QUANTITIES[name].cut:
         raise InputError(
             f'"{name}" has no derivatives: its frequency is looked for at each pose; look at it in a sweep or map, or '
@@ -145,7 +163,8 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
     if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
         refuse_unknown_mass(machine, weighing[0], state.configuration)
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
-    wanted = [name for name in names if QUANTITIES[name].needs]
+    _refuse_without_cables(machine, names)
+    wanted = [name for name in names if QUANTITIES[name].needs and not QUANTITIES[name].cables]
     if not wanted:
         return
     placed = state.configuration
@@ -184,6 +203,24 @@ def refuse_unknown_mass(machine: Machine, what: str, configuration: Configuratio
         raise InputError(
             f'"{what}" is not known: the file of {machine.name} does not say what it weighs; give links a '
             'cross-section with a density or material, or its table [tool] mass = "12 kg".'
+        )
+
+
+def _refuse_without_cables(machine: Machine, names: Sequence[str]) -> None:
+    """Refuse quantities of cables where legs are anything else, and tensions of cables that are not there."""
+    wanted = [name for name in names if QUANTITIES[name].cables]
+    if not wanted:
+        return
+    count = len(cable_signs(machine))
+    if not count:
+        raise InputError(
+            f'"{wanted[0]}" has no meaning here: {machine.name} lacks {QUANTITIES[wanted[0]].needs}, each written with '
+            'type = "cable"; leave it out.'
+        )
+    beyond = [name for name in wanted if name in TENSIONS[count:]]
+    if beyond:
+        raise InputError(
+            f'"{beyond[0]}" is not known: {machine.name} has {count} cables, tension_1 to tension_{count}.'
         )
 
 

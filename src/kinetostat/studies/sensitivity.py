@@ -26,7 +26,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
-from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
+from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
 
@@ -37,7 +37,7 @@ WITHOUT_INFLUENCE = (
     "load.", "limits.", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
 )  # fmt: skip
 """How the fields begin on which no index depends: loads, limits, weights, buckling and growth."""
-NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "drives.rotor_damping")
+NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
 """Those on which nothing depends that has derivatives."""
 NOT_EVEN_LOADED = ("load.min_tension", "load.max_tension")
 """Those on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
@@ -186,7 +186,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     """
     state = state_of(machine)
     machine = state.machine
-    names = tuple(resolve_quantities(quantities, machine.family.component_names))
+    names = tuple(resolve_quantities(quantities, machine.family.component_names, cable_count(machine)))
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
     refuse_loaded(machine, names)

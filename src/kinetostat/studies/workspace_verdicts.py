@@ -55,7 +55,7 @@ COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": oper
 CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
 LONGEST_CONDITION = 200
 
-_CONDITION = re.compile(r"\s*([a-z_]+)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
+_CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 _BY_UNIT = {
     kind.unit: kind.name
     for kind in KINDS.values()

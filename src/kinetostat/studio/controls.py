@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
@@ -147,6 +148,8 @@ def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator
     Of an inertia the three moments move together: no body has a moment about one axis alone.
     """
     for given in parameters(machine.family):
+        if given.path.startswith("cables.") and not cable_signs(machine):
+            continue
         inertia = given.quantity.kind == "inertia" and len(given.leaves) > 1
         parameter = replace(given, leaves=given.leaves[: len(AXES)]) if inertia else given
         several = len(parameter.leaves) > 1
@@ -160,7 +163,8 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
     table = parameter.path.split(".")[0]
     value, quantity = present[parameter.leaves[0]], parameter.quantity
     panel = "Stiffness" if quantity.stiff else "Pose" if table == "pose" else "Geometry"
-    panel = "Load" if table in ("load", "tool", "limits") or parameter.path.startswith(OF_LOADED_STATES) else panel
+    loads = table in ("load", "tool", "limits", "cables") or parameter.path.startswith(OF_LOADED_STATES)
+    panel = "Load" if loads else panel
     panel = "Mass" if parameter.path.startswith(OF_MASSES) or KINDS[quantity.kind].heavy else panel
     group = table_of(parameter)
     if quantity.unset is not None:
@@ -173,7 +177,7 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
         return Control(parameter, panel, group, -most if product else least, most, False)
     low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
     if quantity.positive and not quantity.stiff:
-        low = max(low, LEAST_SHARE * high)
+        low = max(low, LEAST_SHARE * high, quantity.least)
     return Control(parameter, panel, group, low, min(high, quantity.most), logarithmic)
 
 
@@ -192,7 +196,8 @@ def _range(kind: str, stiff: bool, value: float, table: str, length: float) -> t
         most = max(LARGEST_LOAD[kind], 2.0 * abs(value))
         return -most, most, False
     if kind == "direction":
-        return -1.0, 1.0, False
+        most = max(1.0, abs(value))
+        return -most, most, False
     return value / 10.0, value * 10.0, True
 
 

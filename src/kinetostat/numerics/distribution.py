@@ -1,0 +1,270 @@
+"""Forces that balance a load and keep within bounds, at least cost, of many problems at once.
+
+More forces than conditions leave a choice: internal forces, which balance each other. Forces are those of least norm,
+or nearest to a wanted level, by the square of their differences or by a higher power of them. Which forces act, and
+along which lines, is not known here.
+
+Source: theory (76) and (77). Least norm and least distance to a level: T. Bruckmann, A. Pott and M. Hiller,
+"Calculating force distributions for redundantly actuated tendon-based Stewart platforms", Advances in Robot Kinematics
+(2006); powers: R. Verhoeven, Analysis of the Workspace of Tendon-based Stewart Platforms (2004), and C. Gosselin and
+M. Grenier, "On the determination of the force distribution in overconstrained cable-driven parallel mechanisms",
+Meccanica 46 (2011).
+"""
+
+import numpy as np
+
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.frozen import dataclass
+from kinetostat.tolerances import BALANCED, SURELY_REGULAR, UNRESISTED
+
+MOST_CHANGES = 200
+"""Of the set of forces at their bounds: many times as many as a machine has cables."""
+MOST_POWER_STEPS, MOST_HALVINGS = 100, 30
+"""Of Newton's method for powers, and of one of its steps."""
+LEAST_CURVATURE = 1e-12
+"""Of a force at the wanted level, beside 1 at the one that is farthest from it: powers are flat there."""
+SAME_FORCE = 1e-13
+"""Share of the largest force below which a step is round-off."""
+INDEPENDENT = 1e-20
+"""Square of the share of a condition's normal below which other conditions leave nothing of it."""
+
+
+@dataclass(frozen=True)
+class Balancing:
+    """All forces that balance the loads of n problems: given + internal z, for any z.
+
+    Attributes:
+        given: forces of least norm that balance [n x m].
+        internal: orthonormal internal forces, as columns [n x m x r].
+        sure: whether they are surely all of them, and `given` balances the load [n].
+    """
+
+    given: Array
+    internal: Array
+    sure: Mask
+
+
+def balancing(matrix: Array, load: Array) -> Balancing:
+    """Find all forces f with matrix f = load, by reflections of all problems together.
+
+    Args:
+        matrix: wrenches of unit forces, as columns [n x d x m].
+        load: what they must add up to [n x d].
+
+    Returns:
+        All forces, `sure` where the matrix is surely of rank d.
+    """
+    count, conditions, size = matrix.shape
+    rows, reflections = np.ascontiguousarray(matrix.transpose(2, 1, 0)), []
+    if size < conditions:
+        return Balancing(np.full((count, size), np.nan), np.zeros((count, size, 0)), np.zeros(count, dtype=bool))
+    for k in range(conditions):
+        mirror = rows[k:, k].copy()
+        mirror[0] += np.copysign(np.sqrt((mirror * mirror).sum(axis=0)), mirror[0])
+        square = (mirror * mirror).sum(axis=0)
+        twice = 2.0 / np.where(square > 0.0, square, 1.0)
+        reflections.append((mirror, twice))
+        _reflect(rows[k:, k:], mirror, twice)
+    pivots = np.abs(rows[range(conditions), range(conditions)])
+    columns = np.zeros((size, 1 + size - conditions, count))
+    for k in range(conditions):  # R^T z = load, from the first row
+        columns[k, 0] = (load[:, k] - (rows[:k, k] * columns[:k, 0]).sum(axis=0)) / rows[k, k]
+    columns[range(conditions, size), range(1, 1 + size - conditions)] = 1.0
+    for k in reversed(range(conditions)):
+        _reflect(columns[k:], *reflections[k])
+    columns = columns.transpose(2, 0, 1)
+    return Balancing(columns[:, :, 0], columns[:, :, 1:], pivots.min(axis=0) > SURELY_REGULAR * pivots.max(axis=0))
+
+
+def _reflect(rows: Array, mirror: Array, twice: Array) -> None:
+    """Reflect columns at the plane across a vector, in place: rows [k x columns x n], mirror [k x n]."""
+    rows -= mirror[:, None] * (twice * (mirror[:, None] * rows).sum(axis=0))
+
+
+def balancing_of_any_rank(matrix: Array, load: Array, scale: float) -> Balancing:
+    """Find all forces that balance a single load [d], whatever the rank of the matrix [d x m]; see `balancing`.
+
+    Args:
+        matrix, load: see `balancing`.
+        scale: a size of loads of which what is left over must be a negligible share.
+    """
+    across, sizes, along = np.linalg.svd(matrix)
+    rank = int((sizes > UNRESISTED * sizes.max(initial=0.0)).sum())
+    given = along[:rank].T @ ((across[:, :rank].T @ load) / sizes[:rank])
+    left = np.abs(matrix @ given - load).max(initial=0.0)
+    balances = left <= BALANCED * max(np.abs(load).max(initial=0.0), scale)
+    return Balancing(given[None], along[rank:].T[None], np.array([balances]))
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A choice among the forces that balance a load within bounds: those nearest to a level.
+
+    Attributes:
+        level: the wanted size of every force; 0 for the least ones [n].
+        exponent: power p of the differences whose sum is least, at least 2 [n].
+    """
+
+    level: Array
+    exponent: Array
+
+    def at(self, rows: Integers) -> "Rule":
+        """The rule of some of the problems."""
+        return Rule(self.level[rows], self.exponent[rows])
+
+
+def distribution(matrix: Array, load: Array, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
+    """Choose forces f with matrix f = load within bounds.
+
+    Args:
+        matrix: wrenches of unit forces, as columns [n x d x m].
+        load: what they must add up to [n x d].
+        least, most: bounds of every force [n]; `most` may be infinite.
+        rule: the choice among those that there are.
+
+    Returns:
+        The forces [n x m], and whether there are any within the bounds [n]; where there are not, they are NaN.
+    """
+    with np.errstate(all="ignore"):
+        every = balancing(matrix, load)
+    usable = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(load).all(axis=1)
+    forces, exist = np.full(every.given.shape, np.nan), np.zeros(len(load), dtype=bool)
+    rows = np.flatnonzero(usable & every.sure)
+    regular = Balancing(every.given[rows], every.internal[rows], every.sure[rows])
+    forces[rows], exist[rows] = within_bounds(regular, least[rows], most[rows], rule.at(rows))
+    for row in np.flatnonzero(usable & ~every.sure):
+        special = balancing_of_any_rank(matrix[row], load[row], float(least[row]))
+        if special.sure[0]:
+            forces[[row]], exist[[row]] = within_bounds(special, least[[row]], most[[row]], rule.at(np.array([row])))
+    return forces, exist
+
+
+def within_bounds(every: Balancing, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
+    """Choose among all forces that balance a load; arguments and results as for `distribution`."""
+    internal = every.internal
+    start = every.given + np.einsum("nmr,nr->nm", internal, rule.level[:, None] * internal.sum(axis=1))
+    inner, exist = _shortest_into_bounds(internal, start, least, most)
+    forces = start + np.einsum("nmr,nr->nm", internal, inner)
+    forces[~exist] = np.nan
+    rows = np.flatnonzero(exist & (rule.exponent > 2.0))
+    if len(rows) and internal.shape[2]:
+        forces[rows] = _by_power(internal[rows], forces[rows], least[rows], most[rows], rule.at(rows))
+    return forces, exist
+
+
+def _by_power(internal: Array, forces: Array, least: Array, most: Array, rule: Rule) -> Array:
+    """Forces with the least sum of powers, by Newton's method from forces within the bounds.
+
+    Each step is the least one of squares with the curvatures as weights, within the bounds; it is halved until it leads
+    to a lesser sum, which a convex sum allows.
+    """
+    forces, rows = forces.copy(), np.arange(len(forces))
+    scale = np.maximum(np.abs(forces - rule.level[:, None]).max(axis=1), np.maximum(least, np.abs(rule.level)))
+    for _ in range(MOST_POWER_STEPS):
+        ways, here = internal[rows], forces[rows]
+        level, p = rule.level[rows, None], rule.exponent[rows, None]
+        size = np.abs(here - level).max(axis=1, keepdims=True)
+        apart = (here - level) / np.where(size > 0.0, size, 1.0)
+        curved = (p - 1.0) * np.abs(apart) ** (p - 2.0) + LEAST_CURVATURE
+        slope = np.einsum("nmr,nm->nr", ways, np.abs(apart) ** (p - 2.0) * apart)
+        factor = np.linalg.cholesky(np.einsum("nmr,nm,nms->nrs", ways, curved, ways))
+        scaled = np.linalg.solve(factor, ways.transpose(0, 2, 1)).transpose(0, 2, 1)
+        down = -size * np.linalg.solve(factor, slope[:, :, None])[:, :, 0]
+        wanted: Array = here + np.einsum("nmr,nr->nm", scaled, down)
+        back, _ = _shortest_into_bounds(np.asarray(scaled), np.asarray(wanted), least[rows], most[rows])
+        step: Array = wanted + np.einsum("nmr,nr->nm", scaled, back) - here
+        cost = (np.abs(apart) ** p).sum(axis=1)
+        for _ in range(MOST_HALVINGS):
+            there = np.abs((here + step - level) / np.where(size > 0.0, size, 1.0)) ** p
+            worse = there.sum(axis=1) > cost
+            if not worse.any():
+                break
+            step[worse] *= 0.5
+        forces[rows] = here + step
+        rows = rows[np.abs(step).max(axis=1) > SAME_FORCE * scale[rows]]
+        if not len(rows):
+            break
+    return forces
+
+
+def _shortest_into_bounds(internal: Array, start: Array, least: Array, most: Array) -> tuple[Array, Mask]:
+    """The shortest z [n x r] for which start + internal z is within the bounds, and whether there is any [n]."""
+    scale = np.maximum(np.abs(start).max(axis=1, initial=0.0), least)
+    scale = np.where(scale > 0.0, scale, 1.0)[:, None]
+    ends = np.concatenate([least[:, None] - start, start - most[:, None]], axis=1)
+    beyond = np.flatnonzero((ends > UNRESISTED * scale).any(axis=1))
+    inner, exist = np.zeros((len(start), internal.shape[2])), np.ones(len(start), dtype=bool)
+    if len(beyond):
+        sides = np.concatenate([internal[beyond], -internal[beyond]], axis=1)
+        shortest, exist[beyond] = nearest_to_origin(sides, ends[beyond] / scale[beyond])
+        inner[beyond] = shortest * scale[beyond]
+    return inner, exist
+
+
+def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
+    """Find the point y of each polyhedron sides y >= ends that is nearest to the origin.
+
+    The dual method begins at the origin and takes in one violated condition after the other, while others that pull the
+    wrong way are let go. It needs no point within the polyhedron, and says where there is none.
+
+    Args:
+        sides: normals of the half spaces [n x k x r].
+        ends: where they end [n x k]; minus infinity for none.
+
+    Returns:
+        The points [n x r], and whether the polyhedron has any [n].
+
+    Source: D. Goldfarb and A. Idnani, "A numerically stable dual method for solving strictly convex quadratic
+    programs", Mathematical Programming 27 (1983).
+    """
+    count, _, size = sides.shape
+    points, exist = np.zeros((count, size)), np.ones(count, dtype=bool)
+    lengths = np.maximum(np.sqrt((sides * sides).sum(axis=2)), UNRESISTED)
+    rows, none = np.arange(count), -1
+    active, pull = (
+        np.full((count, size), none),
+        np.zeros((count, size)),
+    )  # conditions that hold exactly, and multipliers
+    entering, its_pull = np.full(count, none), np.zeros(count)
+    for _ in range(MOST_CHANGES):
+        lacking = ends[rows] - np.einsum("nkr,nr->nk", sides[rows], points[rows])
+        waits = entering[rows] == none
+        worst = (lacking / lengths[rows]).argmax(axis=1)
+        met = lacking.max(axis=1) <= UNRESISTED
+        entering[rows] = np.where(waits, worst, entering[rows])
+        its_pull[rows] = np.where(waits, 0.0, its_pull[rows])
+        going = ~(waits & met)
+        rows, lacking = rows[going], lacking[going]
+        if not len(rows):
+            break
+        every, chosen, at_bound = np.arange(len(rows)), entering[rows], active[rows] != none
+        normal = sides[rows, chosen]
+        others = np.where(at_bound[:, :, None], sides[rows[:, None], active[rows]], 0.0)
+        square = np.einsum("nar,nbr->nab", others, others) + np.eye(size) * ~at_bound[:, None, :]
+        share = np.linalg.solve(square, np.einsum("nar,nr->na", others, normal)[:, :, None])[:, :, 0]
+        step = normal - np.einsum("nar,na->nr", others, share)
+        gain = (step * step).sum(axis=1)
+        open_ = gain > INDEPENDENT * lengths[rows, chosen] ** 2
+        with np.errstate(all="ignore"):
+            until = np.where(at_bound & (share > UNRESISTED), pull[rows] / share, np.inf)
+            whole = np.where(open_, lacking[every, chosen] / gain, np.inf)
+        first = until.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
+        part = until[every, first] if size else np.full(len(rows), np.inf)
+        far = np.minimum(part, whole)
+        stuck = np.isinf(far)
+        exist[rows[stuck & (lacking[every, chosen] > BALANCED)]] = False
+        entering[rows[stuck]] = none  # what is left of a condition that is met but for round-off
+        ends[rows[stuck], chosen[stuck]] = -np.inf
+        far = np.where(stuck, 0.0, far)
+        points[rows] += np.where(open_ & ~stuck, far, 0.0)[:, None] * step
+        pull[rows] = np.where(at_bound, pull[rows] - far[:, None] * share, 0.0)
+        its_pull[rows] += far
+        takes = ~stuck & (whole <= part)
+        slots = np.argmin(at_bound, axis=1) if size else first
+        active[rows[takes], slots[takes]], pull[rows[takes], slots[takes]] = chosen[takes], its_pull[rows[takes]]
+        entering[rows[takes]] = none
+        leaves = ~stuck & ~takes
+        active[rows[leaves], first[leaves]], pull[rows[leaves], first[leaves]] = none, 0.0
+        rows = rows[exist[rows]]
+    exist[rows] = False
+    return points, exist

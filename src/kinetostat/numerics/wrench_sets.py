@@ -1,0 +1,143 @@
+"""Sets of wrenches that forces within bounds can hold, by their faces, and the distance of wrenches from them.
+
+Such a set is a sum of segments (a zonotope), or of rays where forces may be as large as they like. Each of its faces
+lies across a direction at right angles to all but one dimension of the wrenches of unit forces, so that the faces are
+found without a vertex. Which forces act, and along which lines, is not known here.
+
+Source: theory (78); S. Bouchard, C. Gosselin and B. Moore, "On the ability of a cable-driven robot to generate a
+prescribed set of wrenches", J. Mechanisms and Robotics 2 (2010); capacity: F. Guay, P. Cardou, A. Cruz-Ruiz and S.
+Caro, "Measuring how well a structure supports varying external wrenches", New Advances in Mechanisms, Transmissions
+and Applications (2014).
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
+from kinetostat.tolerances import DEGENERATE_FACE, UNRESISTED
+
+LARGEST = 1e300
+"""Stands for a force without a bound: a face that such a force moves is out of every wrench's reach."""
+UNBOUNDED = 1e200
+"""Distance beyond which a face is there only because of `LARGEST`."""
+MOST_NUMBERS = 120_000
+"""Of the largest array of a slab: it stays in the second cache level."""
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Directions across the faces of n sets of wrenches.
+
+    Attributes:
+        normals: unit vectors; NaN where the forces of a face are dependent [d x faces x n].
+        pulls: parts of unit forces along them, exactly 0 of those in the face [faces x m x n].
+    """
+
+    normals: Array
+    pulls: Array
+
+    def ends(self, least: Array, most: Array) -> tuple[Array, Array]:
+        """The reach of the sets along the normals, and against them [faces x n].
+
+        Args:
+            least, most: bounds of every force [m x n]; `most` may be infinite.
+        """
+        forth, back = np.maximum(self.pulls, 0.0), np.maximum(-self.pulls, 0.0)
+        high = np.where(np.isinf(most), LARGEST, most)  # 0 times infinity would be nothing that counts
+        above = (forth * high).sum(axis=1) - (back * least).sum(axis=1)
+        below = (back * high).sum(axis=1) - (forth * least).sum(axis=1)
+        return above, below
+
+
+def faces(wrenches: Array) -> Faces:
+    """Find the directions across all faces of the sets of wrenches.
+
+    The direction is the product of the d - 1 wrenches in the face, whose components are their minors. The minors of
+    the first wrenches are those of many faces and are computed once.
+
+    Args:
+        wrenches: those of unit forces, as columns [d x m x n].
+    """
+    size, count = wrenches.shape[:2]
+    unit = wrenches / np.maximum(np.sqrt((wrenches * wrenches).sum(axis=0)), UNRESISTED)
+    minors = unit
+    for order in range(2, size):
+        minors = _next_minors(minors, unit, order)
+    normals = minors[::-1] * ((-1.0) ** np.arange(size))[:, None, None]
+    lengths = np.sqrt(sum(row * row for row in normals))
+    normals /= np.where(lengths > DEGENERATE_FACE, lengths, np.nan)
+    pulls = np.zeros((normals.shape[1], *wrenches.shape[1:]))
+    for row, part in zip(normals, wrenches, strict=True):
+        pulls += row[:, None] * part
+    for face, members in enumerate(combinations(range(count), size - 1)):
+        pulls[face, members, :] = 0.0
+    sizes = np.sqrt((wrenches * wrenches).sum(axis=0))
+    pulls[np.abs(pulls) <= UNRESISTED * sizes] = 0.0
+    return Faces(normals, pulls)
+
+
+def _next_minors(minors: Array, unit: Array, order: int) -> Array:
+    """Minors of `order` columns from those of one less: sets of rows, then sets of columns, in lexical order."""
+    size, count = unit.shape[:2]
+    sets, rows = list(combinations(range(count), order)), list(combinations(range(size), order))
+    before = {columns: place for place, columns in enumerate(combinations(range(count), order - 1))}
+    rows_before = {chosen: place for place, chosen in enumerate(combinations(range(size), order - 1))}
+    kept = minors[:, [before[columns[:-1]] for columns in sets]]
+    last = unit[:, [columns[-1] for columns in sets]]
+    result = np.zeros((len(rows), len(sets), unit.shape[2]))
+    for place, chosen in enumerate(rows):
+        for position, row in enumerate(chosen):
+            sign = 1.0 if (order - 1 - position) % 2 == 0 else -1.0
+            result[place] += sign * kept[rows_before[chosen[:position] + chosen[position + 1 :]]] * last[row]
+    return result
+
+
+def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: Array | None = None) -> Array:
+    """The distance of required wrenches from the faces of the set that forces within bounds can hold [n].
+
+    It is that of the outermost one from the nearest face, negative by its distance beyond a face if it is
+    outside; infinite where the set has no face, and NaN where the wrenches of all forces span less than their space by
+    two dimensions.
+
+    Args:
+        wrenches: those of unit forces, as columns [n x d x m].
+        least, most: bounds of every force [n x m]; `most` may be infinite.
+        required: wrenches all of which must be held, as all mixtures of them then are [n x k x d].
+        box: half the sizes of a box of wrenches about each of them [n x d]; no box if it is left out.
+    """
+    count, size, forces = wrenches.shape
+    result = np.empty(count)
+    half = np.zeros((count, size)) if box is None else box
+    for part in _slabs(count, size, forces):
+        across = faces(wrenches[part].transpose(1, 2, 0))
+        above, below = across.ends(least[part].T, most[part].T)
+        along = np.stack(
+            [sum(a * b for a, b in zip(across.normals, w.T, strict=True)) for w in required[part].transpose(1, 0, 2)]
+        )
+        more = sum(a * b for a, b in zip(np.abs(across.normals), half[part].T, strict=True))
+        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - more
+        known = ~np.isnan(across.normals[0])
+        distance = np.where(known, inside, np.inf).min(axis=0)
+        result[part] = np.where(known.any(axis=0), np.where(distance > UNBOUNDED, np.inf, distance), np.nan)
+    return result
+
+
+def closure(wrenches: Array) -> Array:
+    """The wrench that forces from 0 to 1 can hold in every direction [n]: positive where they hold any wrench.
+
+    Args:
+        wrenches: those of unit forces, as columns [n x d x m].
+    """
+    count, size, forces = wrenches.shape
+    unit = np.ones((count, forces))
+    return capacity(wrenches, 0.0 * unit, unit, np.zeros((count, 1, size)))
+
+
+def _slabs(count: int, size: int, forces: int) -> Iterator[slice]:
+    widest = max(math.comb(forces, order) * math.comb(size, order) for order in range(1, size))
+    step = max(1, MOST_NUMBERS // max(widest, math.comb(forces, size - 1) * forces))
+    return (slice(start, start + step) for start in range(0, count, step))
