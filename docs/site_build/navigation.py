@@ -14,6 +14,7 @@ PAGES = {
         "poses",
         "functions",
         "loads",
+        "capability",
         "vibration",
         "budget",
         "calibration",

@@ -241,6 +241,9 @@ does not reach the other one. Without it, round-off times infinity would make en
 UNFELT = 1e-11
 """Share of the load that a spring can have per unit load of the platform below which what it adds to C is round-off:
 legs that share a load by least energy leave some 1e-12 of it in a spring that should feel nothing."""
+DEPENDENT_GENERATORS = 1e-9
+"""Determinant of orthonormal internal loads in some drives below which these are dependent: the face that they would
+make of a set of wrenches is one that others make, or none."""
 DEPENDENT_LOADS = 1e-12
 """Sine of the angle between the loads of a leg's springs below which they are dependent up to round-off."""
 DEPENDENT_WRENCHES = 1e-9

@@ -46,7 +46,7 @@ class Kind:
     @property
     def unsigned(self) -> bool:
         """Whether it cannot be negative, though it may be 0."""
-        return self.heavy or self.name.endswith(("damping", "ratio", "rate", "duration", "pressure"))
+        return self.heavy or self.name.endswith(("damping", "ratio", "rate", "speed", "duration", "pressure"))
 
 
 KINDS = {
@@ -83,6 +83,7 @@ KINDS = {
         Kind("E I", "N·m**2", "5e4 N*m**2"),
         Kind("temperature difference", "K", "15 K"),
         Kind("thermal expansion", "m/(m·K)", "12 um/(m*K)"),
+        Kind("speed", "m/s", "0.5 m/s"),
         Kind("acceleration", "m/s**2", "9.81 m/s**2"),
         Kind("direction", "", "1.0"),
         Kind("ratio", "m/m", "20 um/m"),
@@ -113,6 +114,7 @@ USUAL = {
     "s": {"s": 1.0},
     "rad/s": {"rad/s": 1.0},
     "Hz": {"Hz": 1.0},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
     "m/s**2": {"m/s**2": 1.0},
     "K": {"K": 1.0},
     "m/(m*K)": {"m/(m*K)": 1.0, "um/(m*K)": 1e-6},

@@ -34,7 +34,7 @@ class States:
         rows: numbers of the points at which the machine is at rest and stable.
         equations: the equations at all states of rest, stable or not; None if no point has a place.
         judged: their stability; `rows` are those that are stable, in their order.
-        loads: size of what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
+        loads: what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
     """
 
     status: Integers
@@ -59,8 +59,8 @@ def states_of_rest(state: MachineState) -> States:
     status[rows], rested = Status.NO_REST, rows[settled[judged.stable]]
     status[rested] = Status.OK
     loads = [(spring, np.full(count, np.nan)) for spring in placed.mechanism.driven]
-    for (_, whole), (_, sizes) in zip(loads, actuator_loads_at_rest(equations), strict=True):
-        whole[rested] = sizes[judged.stable]
+    for (_, whole), (_, carried) in zip(loads, actuator_loads_at_rest(equations), strict=True):
+        whole[rested] = carried[judged.stable]
     status[rested] = borne(state.machine, free, loads, status)[rested]
     return States(status, rested, equations, judged, tuple(loads))
 
@@ -71,12 +71,13 @@ def borne(machine: Machine, response: Response, loads: Sequence[tuple[Spring, Sc
     Args:
         machine: the machine with its limits.
         response: its response without loads.
-        loads: size of what each actuator carries at rest, N or N·m.
+        loads: what each actuator carries at rest, N or N·m.
         status: `Status` code of the state without these limits.
     """
     if not machine.loaded:
         return status
-    kept = within(load_checks(machine, response.configuration, loads))
+    sizes = [(spring, abs(load)) for spring, load in loads]
+    kept = within(load_checks(machine, response.configuration, sizes))
     return where(kept, status, where(abs(status - float(Status.OK)) < 0.5, int(Status.JOINT_LIMIT), status))
 
 
@@ -84,14 +85,14 @@ def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
     """Return the greatest force of an actuated slide and moment of an actuated revolute, by quantity, over any scalars.
 
     Args:
-        loads: size of what each actuator carries, N or N·m.
+        loads: what each actuator carries, N or N·m.
 
     Returns:
         By quantity; one is left out where the machine has no such actuator.
     """
     result: dict[str, Scalar] = {}
-    for spring, size in loads:
-        name = LOADS_OF_ACTUATORS[0 if spring.joint.point is None else 1]
+    for spring, load in loads:
+        size, name = abs(load), LOADS_OF_ACTUATORS[0 if spring.joint.point is None else 1]
         result[name] = -smaller(-size, -result[name]) if name in result else size
     return result
 
@@ -108,9 +109,9 @@ def loaded_numbers(
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
         vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
-        springs), "factor", "actuator_force" and "actuator_moment" (the greatest); NaN where there is no state of rest
-        that is stable. Those of `further`, and the last two, are left out if no pose has a place. And `Status` codes
-        [n].
+        springs), "factor", "actuator_force" and "actuator_moment" (the greatest), "drive_loads" (what each actuator
+        carries) [n x actuators]; NaN where there is no state of rest that is stable. Those of `further`, and the last
+        three, are left out if no pose has a place. And `Status` codes [n].
 
     Raises:
         InputError: as for `MachineState.mechanism`.
@@ -142,4 +143,5 @@ def loaded_numbers(
     for name, values in numbers.items():
         whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
         whole[states.rows] = values[judged.stable]
-    return result | greatest_loads(states.loads), states.status
+    carried = np.array([load for _, load in states.loads]).reshape(-1, count).T
+    return result | greatest_loads(states.loads) | {"drive_loads": carried}, states.status

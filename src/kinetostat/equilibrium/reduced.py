@@ -244,7 +244,9 @@ class Reduced:
         at_rest: Scalar = int(Status.OK)
         if "actuators" in wanted:
             loads = tangent.actuator_loads()
+            by_name = {spring.name: load for spring, load in loads}
             result |= greatest_loads(loads)
+            result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
             at_rest = borne(self.machine, response, loads, at_rest)
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
         for kept in sorted(set(Status) - set(HELD_BY_LOADS)):
@@ -286,19 +288,19 @@ class Tangent:
         return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
 
     def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
-        """Every actuator with the size of what it carries after the step, N or N·m."""
+        """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""
         mechanism, carrier, terms = self.mechanism, self.carrier, self.place.terms
         twist, force = (terms.rates[0] @ of_scalars(self.step)[0]).tolist(), mechanism.force[0]
         loads = []
         for rod, pull in zip(self.rods, self.place.pulls, strict=True):
             along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
             stretched = pull.tension + pull.elastic * pull.length * along
-            loads += [(spring, abs(stretched) * force) for spring in rod.driven]
+            loads += [(spring, stretched * force) for spring in rod.driven]
         for number, spring in enumerate(carrier.springs):
             if spring is not None and spring.actuated:
                 load = terms.loads[0, number] + terms.carrying[0, number] * self.step[number]
                 turning = spring.joint.point is not None
-                loads.append((spring, abs(load) * (force * mechanism.length[0] if turning else force)))
+                loads.append((spring, load * (force * mechanism.length[0] if turning else force)))
         return loads
 
     def compliance(self) -> list[Row]:

@@ -230,7 +230,7 @@ class MachineState(Immutable):
     def actuator_loads(self) -> list[tuple[Spring, float]]:
         """Every actuator with the size of what it carries at rest, N or N·m; none without a rest."""
         loads = [] if self.at_rest is None else actuator_loads_at_rest(self.at_rest)
-        return [(spring, float(size[0])) for spring, size in loads]
+        return [(spring, float(abs(load[0]))) for spring, load in loads]
 
 
 @checked
@@ -266,11 +266,11 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
 
 
 def actuator_loads_at_rest(equations: "Balance") -> list[tuple[Spring, Array]]:
-    """Return every actuator with the size of what it carries in a state, N or N·m [n]."""
+    """Return every actuator with what it carries in a state, N or N·m, positive where it is pulled open [n]."""
     mechanism = equations.mechanism
     holding = total([terms.holding for terms in equations.legs])
     units = [mechanism.force * (1.0 if spring.joint.point is None else mechanism.length) for spring in mechanism.driven]
-    return [(spring, abs(load) * unit) for spring, load, unit in zip(mechanism.driven, holding.T, units, strict=False)]
+    return [(spring, load * unit) for spring, load, unit in zip(mechanism.driven, holding.T, units, strict=False)]
 
 
 def _loaded_mechanism(

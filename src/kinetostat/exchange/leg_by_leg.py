@@ -17,9 +17,9 @@ from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import task_coordinates
-from kinetostat.machine.common_tables import Load, Tool
+from kinetostat.machine.common_tables import COMMON, Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
-from kinetostat.machine.limits import LIMITS, limits_set, unloaded_parts
+from kinetostat.machine.limits import LIMITS, OF_DRIVES, is_set, limits_set, unloaded_parts
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
 from kinetostat.machine.loads import turned_tensor
@@ -110,7 +110,8 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     tool, load_given = _tool(machine, turn), _load(machine, turn)
     document |= {"tool": tool} if tool else {}
     for name in ("drives", "damping", "cutting"):
-        given = {field: value for field, value in vars(machine.tables[name]).items() if np.any(value)}
+        usual = vars(COMMON[name]())
+        given = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
         document |= {name: given} if given else {}
     document |= {"load": load_given} if load_given else {}
     upright = _numbers(turn.z) == [0.0, 0.0, 1.0]
@@ -120,6 +121,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
         limits.pop("platform_joint_angle", None)
     if built:
         limits = _limits_as_built(limits, machine, built)
+    limits |= {name: getattr(table, name) for name in OF_DRIVES if is_set(getattr(table, name))}
     return document | ({"limits": limits} if limits else {})
 
 

@@ -24,6 +24,13 @@ from kinetostat.kinetostatics.extremes import (
     longest_leg,
     shortest_leg,
 )
+from kinetostat.kinetostatics.feasible import (
+    BLOCKS,
+    greatest_along,
+    greatest_ball,
+    greatest_speed,
+    greatest_speed_along,
+)
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import LIMITS, limits_loads
 from kinetostat.machine.machine import Machine
@@ -56,6 +63,7 @@ class MapQuantity:
         modal: whether it is about natural vibrations, so that the machine must have masses.
         cut: whether it is about the receptance across a cut, which is computed pose by pose and has no derivatives.
         cables: whether it is about the tensions of cables, or what they can hold; it has no derivatives.
+        driven: what of its drives it is about: "load" or "speed", which the file must then limit; empty if neither.
     """
 
     name: str
@@ -70,6 +78,7 @@ class MapQuantity:
     modal: bool = False
     cut: bool = False
     cables: bool = False
+    driven: str = ""
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -221,6 +230,51 @@ def _of_cables() -> list[MapQuantity]:
     ]
 
 
+def _of_drives() -> list[MapQuantity]:
+    """Loads that the drives hold and speeds that they allow: in all directions, and along each component."""
+    words = {"translation": ("force", "N", "speed", "m/s"), "rotation": ("moment", "N·m", "rate", "rad/s")}
+    entries = []
+    for block, (load, unit, motion, rate) in words.items():
+        ball, quick = partial(_ball, block=BLOCKS[block]), partial(_quickness, block=BLOCKS[block])
+        symbols = [rf"${letter}_{{\mathrm{{{word},min}}}}$" for letter, word in (("w", load), ("t", motion))]
+        entries += [
+            MapQuantity(f"least_wrench_{load}", unit, symbols[0], ball, better="more", driven="load"),
+            MapQuantity(f"least_twist_{motion}", rate, symbols[1], quick, better="more", driven="speed"),
+        ]
+    for row, name in enumerate(COMPONENTS):
+        _, unit, _, rate = words["rotation" if row in ROTATIONS else "translation"]
+        for word, letter, value, shown in (("wrench", "w", _along, unit), ("twist", "t", _speed_along, rate)):
+            symbol = rf"${letter}_{{\mathrm{{{name},max}}}}$"
+            entries.append(
+                MapQuantity(
+                    f"greatest_{word}_{name}",
+                    shown,
+                    symbol,
+                    partial(value, row=row),
+                    (name,),
+                    "more",
+                    driven="load" if word == "wrench" else "speed",
+                )
+            )
+    return sorted(entries, key=lambda entry: entry.name.rpartition("_")[0])
+
+
+def _ball(response: Response, block: slice) -> Scalar:
+    return greatest_ball(response.faces, block, response.configuration.length)
+
+
+def _along(response: Response, row: int) -> Scalar:
+    return greatest_along(response.faces, row, response.configuration.length)
+
+
+def _quickness(response: Response, block: slice) -> Scalar:
+    return greatest_speed(response.transmission, [drive.speed for drive in response.drives], block)
+
+
+def _speed_along(response: Response, row: int) -> Scalar:
+    return greatest_speed_along(response.transmission, [drive.speed for drive in response.drives], row)
+
+
 def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
@@ -281,6 +335,7 @@ QUANTITIES = {
             better="less",
             needs=LIMITS["actuator_moment"].needs,
         ),
+        *_of_drives(),
         *_frequencies("frequency"),
         *_of_the_cut(),
         *_of_loaded_state(),
@@ -307,7 +362,7 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
     names = list(names)
     wanted = {QUANTITIES[name].loaded for name in names} - {""}
     bounded = limited and limits_loads(machine.tables["limits"])
-    carries = bounded or any(name in LOADS_OF_ACTUATORS for name in names)
+    carries = bounded or any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven == "load" for name in names)
     return wanted | {"actuators"} if machine.loaded and carries else wanted
 
 
@@ -326,6 +381,8 @@ GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
     "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
+    "greatest_wrench": tuple(f"greatest_wrench_{name}" for name in COMPONENTS),
+    "greatest_twist": tuple(f"greatest_twist_{name}" for name in COMPONENTS),
     "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
     "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),
     "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),

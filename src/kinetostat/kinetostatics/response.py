@@ -6,7 +6,9 @@ the status is not OK, results are meaningless; the engine and the studies mask t
 Source: theory sections 2 to 9, in their order; loads of actuators, theory (29).
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
@@ -18,6 +20,7 @@ from kinetostat.kinematics.closing import Joints, within_reach
 from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
+from kinetostat.kinetostatics.feasible import DriveLimits, Face, Transmission, drive_limits, transmission, wrench_faces
 from kinetostat.late import LateModule
 from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
 from kinetostat.machine.limits import limits_loads
@@ -59,6 +62,7 @@ class Response:
         softest: the least real part of the receptance across the cut, m/N, where it has been computed.
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
         cables: numbers of cables (`equilibrium.cables`), where they have been computed.
+        drives: what each drive may do, in the order of the actuators that hold something.
     """
 
     configuration: Configuration
@@ -81,7 +85,24 @@ class Response:
     cutting_pressure: Scalar = 0.0
     softest: Scalar | None = None
     cables: Mapping[str, Any] | None = None
+    drives: tuple[DriveLimits, ...] = ()
     regularity = renamed_property("singularity_margin")
+
+    @cached_property
+    def transmission(self) -> Transmission:
+        """The way in which drives and platform act on each other, as rigid bodies."""
+        return transmission(self.configuration, self.legs, self.guide)
+
+    @cached_property
+    def faces(self) -> list[Face]:
+        """The wrenches that the drives hold beside the loads that count already, theory (80).
+
+        Of a machine that is meant under its loads, drives carry what they carry at rest; NaN where that is not known.
+        """
+        shares, unknown = self.transmission.shares, [math.nan] * len(self.drives)
+        at_rest = (self.loaded or {}).get("drive_loads", unknown)
+        carried = at_rest if self.meant_loaded else [self.load.work(share) for share in shares]
+        return wrench_faces(self.transmission, [(drive.lower, drive.upper) for drive in self.drives], carried)
 
     @property
     def undecided(self) -> bool:
@@ -131,6 +152,7 @@ def respond(machine: Machine, joints: Joints | None = None, configuration: Confi
             statics.doubt if loaded else 0.0,
         ),
         meant_loaded=machine.loaded,
+        drives=drive_limits(machine, configuration),
     )
 
 

@@ -278,7 +278,14 @@ LIMITS = {
 }
 """Every limit by name. To add one, add its row here and, if no row has it yet, its measure above."""
 
-Limits = made_table("Limits", {limit.name: Field(limit.quantity, limit.quantity.unset) for limit in LIMITS.values()})
+OF_DRIVES = {
+    "actuator_speed": _most("speed", "greatest speed of an actuated slide; bounds what drives can do, and no pose"),
+    "actuator_turning_speed": _most("rate", "greatest speed of an actuated revolute, likewise"),
+}
+"""Limits on what no pose has by itself, so that no pose is judged by them: they say what drives can do."""
+
+_FIELDS = {**{limit.name: limit.quantity for limit in LIMITS.values()}, **OF_DRIVES}
+Limits = made_table("Limits", {name: Field(quantity, quantity.unset) for name, quantity in _FIELDS.items()})
 Limits.__doc__ = "Table [limits], in any machine file; a limit that is left out is infinite and costs no arithmetic."
 
 

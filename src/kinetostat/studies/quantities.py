@@ -14,11 +14,12 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.kinetostatics.feasible import drive_limits
 from kinetostat.kinetostatics.quantities import GROUPS, MOST_CABLES, QUANTITIES, rest_numbers
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.parameters import Parameter, with_values
+from kinetostat.machine.parameters import Parameter, values, with_values
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
@@ -164,6 +165,7 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
         refuse_unknown_mass(machine, weighing[0], state.configuration)
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
     _refuse_without_cables(machine, names)
+    _refuse_unlimited_drives(state, names, varied)
     wanted = [name for name in names if QUANTITIES[name].needs and not QUANTITIES[name].cables]
     if not wanted:
         return
@@ -181,6 +183,34 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
             raise InputError(
                 f'"{name}" is not known: the file of {machine.name} gives no load; add a table [load], '
                 'e.g. force = ["0 N", "0 N", "-500 N"].'
+            )
+
+
+LIMITS_OF_DRIVES = {
+    "load": ("limits.actuator_force", '"2 kN"', "limits.actuator_moment", '"20 N*m"'),
+    "speed": ("limits.actuator_speed", '"0.5 m/s"', "limits.actuator_turning_speed", '"3 rad/s"'),
+}
+"""By what is limited of a drive: the field for linear and for rotary ones, each with an example."""
+
+
+def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: Sequence[Parameter]) -> None:
+    """Refuse quantities about what drives can do where the file of a machine limits none of them."""
+    given = values(state.machine)
+    for name in names:
+        what = QUANTITIES[name].driven
+        if not what:
+            continue
+        drives = drive_limits(state.machine, state.configuration)
+        linear, first, rotary, second = LIMITS_OF_DRIVES[what]
+        fields = [(linear, first)] * any(d.spring.joint.point is None for d in drives)
+        fields += [(rotary, second)] * any(d.spring.joint.point is not None for d in drives)
+        pulled = what == "load" and any(np.isfinite(d.lower) for d in drives)
+        chosen = [parameter.path for parameter in varied]
+        if not pulled and all(field not in chosen and np.isinf(given[field]) for field, _ in fields):
+            wanted = " and ".join(f"{field} = {example}" for field, example in fields) or "an actuator"
+            raise InputError(
+                f'"{name}" is not known: nothing limits the {what} of the drives of {state.machine.name}; write '
+                f"{wanted}, say."
             )
 
 

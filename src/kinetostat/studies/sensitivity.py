@@ -249,7 +249,8 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
         return here[path] != 0.0  # a link or rotor without mass has no motion of its own
     if loaded:
         return not path.startswith(NOT_EVEN_LOADED)
-    if any(name in LOADS_OF_ACTUATORS for name in names) and path.startswith(("load.", "tool.")):
+    driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven == "load" for name in names)
+    if driven and path.startswith(("load.", "tool.")):
         return not path.startswith(NOT_EVEN_LOADED)  # to first order, actuators carry the loads and the platform
     if ".centre_of_mass." in path or (modal and path.startswith("tool.")):
         return modal

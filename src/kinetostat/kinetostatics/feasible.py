@@ -1,0 +1,377 @@
+"""Sets of wrenches that the drives of a machine hold at a pose, as faces over scalars, and the speeds that they allow.
+
+A set of wrenches is an intersection of slabs `lower <= n . w <= upper`, which is exact for any number of drives, with
+bounds of either sign (a cable pulls only) and beside any structure that carries loads without a drive. What a machine
+file says about its drives is in `machine`; vertices and pictures are made elsewhere.
+
+Source: theory (79)-(82). Screws are at the tool point, base axes.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import combinations
+
+from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, where
+from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.solve import conjugate, right_inverse
+from kinetostat.algebra.symmetric import SIZE
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.frozen import dataclass
+from kinetostat.kinetostatics.leg import INFINITE, combine, free_springs_as_joints
+from kinetostat.machine.leg import LegScrews, Spring
+from kinetostat.machine.limits import is_set
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.tolerances import DEPENDENT_GENERATORS, UNREACHED_COMPONENT
+
+BLOCKS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+"""Components of a screw that turn, and that move."""
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """Greatest loads and speed of a drive.
+
+    Attributes:
+        spring: of its actuator.
+        lower, upper: least and greatest load, N or N·m: positive in the sense in which the actuator's joint is pulled
+            open; infinite if not limited.
+        speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
+    """
+
+    spring: Spring
+    lower: Scalar
+    upper: Scalar
+    speed: Scalar
+
+
+def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveLimits, ...]:
+    """Return what a machine file lets its drives do, in the order of the actuators that hold something.
+
+    Loads are those of [limits]; where an actuator only pulls or only pushes, the tensions of [load] bound it as well.
+    """
+    limits, load = machine.tables["limits"], machine.tables["load"]
+    result = []
+    for spring in driven_springs(configuration):
+        slides = spring.joint.point is None
+        most = limits.actuator_force if slides else limits.actuator_moment
+        lower, upper = -most if is_set(most) else -math.inf, most
+        if spring.acts:
+            least = load.min_tension if is_set(load.min_tension) else 0.0
+            greatest = load.max_tension if is_set(load.max_tension) else most
+            if is_set(most) and is_set(load.max_tension):
+                greatest = smaller(most, load.max_tension)
+            lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
+        speed = limits.actuator_speed if slides else limits.actuator_turning_speed
+        result.append(DriveLimits(spring, lower, upper, speed))
+    return tuple(result)
+
+
+def driven_springs(configuration: Configuration) -> list[Spring]:
+    """The springs of all actuators that hold something; one that is free by form does not."""
+    return [
+        spring
+        for leg in configuration.legs
+        for spring in leg.springs
+        if spring.actuated and not is_zero(spring.stiffness)
+    ]
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """The way in which the drives of a machine and its platform act on each other.
+
+    Attributes:
+        shares: for each drive, its load per unit of each wrench on the platform where nothing else loads the legs: a
+            twist xi, theory (79).
+        internal: for each drive, its load per unit of each independent internal load of the legs.
+        doubtful: whether some internal loads may load no drive, as where structure is overconstrained.
+        wrenches: for each drive, the wrench that a unit of its load exerts on the platform; its speed is the power of
+            that on a twist. None where two drives of a leg move the platform in one way.
+        constraints: wrenches that legs, or a plane, exert without any drive: of unit size, moments over the length.
+        length: characteristic length, m.
+        margin: 0 where the legs do not hold the platform with locked drives.
+    """
+
+    shares: tuple[Twist, ...]
+    internal: tuple[tuple[Scalar, ...], ...]
+    doubtful: bool
+    wrenches: tuple[Wrench, ...] | None
+    constraints: tuple[Wrench, ...]
+    length: Scalar
+    margin: Scalar
+
+
+def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide: Sequence[Wrench] = ()) -> Transmission:
+    """Find how drives and platform act on each other, as rigid bodies: flexures bend freely.
+
+    Args:
+        configuration: of the machine.
+        legs: their screws at the tool point, base axes.
+        guide: of a planar machine, the wrenches against twists that do not exist there.
+
+    Source: theory (79).
+    """
+    rigid = [_without_flexures(leg.springs, screws) for leg, screws in zip(configuration.legs, legs, strict=True)]
+    shrink = reciprocal(configuration.length)
+    wrenches = [wrench for leg in rigid for wrench in leg.wrenches] + list(guide)
+    columns = [_components_in_newtons(wrench, shrink) for wrench in wrenches]
+    if len(columns) < SIZE:
+        return Transmission((), (), False, None, (), configuration.length, 0.0)
+    balance, null, margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
+    shares, internal, pairs, constraints = [], [], [], list(guide)
+    at, decided, doubtful = 0, True, False
+    for leg, screws in zip(configuration.legs, rigid, strict=True):
+        size = len(screws.wrenches)
+        rows = [
+            row
+            for spring, row in zip(leg.springs, screws.loads, strict=True)
+            if spring.actuated and not is_zero(spring.stiffness)
+        ]
+        for row in rows:
+            amounts = [total([c * balance[at + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
+            shares.append(Twist(Vector(*amounts[:3]) * shrink, Vector(*amounts[3:])))
+            internal.append(tuple(total([c * column[at + i] for i, c in enumerate(row)]) for column in null))
+        driving, passive = _by_drives(screws.wrenches, rows)
+        decided, doubtful = decided and driving is not None, doubtful or bool(passive)
+        pairs += driving or []
+        constraints += passive
+        at += size
+    return Transmission(
+        tuple(shares),
+        tuple(internal),
+        doubtful,
+        tuple(pairs) if decided else None,
+        tuple(wrench * _reciprocal_size(_components_in_newtons(wrench, shrink)) for wrench in constraints),
+        configuration.length,
+        margin,
+    )
+
+
+def _components_in_newtons(wrench: Wrench, shrink: Scalar) -> tuple[Scalar, ...]:
+    return (*(wrench.rotational * shrink).components(), *wrench.translational.components())
+
+
+def _reciprocal_size(components: Sequence[Scalar]) -> Scalar:
+    return reciprocal(sqrt(total([c * c for c in components])))
+
+
+def _without_flexures(springs: Sequence[Spring], leg: LegScrews) -> LegScrews:
+    """A leg whose flexure hinges and free springs are passive joints."""
+    softened = (INFINITE if spring.hinge else s for spring, s in zip(springs, leg.compliance, strict=True))
+    return free_springs_as_joints(replace(leg, compliance=tuple(softened)))
+
+
+def _by_drives(
+    wrenches: Sequence[Wrench], rows: Sequence[Sequence[Scalar]]
+) -> tuple[list[Wrench] | None, list[Wrench]]:
+    """Split what a leg carries into a wrench for each of its drives, and wrenches that load none of them.
+
+    Args:
+        wrenches: of the leg.
+        rows: for each drive, its load per unit of each of them.
+
+    Returns:
+        For each drive, the wrench with a unit of its load and none of the others; None if there are more drives than
+        wrenches. And the wrenches that load none.
+    """
+    if not rows:
+        return [], list(wrenches)
+    if len(rows) > len(wrenches):
+        return None, []
+    if len(wrenches) == 1:
+        return [wrenches[0] * (1.0 / rows[0][0])], []
+    amounts, null, _ = right_inverse([list(row) for row in rows])
+    driving = [combine(wrenches, [row[k] for row in amounts]) for k in range(len(rows))]
+    return driving, [combine(wrenches, column) for column in null]
+
+
+@dataclass(frozen=True)
+class Face:
+    """A pair of parallel faces of a set of wrenches: lower <= normal . w <= upper.
+
+    Attributes:
+        normal: a twist, base axes, at the tool point; of no certain size.
+        lower, upper: W, infinite where nothing bounds the set.
+    """
+
+    normal: Twist
+    lower: Scalar
+    upper: Scalar
+
+    @property
+    def room(self) -> Scalar:
+        """Distance of w = 0 to the nearer face, W; negative outside."""
+        return smaller(self.upper, -self.lower)
+
+
+def wrench_faces(
+    given: Transmission, bounds: Sequence[tuple[Scalar, Scalar]], carried: Sequence[Scalar] = ()
+) -> list[Face]:
+    """Return all faces of the set of wrenches that the drives hold; degenerate ones have a normal of zero.
+
+    With as many drives as freedoms each drive makes a pair of faces. With r more of them, loads xi . w + T z leave r
+    internal loads z open. They can be chosen if and only if no mix v of the drives with T^T v = 0 is asked for more
+    than its bounds allow (Farkas' lemma), and mixes of the fewest drives, r + 1 of them, say it all.
+
+    Args:
+        given: how drives and platform act on each other.
+        bounds: least and greatest load of each drive, N or N·m.
+        carried: what each drive carries already, e.g. by the weight; nothing if empty.
+
+    Source: theory (80).
+    """
+    carried = list(carried) or [0.0] * len(bounds)
+    faces = []
+    for mix in _circuits(given):
+        lower, upper, normal = 0.0, 0.0, Twist(ZERO, ZERO)
+        for drive, amount in mix:
+            low, high = bounds[drive]
+            ends = _times(amount, low), _times(amount, high)
+            before = amount * carried[drive]
+            lower, upper = lower + smaller(*ends) - before, upper + larger(*ends) - before
+            normal = normal + given.shares[drive] * amount
+        faces.append(Face(normal, lower, upper))
+    return faces
+
+
+def _times(amount: Scalar, bound: Scalar) -> Scalar:
+    """A bound of a drive in a mix: 0 where the drive has no part in it, even if the bound is infinite."""
+    if is_set(bound):
+        return amount * bound
+    return where(amount > 0.0, bound, where(amount < 0.0, -bound, 0.0))
+
+
+def _circuits(given: Transmission) -> list[list[tuple[int, Scalar]]]:
+    """The mixes of fewest drives which no internal load enters: drives with their amounts.
+
+    Internal loads that load no drive, to round-off, are put beside the drives as unknowns of their own: mixes then
+    leave them out, and every other choice of drives is counted as degenerate.
+    """
+    drives, degree = len(given.shares), len(given.internal[0]) if given.internal else 0
+    if degree == 0:
+        return [[(drive, 1.0)] for drive in range(drives)]
+    rows = [list(row) for row in given.internal]
+    if given.doubtful:
+        columns = [list(column) for column in zip(*rows, strict=True)]
+        modes = conjugate(columns, [1.0] * drives, [1.0] * drives)
+        sizes = [sqrt(inverse) for inverse in modes.inverses]
+        rows = [[column[i] * size for column, size in zip(modes.columns, sizes, strict=True)] for i in range(drives)]
+        for k, inverse in enumerate(modes.inverses):
+            rows.append([where(inverse > 0.0, 0.0, 1.0) if j == k else 0.0 for j in range(degree)])
+
+    @cache
+    def minor(chosen: tuple[int, ...]) -> Scalar:
+        """That of some rows in as many first columns, along the last of these."""
+        last = len(chosen) - 1
+        entries = [(k, rows[row][last]) for k, row in enumerate(chosen)]
+        if last == 0:
+            return entries[0][1]
+        minors = [(k, c, chosen[:k] + chosen[k + 1 :]) for k, c in entries if not is_zero(c)]
+        return total([c * minor(others) * (-1.0) ** (last - k) for k, c, others in minors])
+
+    result = []
+    for chosen in combinations(range(len(rows)), degree + 1):
+        amounts = [minor(chosen[:k] + chosen[k + 1 :]) * (-1.0) ** k for k in range(degree + 1)]
+        square = total([amount * amount for amount in amounts])
+        alive = square > DEPENDENT_GENERATORS * DEPENDENT_GENERATORS
+        mix = [(drive, amount) for drive, amount in zip(chosen, amounts, strict=True) if drive < drives]
+        result.append([(drive, where(alive, amount, 0.0)) for drive, amount in mix if not is_zero(amount)])
+    return [mix for mix in result if mix]
+
+
+def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar:
+    """Radius of the largest ball of forces (N) at no moment, or of moments (N·m) at no force, about no wrench at all.
+
+    It is the largest force that the drives hold in whichever direction it acts. Infinite where no drive feels the
+    block; negative where the drives do not even hold the loads that count already.
+
+    Args:
+        faces: of the set of wrenches.
+        block: of `BLOCKS`.
+        length: characteristic length, m.
+
+    Source: theory (81).
+    """
+    radius: Scalar = math.inf
+    for face in faces:
+        size, felt = _size_of_part(face.normal.components(), block, length)
+        radius = smaller(where(felt, face.room * reciprocal(where(felt, size, 1.0)), _reach_if_unfelt(face)), radius)
+    return radius
+
+
+def greatest_along(faces: Sequence[Face], row: int, length: Scalar) -> Scalar:
+    """The greatest wrench along both ways of one component, with no other, N or N·m; compare `greatest_ball`."""
+    return greatest_ball(faces, slice(row, row + 1), length)
+
+
+def _reach_if_unfelt(face: Face) -> Scalar:
+    """Infinity where a face that a wrench does not meet holds w = 0; degenerate faces, which are 0 <= 0, do."""
+    return where(face.room < 0.0, -math.inf, math.inf)
+
+
+def _size_of_part(components: Sequence[Scalar], part: slice, length: Scalar) -> tuple[Scalar, Scalar]:
+    """The size of some components of a twist, and whether that is more than round-off of the whole."""
+    area = length * length
+    squares = [c * c for c in components]
+    square = total(squares[part])
+    turning = part.start < SIZE // 2
+    whole = total([*(c * area for c in squares[:3]), *squares[3:]])
+    felt = (square * area if turning else square) > UNREACHED_COMPONENT * whole
+    return sqrt(square), felt
+
+
+def greatest_speed(given: Transmission, speeds: Sequence[Scalar], block: slice) -> Scalar:
+    """The greatest speed (m/s) of the tool point that the drives allow in whichever direction the machine can move.
+
+    It moves without turning, or for the other block turns (rad/s) about the tool point without moving it: directions
+    that the structure does not allow then do not count. NaN where it allows none.
+
+    Args:
+        given: how drives and platform act on each other.
+        speeds: greatest speed of each drive, m/s or rad/s.
+        block: of `BLOCKS`.
+
+    Source: theory (82).
+    """
+    if given.wrenches is None:
+        return math.nan
+    turning, shrink = block.start == 0, reciprocal(given.length)
+    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in given.constraints]
+    stopped = [column for column in stopped if not all(is_zero(c) for c in column)]
+    structure = conjugate(stopped, [1.0] * 3, [1.0] * 3) if stopped else None
+    radius: Scalar = math.inf
+    for wrench, speed in zip(given.wrenches, speeds, strict=True):
+        whole = _components_in_newtons(wrench, shrink)
+        part = list(whole[block])
+        for column, inverse in zip(structure.columns, structure.inverses, strict=True) if structure else ():
+            share = inverse * total([a * b for a, b in zip(part, column, strict=True)])
+            part = [a - share * b for a, b in zip(part, column, strict=True)]
+        square = total([c * c for c in part])
+        felt = square > UNREACHED_COMPONENT * total([c * c for c in whole])
+        needed = sqrt(square) * given.length if turning else sqrt(square)
+        radius = smaller(where(felt, speed * reciprocal(where(felt, needed, 1.0)), math.inf), radius)
+    return where(radius < math.inf, radius, math.nan)
+
+
+def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int) -> Scalar:
+    """The greatest rate of one component alone that the drives allow, m/s or rad/s; 0 where the structure forbids it.
+
+    Args:
+        given, speeds: see `greatest_speed`.
+        row: of rx ry rz x y z = 0 ... 5.
+    """
+    if given.wrenches is None:
+        return math.nan
+    shrink = reciprocal(given.length)
+    rate: Scalar = math.inf
+    for wrench, speed in zip(given.wrenches, speeds, strict=True):
+        part = abs(wrench.components()[row])
+        square, whole = _components_in_newtons(wrench, shrink)[row], _components_in_newtons(wrench, shrink)
+        felt = square * square > UNREACHED_COMPONENT * total([c * c for c in whole])
+        rate = smaller(where(felt, speed * reciprocal(where(felt, part, 1.0)), math.inf), rate)
+    for wrench in given.constraints:
+        entry = _components_in_newtons(wrench, shrink)[row]
+        rate = where(entry * entry > UNREACHED_COMPONENT, 0.0, rate)
+    return rate
