@@ -11,6 +11,7 @@ import re
 import shutil
 import sysconfig
 import tempfile
+from functools import partial
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before anything loads NumPy
 
@@ -34,9 +35,11 @@ MARKERS = {
     "attack": ("test_attack", "test_judge"),
     "packaging": ("test_packaging",),
     "numbers": (
+        "test_closed_legs",
         "test_derivatives",
         "test_derivatives_leg_by_leg",
         "test_engine",
+        "test_far_rests",
         "test_identified_truth",
         "test_limited_poses",
         "test_optimisers",
@@ -52,6 +55,7 @@ MARKERS = {
         "test_uploads",
         "test_written_files",
     ),
+    "exports": ("test_c_source", "test_machine_page"),
     "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
 """Files of tests that plain `pytest` leaves out, because they take long; `-m slow` runs them. A single test of
@@ -103,7 +107,7 @@ def pytest_configure(config):
     """
     if CACHE not in os.environ and not hasattr(config, "workerinput"):
         os.environ[CACHE] = tempfile.mkdtemp(prefix="kinetostat-programs-")
-        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(CACHE), ignore_errors=True))
+        config.add_cleanup(partial(shutil.rmtree, os.environ[CACHE], ignore_errors=True))
 
 
 @pytest.fixture(autouse=True)
