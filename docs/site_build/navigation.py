@@ -2,16 +2,7 @@
 
 from pathlib import Path
 
-TUTORIALS = (
-    "paper-machine",
-    "own-machine",
-    "real-hexapod",
-    "read-a-map",
-    "optimise",
-    "calibrate",
-    "cable-robot",
-    "jupyter",
-)
+TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "calibrate", "jupyter")
 PAGES = {
     "Start": ["start", "overview", "install"],
     "Tutorials": [*(f"tutorials/{name}" for name in TUTORIALS), "exercises"],

@@ -22,6 +22,7 @@ _HOMES = {
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",
     "modes": "kinetostat.studies.vibration",
+    "dynamics": "kinetostat.studies.dynamics",
     "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
     "carrying_legs": "kinetostat.studies.carrying",
@@ -64,9 +65,9 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "carrying_legs", "changed", "command",
-    "compare", "compile", "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines",
-    "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot", "register", "report",
-    "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions", "under_load", "validate",
+    "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export", "forward",
+    "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot", "register",
+    "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "under_load", "validate",
     "validate_measured", "workspace",
 ]  # fmt: skip
 

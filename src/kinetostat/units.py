@@ -46,7 +46,9 @@ class Kind:
     @property
     def unsigned(self) -> bool:
         """Whether it cannot be negative, though it may be 0."""
-        return self.heavy or self.name.endswith(("damping", "ratio", "rate", "speed", "duration", "pressure"))
+        return self.heavy or self.name.endswith(
+            ("damping", "friction", "ratio", "rate", "speed", "duration", "pressure")
+        )
 
 
 KINDS = {
@@ -76,6 +78,8 @@ KINDS = {
         Kind("ratio", "", "0.02"),
         Kind("linear damping", "N·s/m", "500 N*s/m"),
         Kind("torsional damping", "N·m·s/rad", "0.2 N*m*s/rad"),
+        Kind("linear friction", "N", "5 N"),
+        Kind("torsional friction", "N·m", "0.05 N*m"),
         Kind("rate", "rad/s", "3 rad/s"),
         Kind("duration", "s", "1e-5 s"),
         Kind("frequency", "Hz", "120 Hz"),

@@ -22,6 +22,7 @@ LAYERS = [
     "kinetostatics",
     "equilibrium",
     "vibration",
+    "motion",
     "engine",
     "accuracy",
     "studies",

@@ -186,13 +186,13 @@ def objectives_of(
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
     """
     given = traced_machine(kind, form)
-    joints, columns = _joints(given, closed)
+    joints, columns = traced_joints(given, closed)
     response = respond(given.machine, joints)
     coordinates: tuple[Traced, ...] = ()
     wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights], limited)
     if wanted:
         equations = reduced_machine(given.machine, response, joints)
-        coordinates = _inputs(given.graph, equations.size)
+        coordinates = new_inputs(given.graph, equations.size)
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
         loaded, status = equations.numbers(there, wanted, response)
@@ -201,14 +201,14 @@ def objectives_of(
         response = replace(response, loaded=loaded, status=status)
     if modes:
         vibration = vibrating(given.machine, response, joints, modes)
-        known = _inputs(given.graph, vibration.columns)
+        known = new_inputs(given.graph, vibration.columns)
         coordinates = (*coordinates, *known)
         response = replace(response, frequencies=in_order(vibration.squares(known)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     accepted = response.status < Status.OK + 0.5
-    results = [_number(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
-    return _formula(given, columns, results, _number(response.status), paths, coordinates)
+    results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
+    return formula_of(given, columns, results, result_of(response.status), paths, coordinates)
 
 
 def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:
@@ -223,12 +223,12 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
         first: whether to begin at the free state, with two steps and without columns of coordinates.
     """
     given = traced_machine(kind, form)
-    joints, columns = _joints(given, closed)
+    joints, columns = traced_joints(given, closed)
     equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
-    coordinates = () if first else _inputs(given.graph, equations.size)
+    coordinates = () if first else new_inputs(given.graph, equations.size)
     stepped, square = equations.step(equations.start() if first else [*coordinates])
-    results = [_number(value) for value in (*stepped, square)]
-    return _formula(given, columns, results, 0.0, coordinates=coordinates)
+    results = [result_of(value) for value in (*stepped, square)]
+    return formula_of(given, columns, results, 0.0, coordinates=coordinates)
 
 
 @dataclass(frozen=True)
@@ -272,13 +272,14 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
     vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *(p for row in points for p in row)]
     wanted = [actuator.coordinate for actuator in actuators] + [c for vector in vectors for c in vector.components()]
     accepted = status < Status.OK + 0.5
-    results = [_number(where(accepted, value, math.nan)) for value in wanted]
-    formula = _formula(given, (), results, _number(status), paths)
+    results = [result_of(where(accepted, value, math.nan)) for value in wanted]
+    formula = formula_of(given, (), results, result_of(status), paths)
     legs = zip((leg.name for leg in configuration.legs), map(len, points), strict=True)
     return TracedPlacement(formula, tuple(actuators), tuple(legs))
 
 
-def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
+def new_inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
+    """Further columns."""
     return tuple(graph.input() for _ in range(count))
 
 
@@ -293,13 +294,13 @@ def equations_of(kind: Specimen, form: Form, paths: Sequence[str]) -> TracedForm
         paths: leaf paths of the parameters to differentiate by.
     """
     given = traced_machine(kind, form)
-    _, columns = _joints(given, closed=False)
+    _, columns = traced_joints(given, closed=False)
     chains = given.machine.chains()
-    results = [_number(result) for result in (*closing_equations(chains, columns[:-1]), chains.length)]
-    return _formula(given, columns, results, 0.0, paths)
+    results = [result_of(result) for result in (*closing_equations(chains, columns[:-1]), chains.length)]
+    return formula_of(given, columns, results, 0.0, paths)
 
 
-def _formula(
+def formula_of(
     given: TracedMachine,
     joints: Sequence[Traced],
     results: Sequence[Operand],
@@ -307,18 +308,19 @@ def _formula(
     paths: Sequence[str] | None = None,
     coordinates: Sequence[Traced] = (),
 ) -> TracedFormula:
+    """The formula of some results and a code, whose columns are those that vary, of joints, and further coordinates."""
     body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
     inputs = () if paths is None else (*(given.parameters[path] for path in paths), *joints[:-1])
     return TracedFormula(body, inputs)
 
 
-def _joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
+def traced_joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
     """The joints of a traced machine, and the columns that bring them: coordinates and a status."""
     if given.machine.family.chains is None:
         return None, ()
     if closed:
         return CLOSED_FORMS.over_scalars(given.machine.chains()), ()
-    columns = _inputs(given.graph, given.machine.chains().size + 1)
+    columns = new_inputs(given.graph, given.machine.chains().size + 1)
     return Joints(columns[:-1], columns[-1]), columns
 
 
@@ -329,6 +331,6 @@ def _weighted_sum(response: Response, weights: Weights) -> Scalar:
     return value
 
 
-def _number(value: Scalar) -> Operand:
+def result_of(value: Scalar) -> Operand:
     """A result as a program takes it: a node, or a float where it depends on nothing."""
     return float(value) if isinstance(value, int | float) else value

@@ -318,7 +318,7 @@ class _Row:
     def _parallelogram(self, bars: Parallelogram, number: int) -> None:
         """Turn about the near side and back about the far one; in between, the bars grow."""
         near, far, turn = bar_turns(bars)
-        rate = self.units.length * turn
+        rate = self.units.length * of_scalars([turn], self.units.count)[:, 0]
         coordinate = self._coordinate(None)
         self._move(self.units.twist(near, rate), coordinate)
         self.grow(number)

@@ -41,7 +41,7 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
         if spring is None:
             dampers[:, coordinate] = _friction(leg, coordinate, units, damping)
         elif spring.actuated:
-            turns = _turns(spring, drives)
+            turns = rotor_turns(spring, drives)
             square = turns * turns
             for amounts, number in ((rotors, drives.rotor_inertia), (dampers, drives.rotor_damping)):
                 if not is_zero(number):
@@ -49,15 +49,22 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
     return replace(leg, rotors=rotors, dampers=dampers)
 
 
-def _turns(spring: Spring, drives: Any) -> Scalar:
-    """By how many radians the rotor of an actuator turns per metre or radian of the actuator."""
+def rotor_turns(spring: Spring, drives: Any) -> Scalar:
+    """Radians by which the rotor of an actuator turns per metre or radian of the actuator; 0.0 if nothing says it.
+
+    Raises:
+        InputError: rotors have an inertia or friction, but nothing says how far they turn.
+    """
     slides = spring.joint.point is None
     given = drives.lead if slides else drives.ratio
-    if is_zero(given) and not (is_zero(drives.rotor_inertia) and is_zero(drives.rotor_damping)):
+    if is_zero(given):
+        if all(is_zero(number) for number in (drives.rotor_inertia, drives.rotor_damping, drives.rotor_friction)):
+            return 0.0
         field, example, kind = ("lead", '"10 mm"', "linear") if slides else ("ratio", "50", "rotary")
         raise InputError(
-            f"drives.{field} is 0, but drives.rotor_inertia or drives.rotor_damping is given and the actuators are "
-            f"{kind}: nothing says how far a rotor turns; write {field} = {example} in the table [drives]."
+            f"drives.{field} is 0, but drives.rotor_inertia, drives.rotor_damping or drives.rotor_friction is given "
+            f"and the actuators are {kind}: nothing says how far a rotor turns; write {field} = {example} in the "
+            "table [drives]."
         )
     return reciprocal(given) * (2.0 * math.pi) if slides else given
 

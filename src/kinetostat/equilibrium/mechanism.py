@@ -9,11 +9,12 @@ times it. Arrays have the poses first [n]. The origin is the tool point of the f
 Source: theory (35).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import ElasticLeg, Given, Masses, Units, Weight, elastic_leg
@@ -22,7 +23,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.numerics.motions import of_scalars
 
 
@@ -107,7 +108,12 @@ def _wrench_units(length: Array, force: Array) -> Array:
 
 
 def mechanism_of(
-    machine: Machine, configuration: Configuration, joints: Joints | None, count: int | None = 1
+    machine: Machine,
+    configuration: Configuration,
+    joints: Joints | None,
+    count: int | None = 1,
+    force: Scalar | None = None,
+    members: Sequence[Member] | None = None,
 ) -> Mechanism:
     """The mechanism of a machine at its pose, or at n poses.
 
@@ -117,17 +123,18 @@ def mechanism_of(
         joints: coordinates that close its legs, if it is written leg by leg.
         count: number of poses, n; None for numbers of any kind as they are, traced ones for instance: its arrays then
             hold them as objects, for one pose.
+        force: unit of force, N; if None, a typical stiffness times the unit of length.
+        members: its links with both ends at the pose, if they are known.
     """
     origin = machine.reference_point(configuration)
     length = of_scalars([configuration.length], count)[:, 0]
-    known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
-    typical = _typical(of_scalars(known, count))
-    force = typical * length
-    units = Units(origin, length, force, count)
-    members = located_members(machine, configuration, None if joints is None else joints.coordinates)
+    units = Units(origin, length, _unit_of_force(configuration, length, count, force), count)
+    if members is None:
+        members = located_members(machine, configuration, None if joints is None else joints.coordinates)
     driven = [s for leg in configuration.legs for s in leg.springs if s.actuated and not is_zero(s.stiffness)]
     amounts = Given(len(driven))
-    travels = {} if joints is None or count is None else _travels(machine, joints, count)
+    returning = joints is not None and any(not is_zero(s.returns) for leg in configuration.legs for s in leg.springs)
+    travels = _travels(machine, joints, count) if returning and joints is not None else {}
     legs = []
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
@@ -140,7 +147,7 @@ def mechanism_of(
     moment = machine.load.rotational
     for _, other in named:
         moment = moment + other.rotational
-    wrench = of_scalars([*moment.components(), *load.force], count) * (1.0 / _wrench_units(length, force))
+    wrench = of_scalars([*moment.components(), *load.force], count) * (1.0 / _wrench_units(length, units.force))
     ways = np.eye(6)
     if configuration.plane is not None:
         turn, *slides = (np.array(joint.axis.components(), dtype=float) for joint in configuration.plane.freedoms)
@@ -156,7 +163,7 @@ def mechanism_of(
         of_scalars(gravity_of(load).components(), count),
         ways,
         length,
-        force,
+        units.force,
         bool(weights) or any(leg.masses.carried for leg in legs),
     )
 
@@ -169,18 +176,24 @@ def platform_weights(machine: Machine, platform: Displacement) -> list[Weight]:
     ]
 
 
-def _travels(machine: Machine, joints: Joints, count: int) -> dict[str, list[Array]]:
+def _unit_of_force(configuration: Configuration, length: Array, count: int | None, given: Scalar | None) -> Array:
+    if given is not None:
+        return of_scalars([given], count)[:, 0]
+    known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
+    return _typical(of_scalars(known, count)) * length
+
+
+def _travels(machine: Machine, joints: Joints, count: int | None) -> dict[str, list[Array]]:
     """For each leg and element, how far what moves there or last before it is from the home pose, rad or m [n]."""
     remaining = iter(joints.coordinates)
     travels = {}
     for leg, steps in zip(machine.configure(joints.coordinates).legs, machine.chains().legs, strict=True):
-        row, last = [], np.zeros(count)
+        row, last = [], of_scalars([0.0], count)[:, 0]
         for step in steps:
             if step.moves:
                 amount = next(remaining)
-                parts = (amount.sine, amount.cosine) if isinstance(amount, Turn) else (amount, 1.0)
-                both = of_scalars(parts, count)
-                last = np.arctan2(both[:, 0], both[:, 1]) if isinstance(amount, Turn) else both[:, 0]
+                travel = arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
+                last = of_scalars([travel], count)[:, 0]
             row.append(last)
         travels[leg.name] = row
     return travels

@@ -54,17 +54,30 @@ class Drives:
     ] = 0.0
     ratio: Annotated[float, Quantity("ratio", "turns of the rotor per turn of a rotary actuator")] = 0.0
     rotor_damping: Annotated[float, Quantity("torsional damping", "viscous friction that each rotor meets")] = 0.0
+    rotor_friction: Annotated[
+        float, Quantity("torsional friction", "Coulomb friction that each rotor meets: the same at every speed")
+    ] = 0.0
+    efficiency: Annotated[
+        float,
+        Quantity("ratio", "share of the rotor's power that gear or screw pass on, and back", positive=True, most=1.0),
+    ] = 1.0
 
 
 @table
 class Damping:
-    """Table [damping], in any machine file: what takes energy out of vibrations."""
+    """Table [damping], in any machine file: what takes energy out of vibrations, and friction of joints in motion."""
 
     ratio: Annotated[float, Quantity("ratio", "damping ratio of every mode, added to all other damping")] = 0.0
     per_mass: Annotated[float, Quantity("rate", "Rayleigh damping in proportion to mass")] = 0.0
     per_stiffness: Annotated[float, Quantity("duration", "Rayleigh damping in proportion to stiffness")] = 0.0
     hinges: Annotated[float, Quantity("torsional damping", "viscous friction of each passive joint that turns")] = 0.0
     slides: Annotated[float, Quantity("linear damping", "viscous friction of each passive joint that slides")] = 0.0
+    hinge_friction: Annotated[
+        float, Quantity("torsional friction", "Coulomb friction of each passive joint that turns, at any speed")
+    ] = 0.0
+    slide_friction: Annotated[
+        float, Quantity("linear friction", "Coulomb friction of each passive joint that slides, at any speed")
+    ] = 0.0
 
 
 Moment = Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)]
@@ -111,7 +124,7 @@ class Load:
 class CableTable:
     """Table [cables], in any machine file: which tensions are chosen, what they must hold, and what the cables are.
 
-    How tensions are distributed counts wherever they are chosen; the rest, where tensions and capacity are asked for.
+    How tensions are distributed counts wherever they are chosen; the box, where capacity is asked for.
     """
 
     level: Annotated[float, Quantity("force", "tension to which all are brought as near as can be; 0: the least")] = 0.0
@@ -129,12 +142,6 @@ class CableTable:
         tuple[float, float, float],
         Quantity("moment", "by which moments x, y, z about the load must be held too, base axes", count=3, apart=True),
     ] = (0.0, 0.0, 0.0)
-    linear_density: Annotated[
-        float, Quantity("linear density", "of unstretched cable, which then sags; 0: cables are straight")
-    ] = 0.0
-    pulley_radius: Annotated[
-        float, Quantity("length", "of pulleys at the base, which swivel about the vertical through `from`; 0: none")
-    ] = 0.0
 
 
 @table

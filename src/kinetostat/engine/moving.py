@@ -1,0 +1,199 @@
+"""Motions of many points: drives and joints of a machine of rigid parts, traced and compiled, or by columns for a few.
+
+No formula lives here.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, where
+from kinetostat.arrays import Array, Codes
+from kinetostat.engine.form import (
+    Form,
+    Specimen,
+    TracedFormula,
+    form_of,
+    formula_of,
+    new_inputs,
+    result_of,
+    traced_joints,
+    traced_machine,
+)
+from kinetostat.engine.kernel import Recipe, program_columns, program_of
+from kinetostat.equilibrium.state import MachineState, states_at
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.closing import within_reach
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.column import column, stacked_columns
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE
+from kinetostat.motion.numbers import OF_DRIVE, drive_numbers, joints_of, motion_details
+from kinetostat.motion.operators import MachineAtPose, at_pose
+from kinetostat.motion.rates import PoseRates
+from kinetostat.motion.rigid import MotionPlan, masses_of_links, mechanism_over_scalars, plan_of
+
+COMPILED_FROM = 2000
+"""Points from which machine code pays, which takes a second or two to compile and is then kept on disk."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """Points of a motion.
+
+    Attributes:
+        pose: coordinates of the pose by name, m or rad [n].
+        rates: of these, per second [n].
+        accelerations: of these, per second squared [n].
+    """
+
+    pose: Mapping[str, Array]
+    rates: Mapping[str, Array]
+    accelerations: Mapping[str, Array]
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return len(next(iter(self.pose.values())))
+
+
+@dataclass(frozen=True)
+class PathForces:
+    """Drives and joints along a motion; NaN where the machine has no place.
+
+    Attributes:
+        drives: numbers of each drive, see `motion.numbers.OF_DRIVE` [drives x numbers x n], SI.
+        joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
+        inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
+        status: `Status` codes [n].
+    """
+
+    drives: Array
+    joints: Array
+    inertia: Array
+    status: Codes
+
+
+def motion_of(
+    kind: Specimen, form: Form, plan: MotionPlan, links: int, joints_too: bool, closed: bool = False
+) -> TracedFormula:
+    """Trace what the drives of a machine of rigid parts do along a motion, and if wanted what its joints pass on.
+
+    Columns after those of the pose and of joints are the rates of the pose's coordinates, their accelerations, and the
+    masses of so many links.
+
+    Args:
+        kind: of the machine.
+        form: how its parameters enter; its pose varies.
+        plan: which motions there are.
+        links: how many links have a mass that does not follow the pose; 0 for masses as they are at each pose.
+        joints_too: whether loads of joints and reflected inertia come after the numbers of the drives.
+        closed: whether joints are closed inside the program.
+    """
+    given = traced_machine(kind, form)
+    joints, columns = traced_joints(given, closed)
+    configuration = given.machine.configure(joints.coordinates if joints else ())
+    names = [path.removeprefix(POSE) for path in form.varying]
+    size = len(names)
+    moving = new_inputs(given.graph, 2 * size + links)
+    direction = PoseRates(
+        dict(zip(names, moving[:size], strict=True)), dict(zip(names, moving[size : 2 * size], strict=True))
+    )
+    here = at_pose(given.machine, configuration, joints, plan, moving[2 * size :] or None)
+    results = drive_numbers(here, direction)
+    if joints_too:
+        results += motion_details(here, direction)
+    status: Scalar = joints.status if joints else int(Status.OK)
+    status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
+    accepted = status < Status.OK + 0.5
+    shown = [result_of(where(accepted, value, math.nan)) for value in results]
+    return formula_of(given, columns, shown, result_of(status), coordinates=moving)
+
+
+@dataclass(frozen=True)
+class RigidForm:
+    """The form of a machine's equations, found once: the motions that it has, and the masses of its links.
+
+    Attributes:
+        machine: at the pose at which its telescopic legs have their mass.
+        plan: which motions there are.
+        masses: of its links, kg; none of a machine written leg by leg, whose file says them.
+    """
+
+    machine: Machine
+    plan: MotionPlan
+    masses: tuple[float, ...]
+
+    def at(self, state: MachineState) -> MachineAtPose:
+        """Take the rigid parts of the machine in a state, at its pose or at n poses."""
+        return at_pose(state.machine, state.configuration, state.joints, self.plan, self.masses or None)
+
+
+def rigid_form(state: MachineState) -> RigidForm:
+    """Decide what the equations of a machine look like, at its pose."""
+    with np.errstate(all="ignore"):
+        plan = plan_of(mechanism_over_scalars(state.machine, state.configuration, state.joints))
+    closed = state.machine.family.chains is None
+    masses = tuple(map(float, masses_of_links(state.machine, state.configuration))) if closed else ()
+    return RigidForm(state.machine, plan, masses if any(masses) else ())
+
+
+def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: bool | None = None) -> PathForces:
+    """Compute what drives do along a motion, and if wanted what joints pass on.
+
+    Args:
+        form: of the machine.
+        path: the points of the motion.
+        joints: whether loads of joints and reflected inertia are wanted.
+        compiled: whether by machine code; if None, where there are many points.
+    """
+    state = MachineState(form.machine)
+    size, loaded = len(form.at(state).rigid.drives), joints_of(state.configuration) if joints else []
+    if compiled if compiled is not None else path.size >= COMPILED_FROM:
+        results, status = _by_program(form, path, joints)
+    else:
+        results, status = _by_columns(form, path, joints)
+    end = size * len(OF_DRIVE)
+    pairs = end + 2 * len(loaded)
+    return PathForces(
+        results[:end].reshape(size, len(OF_DRIVE), path.size),
+        results[end:pairs].reshape(len(loaded), 2, path.size),
+        results[pairs:],
+        status,
+    )
+
+
+def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
+    with np.errstate(all="ignore"):
+        state = states_at(form.machine, {POSE + name: values for name, values in path.pose.items()}, path.size)
+        here = form.at(state)
+        rates, accelerations = (
+            {name: column(np.asarray(values, dtype=float)) for name, values in part.items()}
+            for part in (path.rates, path.accelerations)
+        )
+        direction = PoseRates(rates, accelerations)
+        numbers = drive_numbers(here, direction)
+        if joints:
+            numbers += motion_details(here, direction)
+        placed: Scalar = int(Status.OK) if state.joints is None else state.joints.status
+        status = np.where(np.asarray(within_reach(state.configuration)), placed, int(Status.OUT_OF_REACH))
+        results = stacked_columns(numbers, path.size).T.copy()
+    codes = np.broadcast_to(status, (path.size,)).astype(np.int8)
+    results[:, codes != Status.OK] = np.nan
+    return results, codes
+
+
+def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
+    machine, names = form.machine, list(path.pose)
+    varying = {POSE + name: np.asarray(path.pose[name], dtype=float) for name in names}
+    shape, fixed = form_of(machine, list(varying))
+    program = program_of(Recipe(motion_of, Specimen(machine), shape, (form.plan, len(form.masses), joints)))
+    given = program_columns(machine, shape, varying, path.size)
+    given += [
+        np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in names
+    ]
+    given += [np.full(path.size, mass) for mass in form.masses]
+    results, status = np.empty((program.rows, path.size)), np.empty(path.size, dtype=np.int8)
+    program.run(fixed, given, results, status)
+    return results, status

@@ -1,0 +1,217 @@
+"""Machines in motion by a second route: positions of masses and drives, placed pose by pose, and differences of them.
+
+It knows no screws: kinetic and potential energy come from the ends of links, and forces from virtual work along the
+coordinates of the pose. Further, what must hold of any such equations: power, skew symmetry, statics, programs.
+"""
+
+import numpy as np
+import pytest
+
+from kinetostat.engine.moving import Path, forces_on_path, rigid_form
+from kinetostat.equilibrium.state import state_of
+from kinetostat.kinematics.forward import leg_names
+from kinetostat.machine.actuators import actuators_of, joint_actuators
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loads import gravity_of, located_members
+from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.studies.dynamics import driven_springs, dynamics
+
+MASSES = ("tool.mass=3 kg", "tool.inertia=[0.02, 0.03, 0.04, 0.001, 0, 0.002]")
+ROTORS = ("drives.rotor_inertia=1e-4", "drives.lead=10 mm", "drives.ratio=5")
+FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
+SECOND = np.array([2, -27, 270, -490, 270, -27, 2]) / 180.0
+STEP = 4e-3
+NAMES = ("hexapod", "delta", "planar-3rrr", "zhang-gosselin-4dof", "tripteron", "passive-leg-5dof-rus", "tricept")
+
+
+def massive(name, *further):
+    plain = load(name)
+    links = [f"{p.path}=2 kg/m" for p in parameters(plain.family) if p.path.startswith("linear_density.")]
+    flat = plain.family.planar
+    centre = "tool.centre_of_mass=[0.02, 0.01, 0]" if flat else "tool.centre_of_mass=[0.02, 0.01, 0.03]"
+    down = "load.gravity=[1, 2, 0]" if flat else "load.gravity=[1, 2, -9.81]"
+    return load(name, [*MASSES, *ROTORS, *links, centre, down, *further])
+
+
+def named(machine):
+    names = [path.removeprefix(POSE) for path in values(machine) if path.startswith(POSE)]
+    return names, np.array([float(values(machine)[POSE + name]) for name in names])
+
+
+class Placed:
+    """Where masses and drives of a machine are at a pose; masses of links are those at its own pose."""
+
+    def __init__(self, machine):
+        self.machine, self.names = machine, named(machine)[0]
+        self.masses = [float(link.mass) for link in self.members(state_of(machine))]
+        tool = machine.tables["tool"]
+        self.tool = float(tool.mass)
+        xx, yy, zz, xy, xz, yz = tool.inertia
+        self.inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def members(self, state):
+        return located_members(state.machine, state.configuration, state.joints and state.joints.coordinates)
+
+    def at(self, numbers):
+        """Points (three of each link, whose masses are 1/6, 2/3, 1/6), the platform's centre, its turn, the drives."""
+        pose = dict(zip([POSE + name for name in self.names], map(float, numbers), strict=True))
+        state = state_of(with_values(self.machine, pose))
+        points = []
+        for link in self.members(state):
+            start, end = (np.array(p.components(), dtype=float) for _, p in link.ends())
+            points += [start, 0.5 * (start + end), end]
+        platform = state.configuration.platform
+        centre = platform.apply(type(platform.translation)(*self.machine.tables["tool"].centre_of_mass))
+        points.append(np.array(centre.components(), dtype=float))
+        axes = (platform.rotation.x, platform.rotation.y, platform.rotation.z)
+        turn = np.array([axis.components() for axis in axes], dtype=float).T
+        if state.joints is None:
+            every = actuators_of(state.configuration)
+            springs = [s for leg in state.configuration.legs for s in leg.springs if s.actuated]
+            every = [a for a, s in zip(every, springs, strict=True) if s in driven_springs(state.configuration)]
+        else:
+            chains = state.machine.chains()
+            every = [a.at(state.joints.coordinates) for a in joint_actuators(chains, leg_names(state.machine))]
+        return np.array(points), turn, np.array([float(a.coordinate) for a in every]), [a.slides for a in every]
+
+    @property
+    def weights(self):
+        return np.array([*(m * share for m in self.masses for share in (1 / 6, 2 / 3, 1 / 6)), self.tool])
+
+    def along(self, pose, rates, accelerations=0.0):
+        steps = STEP * np.arange(-3, 4)
+        rows = [self.at(pose + rates * t + 0.5 * accelerations * t * t) for t in steps]
+        return [np.array([row[k] for row in rows]) for k in range(3)]
+
+
+def spin(turns, turn):
+    """Angular velocity and acceleration from seven rotations in a row."""
+    turning = np.einsum("k,kij->ij", FIRST / STEP, turns) @ turn.T
+    changing = np.einsum("k,kij->ij", SECOND / STEP**2, turns) @ turn.T - turning @ turning
+    return [np.array([m[2, 1], m[0, 2], m[1, 0]]) for m in (turning, changing)]
+
+
+def forces_by_differences(machine, rates, accelerations):
+    """Forces of the drives from virtual work over differences of positions."""
+    placed = Placed(machine)
+    _, pose = named(machine)
+    _, turn, _, slides = placed.at(pose)
+    points, turns, drives = placed.along(pose, rates, accelerations)
+    gained = np.einsum("k,kij->ij", SECOND / STEP**2, points)
+    gained = gained - np.array(gravity_of(machine.tables["load"]).components(), dtype=float)
+    turning, changing = spin(turns, turn)
+    tensor = turn @ placed.inertia @ turn.T
+    torque = tensor @ changing + np.cross(turning, tensor @ turning)
+    rotors = machine.tables["drives"]
+    reflected = [rotors.rotor_inertia * (2 * np.pi / rotors.lead if s else rotors.ratio) ** 2 for s in slides]
+    speeded = np.einsum("k,ki->i", SECOND / STEP**2, drives) * reflected
+    asked, moved = [], []
+    for direction in np.eye(len(pose)):
+        here, turned, driven = placed.along(pose, direction)
+        rate = np.einsum("k,kij->ij", FIRST / STEP, here)
+        moved.append(np.einsum("k,ki->i", FIRST / STEP, driven))
+        work = (placed.weights[:, None] * gained * rate).sum() + torque @ spin(turned, turn)[0]
+        asked.append(work + speeded @ moved[-1])
+    return np.linalg.solve(np.array(moved), np.array(asked))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_drives_do_what_virtual_work_asks_for(name):
+    machine, rng = massive(name), np.random.default_rng(4)
+    size = len(named(machine)[0])
+    rates, accelerations = rng.normal(0.0, 0.1, size), rng.normal(0.0, 1.0, size)
+    parts = dynamics(machine).forces(rates.tolist(), accelerations.tolist())
+    expected = forces_by_differences(machine, rates, accelerations)
+    assert parts["weight"] + parts["inertia"] == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+
+
+def circle(machine, count, share=1.0):
+    """A closed motion through all coordinates of the pose, once round in a second."""
+    names, here = named(machine)
+    time = np.arange(count) / count
+    rng = np.random.default_rng(5)
+    pose, rates, accelerations = {}, {}, {}
+    for name, middle in zip(names, here, strict=True):
+        size, turns, phase = 0.01 * share, 2.0 * np.pi * rng.integers(1, 3), rng.uniform(0.0, 6.0)
+        angle = turns * time + phase
+        pose[name], rates[name] = middle + size * np.sin(angle), size * turns * np.cos(angle)
+        accelerations[name] = -size * turns**2 * np.sin(angle)
+    return Path(pose, rates, accelerations)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_drives_get_back_all_that_friction_does_not_take(name):
+    """The mean of a smooth periodic function over equal steps has no error but round-off."""
+    machine = massive(name, "drives.rotor_damping=1e-4 N*m*s/rad", "damping.hinges=0.02 N*m*s/rad")
+    whole = forces_on_path(rigid_form(state_of(machine)), circle(machine, 256))
+    speed, _, weight, inertia, process, friction, springs = np.moveaxis(whole.drives, 1, 0)
+    power = (speed * (weight + inertia)).sum(axis=0)
+    assert abs(power.mean()) < 1e-10 * np.abs(power).max()
+    assert (speed * friction).sum(axis=0).min() > 0.0
+    assert not process.any()
+    assert not springs.any()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_change_of_mass_less_twice_coriolis_is_skew(name):
+    machine, rng = massive(name), np.random.default_rng(6)
+    names, pose = named(machine)
+    equations, rates = dynamics(machine), rng.normal(0.0, 0.1, len(names))
+    steps = [equations.at(**dict(zip(names, pose + STEP * k * rates, strict=True))) for k in range(-3, 4)]
+    changed = np.einsum("k,kij->ij", FIRST / STEP, np.array([there.mass for there in steps]))
+    both = 2.0 * equations.coriolis(rates.tolist())
+    assert changed == pytest.approx(0.5 * (both + both.T), abs=1e-9 * np.abs(equations.mass).max())
+    assert equations.mass == pytest.approx(equations.mass.T, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta", "planar-3rrr", "zhang-gosselin-4dof", "tripteron"])
+def test_operators_over_pose_and_drives_give_the_forces(name):
+    machine, rng = massive(name), np.random.default_rng(7)
+    equations = dynamics(machine)
+    rates, gains = rng.normal(0.0, 0.1, (2, len(equations.coordinates)))
+    parts = equations.forces(rates.tolist(), gains.tolist())
+    forces = parts["weight"] + parts["inertia"]
+    over_pose = equations.mass @ gains + equations.coriolis(rates.tolist()) @ rates + equations.gravity
+    close = 1e-10 * np.abs(forces).max()
+    assert equations.jacobian.T @ forces == pytest.approx(over_pose, abs=close)
+    whole = forces_on_path(rigid_form(state_of(machine)), single(machine, rates, gains))
+    speeds, accelerations = whole.drives[:, 0, 0] * equations.senses, whole.drives[:, 1, 0] * equations.senses
+    turned = equations.coriolis_at_drives(speeds.tolist()) @ speeds
+    over_drives = equations.mass_at_drives @ accelerations + turned + equations.gravity_at_drives
+    assert over_drives == pytest.approx(forces, abs=close)
+
+
+def single(machine, rates, gains):
+    names, pose = named(machine)
+    return Path(*({n: np.array([v]) for n, v in zip(names, row, strict=True)} for row in (pose, rates, gains)))
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta", "zhang-gosselin-4dof", "tricept"])
+def test_drives_hold_at_rest_what_the_loaded_machine_shows(name):
+    """The stiffer all springs are, the nearer the loaded state is to rigid parts."""
+    machine = massive(name, "load.force=[30, -20, 50]", "load.moment=[1, 2, 3]")
+    stiff = [path for path, k in values(machine).items() if path.startswith("stiffness.") and np.isfinite(k)]
+    machine = with_values(machine, {path: 1e9 * float(values(machine)[path]) for path in stiff})
+    shown = [size for _, size in state_of(machine).actuator_loads]
+    size = len(named(machine)[0])
+    parts = dynamics(machine).forces([0.0] * size, [0.0] * size)
+    forces = sum(parts.values())
+    assert np.abs(forces) == pytest.approx(np.abs(shown), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "zhang-gosselin-4dof", "tripteron"])
+def test_machine_code_does_as_columns_do(name):
+    machine = massive(name, "drives.rotor_friction=0.05 N*m", "damping.hinge_friction=0.1 N*m")
+    form, path = rigid_form(state_of(machine)), circle(machine, 40, share=0.5)
+    columns, program = (forces_on_path(form, path, joints=True, compiled=way) for way in (False, True))
+    for name_ in ("drives", "joints", "inertia"):
+        expected = getattr(columns, name_)
+        assert getattr(program, name_) == pytest.approx(expected, abs=1e-11 * np.abs(expected).max())
+
+
+def test_every_bundled_machine_moves():
+    for name in bundled():
+        machine = massive(name)
+        equations = dynamics(machine)
+        assert np.linalg.eigvalsh(equations.mass).min() > 0.0
+        assert len(equations.drives) == len(equations.coordinates)
