@@ -8,11 +8,12 @@ first one it meets. CI runs all tests with `--hypothesis-profile=fresh`, whose e
 import gc
 import os
 import re
+import shutil
 import sysconfig
+import tempfile
+from functools import partial
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before anything loads NumPy
-
-os.environ.setdefault("KINETOSTAT_CACHE", "off")  # tests change formulas while they run
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -34,9 +35,11 @@ MARKERS = {
     "attack": ("test_attack", "test_judge"),
     "packaging": ("test_packaging",),
     "numbers": (
+        "test_closed_legs",
         "test_derivatives",
         "test_derivatives_leg_by_leg",
         "test_engine",
+        "test_far_rests",
         "test_identified_truth",
         "test_limited_poses",
         "test_optimisers",
@@ -52,6 +55,7 @@ MARKERS = {
         "test_uploads",
         "test_written_files",
     ),
+    "exports": ("test_c_source", "test_machine_page"),
     "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
 """Files of tests that plain `pytest` leaves out, because they take long; `-m slow` runs them. A single test of
@@ -89,6 +93,28 @@ def pytest_addoption(parser):
 BY_FILE = {stem: marker for marker, stems in MARKERS.items() for stem in stems}
 MARKED = re.compile(rf"mark\.(?:slow|{'|'.join(MARKERS)})\b")
 """How a file that is not slow as a whole marks those of its tests that are."""
+
+
+CACHE = "KINETOSTAT_CACHE"
+DRIVEN = "edges"
+"""The folder of what drives commands, messages and files; its tests replace functions, but none of a formula."""
+
+
+def pytest_configure(config):
+    """Compile each program once: all processes of a run share a folder of programs, which begins empty and is removed.
+
+    A run so tests the formulas as they stand, and what it compiles is read back by other processes as in daily use.
+    """
+    if CACHE not in os.environ and not hasattr(config, "workerinput"):
+        os.environ[CACHE] = tempfile.mkdtemp(prefix="kinetostat-programs-")
+        config.add_cleanup(partial(shutil.rmtree, os.environ[CACHE], ignore_errors=True))
+
+
+@pytest.fixture(autouse=True)
+def _changed_formulas_are_not_kept(request):
+    """Leave nothing on disk of tests that may change a formula, and hand nothing to them."""
+    if "monkeypatch" in request.fixturenames and request.path.parent.name != DRIVEN:
+        request.getfixturevalue("monkeypatch").setenv(CACHE, "off")
 
 
 LAWS = "property"

@@ -2,7 +2,16 @@
 
 from pathlib import Path
 
-TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "calibrate", "jupyter")
+TUTORIALS = (
+    "paper-machine",
+    "own-machine",
+    "real-hexapod",
+    "read-a-map",
+    "optimise",
+    "calibrate",
+    "cable-robot",
+    "jupyter",
+)
 PAGES = {
     "Start": ["start", "overview", "install"],
     "Tutorials": [*(f"tutorials/{name}" for name in TUTORIALS), "exercises"],

@@ -67,8 +67,8 @@ __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "carrying_legs", "changed", "command",
     "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export", "forward",
     "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot", "register",
-    "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "under_load", "validate",
-    "validate_measured", "workspace",
+    "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions", "under_load",
+    "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

@@ -116,6 +116,10 @@ UNMOVED_TOOL = 1e-13
 tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
+HANGING = 1e-13
+"""Share of a cable's length below which a step towards its shape is round-off; as level a cable hangs straight down."""
+SAME_DIRECTION = 1e-13
+"""Change of a cable's direction, or of where it leaves its pulley, m, below which it is round-off."""
 DEGENERATE_FACE = 1e-10
 """Product of unit wrenches below which they are dependent and span no face: their round-off is then its direction."""
 SURELY_REGULAR = 1e-6

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,6 +25,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import actuator_targets
 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+QUICKLY = "-O0"
+"""Formulas have hundreds of thousands of characters, and compile eight times as fast without optimisation."""
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 """The C compilers of this machine."""
 LOADED = ["load.force=[2, -3, -10]"]
@@ -36,7 +39,7 @@ class Functions:
     def __init__(self, machine, folder, inputs=None, outputs=None):
         self.source = export(machine, folder / "pkm.c", inputs=inputs, outputs=outputs)[0]
         library = folder / "pkm.so"
-        command = [COMPILERS[0], *WARNINGS, "-O1", "-shared", "-fPIC", str(self.source), "-o", str(library), "-lm"]
+        command = [COMPILERS[0], *WARNINGS, QUICKLY, "-shared", "-fPIC", str(self.source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         self._library = ctypes.CDLL(str(library))
 
@@ -74,10 +77,15 @@ def spreads(matrices):
     return (diagonal[:, :, None] * diagonal[:, None, :]).reshape(-1, 36)
 
 
+@pytest.fixture(scope="module")
+def functions_of(tmp_path_factory):
+    """The functions of a bundled machine, which several tests call."""
+    return cache(lambda name: Functions(load(name), tmp_path_factory.mktemp(name)))
+
+
 @pytest.mark.parametrize("name", printable())
-def test_matrices_and_statuses_are_those_of_the_engine(name, tmp_path):
-    machine = load(name)
-    functions = Functions(machine, tmp_path)
+def test_matrices_and_statuses_are_those_of_the_engine(name, functions_of):
+    machine, functions = load(name), functions_of(name)
     poses, points = poses_of(machine, 1000, 0.3)
     codes, stiffness, compliance = functions.at("matrices", poses, 36, 36)
     found = evaluate(machine, points, ENTRIES, repeated=True)
@@ -100,9 +108,8 @@ def test_matrices_and_statuses_are_those_of_the_engine(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", printable())
-def test_actuators_stand_where_python_says_and_slopes_are_those_of_differences(name, tmp_path):
-    machine = load(name)
-    functions = Functions(machine, tmp_path)
+def test_actuators_stand_where_python_says_and_slopes_are_those_of_differences(name, functions_of):
+    machine, functions = load(name), functions_of(name)
     poses, points = poses_of(machine, 25, 0.05)
     count = len(stand(machine))
     codes, coordinates, slopes = functions.at("actuators", poses, count, count * poses.shape[1])
@@ -124,9 +131,8 @@ def test_actuators_stand_where_python_says_and_slopes_are_those_of_differences(n
 
 
 @pytest.mark.parametrize("name", ["hexapod", "delta", "tricept", "hexapod-hardware"])
-def test_a_pose_comes_back_from_its_actuators(name, tmp_path):
-    machine = load(name)
-    functions = Functions(machine, tmp_path)
+def test_a_pose_comes_back_from_its_actuators(name, functions_of):
+    machine, functions = load(name), functions_of(name)
     poses, _ = poses_of(machine, 200, 0.1)
     size = poses.shape[1]
     codes, coordinates, _ = functions.at("actuators", poses, size, size * size)
@@ -141,8 +147,8 @@ def test_a_pose_comes_back_from_its_actuators(name, tmp_path):
     assert (ends[~ok] != Status.OK).all()
 
 
-def test_coordinates_that_no_pose_has_are_refused(tmp_path):
-    functions = Functions(load("hexapod"), tmp_path)
+def test_coordinates_that_no_pose_has_are_refused(functions_of):
+    functions = functions_of("hexapod")
     forward = functions._library.pkm_forward
     forward.argtypes, forward.restype = [NUMBERS, NUMBERS], ctypes.c_int
     start = poses_of(load("hexapod"), 1, 0.0)[0][0]
@@ -218,7 +224,7 @@ def test_the_written_test_passes_under_sanitizers(compiler, name, settings, outp
     source, header, test, _ = files
     assert header.name == "a.machine-1.h"
     checks = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    for further in (["-O2", *checks], ["-O2", "-DA_MACHINE_1_REAL=float"], ["-O2", "-pedantic"]):
+    for further in ([QUICKLY, *checks], [QUICKLY, "-DA_MACHINE_1_REAL=float"], ["-O2", "-pedantic"]):
         program = tmp_path / "checked"
         command = [compiler, *WARNINGS, *further, str(test), str(source), "-o", str(program), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)

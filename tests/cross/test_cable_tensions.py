@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from kinetostat import evaluate, evaluate_grid, load, under_load, workspace
+from kinetostat import evaluate, evaluate_grid, load, tensions, under_load, workspace
 from kinetostat.engine.batch import evaluate as evaluate_points
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.cables import cables_of
+from kinetostat.equilibrium.catenary import leaving_points
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.sensitivity import sensitivity
 
@@ -172,3 +174,61 @@ def test_poses_that_no_tensions_hold_are_not_at_rest():
     result = values(load("cogiro"), "least_tension", z=[2.0, 5.9])
     assert [int(code) for code in result.status] == [0, 6] or result.status[1] != 0
     assert np.isnan(result.values["least_tension"][1])
+
+
+def test_cables_that_hang_over_pulleys_hold_the_load_by_their_own_shapes():
+    """Forces of the cables at the platform, from spans and tensions that the test reads, balance the weight."""
+    machine = load("cogiro", ["pose.x=3", "pose.yaw=10 deg", "cables.linear_density=0.3", "cables.pulley_radius=8 cm"])
+    cables = cables_of(machine, (1.0,) * 8, 1)
+    shape = cables.shape
+    assert cables.tensions[1][0]
+    span = cables.near - cables.far
+    ahead = span[0] * [1.0, 1.0, 0.0]
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    pulls = shape.across[0][:, None] * ahead + shape.up[0][:, None] * [0.0, 0.0, 1.0]
+    assert np.linalg.norm(pulls, axis=1) == pytest.approx(cables.tensions[0][0], rel=1e-10)
+    columns = {name: np.array([0.0]) for name in ("roll", "pitch")} | {"yaw": np.array([np.radians(10)])}
+    columns |= {"x": np.array([3.0]), "y": np.array([0.0]), "z": np.array([2.0])}
+    _, weight = structure(machine, columns, 0)
+    assert pulls.sum(axis=0) == pytest.approx(-weight[3:], abs=1e-9)
+    assert np.cross(cables.far[0] - [3.0, 0.0, 2.0], pulls).sum(axis=0) == pytest.approx(-weight[:3], abs=1e-9)
+    level, rise = shape.spans
+    assert np.hypot(level, rise)[0] == pytest.approx(np.linalg.norm(span[0], axis=1), abs=1e-10)
+    guides = np.array([machine.tables[f"legs.cable {n}.anchor"].point for n in range(1, 9)])
+    again = leaving_points(guides[None], cables.far, np.array([0.08]), shape.base_slope)[0]
+    assert cables.near == pytest.approx(again, abs=1e-11)
+
+
+def test_cables_of_hardly_any_weight_over_tiny_pulleys_are_straight_ones():
+    light = load("cogiro", ["cables.linear_density=1e-9", "cables.pulley_radius=1e-9"])
+    pairs = zip(tensions(light).cables, tensions(load("cogiro")).cables, strict=True)
+    assert all(a.tension == pytest.approx(b.tension, rel=1e-6) for a, b in pairs)
+
+
+def test_the_answer_has_the_published_tensions_a_reserve_and_the_worst_of_further_loads():
+    answer = tensions(load("cogiro"))
+    assert [round(cable.tension, 1) for cable in answer.cables] == PUBLISHED
+    assert min(cable.reserve for cable in answer.cables) == pytest.approx(min(PUBLISHED) - 50.0, abs=0.05)
+    assert "Cables are straight here" in answer.sag_message
+    pushes = {"load.force.0": [300.0, -300.0], "load.force.1": [0.0, 50.0]}
+    each = [values(load("cogiro", [f"load.force=[{x}, {y}, 0]"]), "capacity", x=0.0) for x, y in ((300, 0), (-300, 50))]
+    both = tensions(load("cogiro"), pushes)
+    assert both.required == 2
+    assert both.capacity == pytest.approx(min(float(one.values["capacity"][0]) for one in each), rel=1e-12)
+    with pytest.raises(InputError, match=r"wrenches has pose.x, which moves the machine"):
+        tensions(load("cogiro"), {"x": [0.0]})
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (
+            ["cables.pulley_radius=5 cm", "cables.linear_density=1", "load.gravity_angle=5 deg"],
+            "gravity is not along z",
+        ),
+        (["cables.exponent=1.5"], "it must be at least 2"),
+    ],
+)
+def test_what_cables_cannot_be_is_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        tensions(load("cogiro", settings))

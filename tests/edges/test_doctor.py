@@ -1,6 +1,7 @@
 """`kinetostat doctor`: what it finds in a sound installation, and what it says where something is broken."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -22,7 +23,8 @@ from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import table_3
 
 
-def test_a_sound_installation(capsys):
+def test_a_sound_installation(capsys, monkeypatch):
+    monkeypatch.setenv(program_files.VARIABLE, program_files.OFF)
     assert main(["doctor", "--json"]) == DONE
     found = json.loads(capsys.readouterr().out)
     assert found["healthy"] is True
@@ -151,7 +153,8 @@ def test_a_broken_library_hides_nothing_else(tmp_path):
     """NumPy that cannot be imported: everything is still said, in words, and nothing is a traceback."""
     (tmp_path / "numpy.py").write_text('raise ImportError("wrong processor")\n')
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from kinetostat.cli import main; exit(main(['doctor']))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    unkept = {**os.environ, program_files.VARIABLE: program_files.OFF}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=unkept)
     assert (done.returncode, done.stderr) == (NO_ANSWER, "")
     said = " ".join(done.stdout.split())
     assert "✗ numpy" in said

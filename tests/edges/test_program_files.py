@@ -374,6 +374,7 @@ def test_linked_code_is_what_llvm_loads():
 
 def test_without_llvm_all_runs_in_numpy(monkeypatch):
     machine = load("hexapod")
+    monkeypatch.setenv(program_files.VARIABLE, program_files.OFF)
     monkeypatch.setitem(sys.modules, "kinetostat.engine.native", None)
     program_of.cache_clear()
     try:

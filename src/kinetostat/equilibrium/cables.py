@@ -1,17 +1,20 @@
 """Cables that hold a platform at n poses: their lines, their tensions, and the wrenches that they can hold.
 
-Cables are straight here, so that the platform's pose alone says along which lines they pull, whatever stretches. A
-machine is one of cables if each of its legs is an actuated slide between two joints that only pulls (or pushes).
+Straight cables pull along lines that the platform's pose alone says, whatever stretches. Those that weigh something,
+or leave the base over pulleys, pull along others, which depend on their tensions. A machine is one of cables if each
+of its legs is an actuated slide between two joints that only pulls (or pushes).
 
-Source: theory (76) to (78).
+Source: theory (76) to (80).
 """
 
 from collections.abc import Collection
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Mask
+from kinetostat.equilibrium.catenary import Hanging, hanging_cables, leaving_points
 from kinetostat.equilibrium.chains import SIGNS
 from kinetostat.equilibrium.state import check_loads
 from kinetostat.frozen import dataclass
@@ -19,12 +22,17 @@ from kinetostat.kinematics.closing import platform_placement
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Leg
-from kinetostat.machine.loads import load_on_platform, platform_masses
-from kinetostat.machine.machine import Chains, Machine
+from kinetostat.machine.loads import gravity_of, load_on_platform, platform_masses
+from kinetostat.machine.machine import Chains, Machine, Step
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.numerics.wrench_sets import capacity, closure
+from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import SAME_DIRECTION
+
+MOST_CHANGES = 60
+"""Of the directions and tensions of cables that hang: each changes the next one by a small share."""
 
 
 def cable_signs(machine: Machine) -> tuple[float, ...]:
@@ -51,22 +59,40 @@ class Cables:
 
     Attributes:
         near, far: where they leave the base, and where they hold the platform, base frame, m [n x cables x 3].
-        wrenches: what a tension of 1 N does to the platform at the tool point, base axes: moments over the length of
-            the machine, so that all is in N; of a planar machine rz, x, y [n x d x cables].
-        load: all loads on the platform, the same way [n x d].
+        directions: those in which they pull the platform, base axes [n x cables x 3].
+        arms: from the tool point to their platform ends, over the length of the machine [n x cables x 3].
+        signs: 1 of each cable, -1 of a leg that only pushes [cables].
+        components: places of those of rx ry rz x y z that exist [d].
+        load: all loads on the platform at the tool point, base axes, moments over the length of the machine, N [n x d].
         least, most: bounds of the tensions, N [n].
         rule: how they are chosen.
         box: half the sizes of the box of wrenches that must be held about the load [n x d].
+        stiffness: of each with its winch, straight, N/m [n x cables].
+        wound: length that lies on its pulley, m [n x cables].
+        shape: how they hang; None of straight ones.
     """
 
     near: Array
     far: Array
-    wrenches: Array
+    directions: Array
+    arms: Array
+    signs: Array
+    components: tuple[int, ...]
     load: Array
     least: Array
     most: Array
     rule: Rule
     box: Array
+    stiffness: Array
+    wound: Array
+    shape: Hanging | None = None
+
+    @cached_property
+    def wrenches(self) -> Array:
+        """Wrenches of tensions of 1 N at the tool point, moments over the length of the machine [n x d x cables]."""
+        lines = self.directions * self.signs[:, None]
+        whole = np.concatenate([np.cross(self.arms, lines), lines], axis=2)
+        return whole[:, :, list(self.components)].transpose(0, 2, 1)
 
     @cached_property
     def tensions(self) -> tuple[Array, Mask]:
@@ -86,7 +112,7 @@ class Cables:
 
 
 def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
-    """Place the cables of a machine.
+    """Place the cables of a machine: straight, or as they hang and leave their pulleys where its file describes these.
 
     Args:
         machine: the machine with columns of n poses, and its loads.
@@ -94,40 +120,100 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
         count: number of poses, n.
 
     Raises:
-        InputError: gravity pulls, but nothing says a mass.
+        InputError: gravity pulls, but nothing says a mass; or pulleys of a planar machine, or of one that is tilted.
     """
-    chains = machine.chains()
+    chains, planar = machine.chains(), machine.family.planar
     platform = platform_placement(chains)
-    check_loads(machine, count, bool(platform_masses(machine, platform)))
+    table, load = machine.tables["cables"], machine.tables["load"]
+    density, radius = stacked_columns([table.linear_density, table.pulley_radius], count).T
+    check_loads(machine, count, bool(platform_masses(machine, platform)) or bool(density.any()))
     moved, tool = platform @ chains.home.inverse(), machine.tool_point(platform)
-    ends = [rod for rod in _rods(chains, machine.family.planar) if rod is not None]
+    ends = [rod for rod in _rods(chains, planar) if rod is not None]
     near, far = (
         np.stack([of_scalars(point.components(), count) for point in points], axis=1)
         for points in ([rod.start for rod in ends], [moved.apply(rod.end) for rod in ends])
     )
-    if machine.family.planar:
+    if planar:
         near[:, :, 2] = far[:, :, 2] = 0.0
-    span, arm = near - far, far - of_scalars(tool.components(), count)[:, None]
-    line = span * (np.array(signs)[:, None] / np.sqrt((span * span).sum(axis=2, keepdims=True)))
-    length = of_scalars([chains.length], count)[:, 0]
-    moment = np.cross(arm, line) / length[:, None, None]
-    parts = list(machine.family.components)
+    length = of_scalars([chains.length], count)
     wrench = of_scalars(load_on_platform(machine, platform).components(), count)
-    wrench[:, :3] /= length[:, None]
-    table, load = machine.tables["cables"], machine.tables["load"]
-    least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
     box = np.abs(stacked_columns([*table.moment_box, *table.force_box], count))
-    box[:, :3] /= length[:, None]
-    return Cables(
+    wrench[:, :3], box[:, :3] = wrench[:, :3] / length, box[:, :3] / length
+    least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    parts = machine.family.components
+    cables = Cables(
         near,
         far,
-        np.concatenate([moment, line], axis=2)[:, :, parts].transpose(0, 2, 1),
+        _units(near - far),
+        (far - of_scalars(tool.components(), count)[:, None]) / length[:, None],
+        np.array(signs),
+        parts,
         wrench[:, parts],
         np.where(np.isinf(least), 0.0, least),
         most,
         Rule(*stacked_columns([table.level, table.exponent], count).T),
         box[:, parts],
+        of_scalars([step.element.springs[0].stiffness for leg in chains.legs for step in leg if _sprung(step)], count),
+        np.zeros(near.shape[:2]),
     )
+    gravity = of_scalars(gravity_of(load).components(), count)
+    weight = density * np.linalg.norm(gravity, axis=1)
+    if not (weight.any() or radius.any()):
+        return cables
+    if radius.any() and (planar or (gravity[:, :2].any() and weight.any())):
+        raise InputError(
+            f"{machine.name}: cables.pulley_radius is that of pulleys which swivel about the z axis of the base, so "
+            "that cables hang and pull in planes through it; leave it out of a planar machine, and where gravity is "
+            "not along z."
+        )
+    return _hanging_cables(cables, np.where(weight[:, None] > 0.0, -_units(gravity), [0.0, 0.0, 1.0]), weight, radius)
+
+
+def _sprung(step: Step) -> bool:
+    return bool(step.element.springs)
+
+
+def _units(vectors: Array) -> Array:
+    sizes = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    return np.asarray(vectors / np.where(sizes > 0.0, sizes, 1.0))
+
+
+def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
+    """Cables as they hang with the tensions that they then have, over their pulleys.
+
+    Directions and tensions depend on each other; with the directions of one step the next tensions are chosen, until
+    nothing changes. Cables sag little, so that each step changes hardly more than a hundredth of the one before.
+
+    Args:
+        cables: straight, without pulleys.
+        up: against gravity [n x 3].
+        weight: of a metre of unstretched cable, N/m [n].
+        radius: of the pulleys, m [n].
+    """
+    hung, guides, heavy = cables, cables.near, weight > 0.0
+    rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
+    for _ in range(MOST_CHANGES):
+        span = hung.near - hung.far
+        rise = np.einsum("nmk,nk->nm", span, up)
+        sideways = span - rise[:, :, None] * up[:, None]
+        level = np.sqrt((sideways * sideways).sum(axis=2))
+        tensions = np.where(np.isnan(hung.tensions[0]), np.inf, hung.tensions[0])
+        known = np.isfinite(tensions) & heavy[:, None] & (tensions > 0.0)
+        shape = hanging_cables(
+            level, rise, np.where(known, tensions, 1.0), np.where(heavy, weight, 1.0)[:, None] + 0.0 * level, rigidity
+        )
+        slope = np.where(known, np.arctan2(shape.up, shape.across), np.arctan2(rise, level))
+        leaving = np.where(known, shape.base_slope, np.arctan2(rise, level))
+        directions = np.cos(slope)[:, :, None] * _units(sideways) + np.sin(slope)[:, :, None] * up[:, None]
+        near, wound = guides, cables.wound
+        if radius.any():
+            near, wound = leaving_points(guides, cables.far, radius, leaving)
+        turned, moved = np.abs(directions - hung.directions), np.abs(near - hung.near)
+        changed = max(np.nan_to_num(turned).max(), np.nan_to_num(moved).max())
+        hung = replace(cables, near=near, directions=directions, wound=wound, shape=shape if heavy.any() else None)
+        if changed < SAME_DIRECTION:
+            break
+    return hung
 
 
 def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple[dict[str, Array], Codes]:

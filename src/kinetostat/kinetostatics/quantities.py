@@ -208,8 +208,8 @@ def _of_cable(response: Response, name: str) -> Scalar:
 def _of_cables() -> list[MapQuantity]:
     tensions = [(f"tension_{number}", rf"$\tau_{{{number}}}$", None) for number in range(1, MOST_CABLES + 1)]
     others: list[tuple[str, str, Better]] = [
-        ("least_tension", r"$\tau_\mathrm{min}$", "more"),
-        ("greatest_tension", r"$\tau_\mathrm{max}$", "less"),
+        ("least_tension", "least tension", "more"),
+        ("greatest_tension", "greatest tension", "less"),
         ("tension_reserve", "reserve of the tensions", "more"),
         ("capacity", "capacity", "more"),
     ]

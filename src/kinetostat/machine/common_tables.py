@@ -124,7 +124,7 @@ class Load:
 class CableTable:
     """Table [cables], in any machine file: which tensions are chosen, what they must hold, and what the cables are.
 
-    How tensions are distributed counts wherever they are chosen; the box, where capacity is asked for.
+    How tensions are distributed counts wherever they are chosen; the rest, where tensions and capacity are asked for.
     """
 
     level: Annotated[float, Quantity("force", "tension to which all are brought as near as can be; 0: the least")] = 0.0
@@ -142,6 +142,12 @@ class CableTable:
         tuple[float, float, float],
         Quantity("moment", "by which moments x, y, z about the load must be held too, base axes", count=3, apart=True),
     ] = (0.0, 0.0, 0.0)
+    linear_density: Annotated[
+        float, Quantity("linear density", "of unstretched cable, which then sags; 0: cables are straight")
+    ] = 0.0
+    pulley_radius: Annotated[
+        float, Quantity("length", "of pulleys at the base, which swivel about the vertical through `from`; 0: none")
+    ] = 0.0
 
 
 @table

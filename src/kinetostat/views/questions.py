@@ -20,6 +20,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "show what stiffness depends on, what counts as rigid, what to change",
         "views.guidelines.GUIDELINES_QUESTION",
     ),
+    "tensions": (
+        "compute the tensions of cables, their sag, and what they can hold besides",
+        "views.tensions.TENSIONS_QUESTION",
+    ),
     "modes": (
         "compute natural frequencies and modes, and the receptance of the tool",
         "views.vibration.MODES_QUESTION",
@@ -43,6 +47,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.analysis.Analysis": "views.analysis.ANALYSIS",
     "studies.assembly.Forward": "views.forward.FORWARD",
     "studies.under_load.LoadedState": "views.analysis.LOADED",
+    "studies.tensions.Tensions": "views.tensions.TENSIONS",
     "studies.vibration.Vibration": "views.vibration.VIBRATION",
     "studies.evaluation.PoseAnswers": "views.path.PATH",
     "xarray.Dataset": "views.grid.GRID",

@@ -1,0 +1,131 @@
+"""Tensions of cables: the question, and the description of its answer. Nothing is computed here."""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from kinetostat.display import number
+from kinetostat.studies.setting import setting_of
+from kinetostat.studies.tensions import Tensions, tensions
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
+from kinetostat.views.tables import numeric_table
+
+BAR = 0.28
+"""Inches of a cable's bar."""
+
+
+def _lines(answer: Tensions) -> Lines:
+    show = answer.machine.display.show
+    yield "Tensions", answer.message
+    about = "the load" if answer.required == 1 else f"the {answer.required} required loads"
+    if math.isinf(answer.capacity):
+        sentence = "No bound limits what the cables can hold."
+    elif answer.capacity >= 0.0:
+        sentence = f"{show(answer.capacity, 'N')} in any direction may come to {about} before a bound is passed."
+    else:
+        sentence = f"What the cables can hold ends {show(-answer.capacity, 'N')} before {about}."
+    yield "Capacity", sentence
+    closed = answer.wrench_closure > 0.0
+    yield (
+        "Closure",
+        "Cables without an upper bound hold any wrench here."
+        if closed
+        else "Cables alone cannot hold every wrench here, however hard they pull: they need the load.",
+    )
+    yield "Sag", answer.sag_message
+
+
+def _tables(answer: Tensions, _full: bool) -> Iterator[FittedTable]:
+    show, hangs = answer.machine.display.show, any(cable.sag for cable in answer.cables)
+    heads = ["tension", "reserve", "length", *(["at the base", "sag", "stiffness kept"] if hangs else [])]
+    table = numeric_table("Cables", "cable", heads)
+    for cable in answer.cables:
+        forces = [("-" if value is None else show(value, "N")) for value in (cable.tension, cable.reserve)]
+        row = [*forces, show(cable.length, "m")]
+        if hangs:
+            base = "-" if cable.base_tension is None else show(cable.base_tension, "N")
+            row += [base, show(cable.sag, "m"), f"{number(100.0 * cable.stiffness_share)} %"]
+        table.add_row(cable.name, *row)
+    yield table
+
+
+def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figure:
+    """Draw the tension of each cable as a bar between the bounds."""
+    scale = answer.machine.display.scale("N")
+    sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
+    least, most = (bound * scale.factor for bound in answer.bounds)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.0, 1.3 + BAR * len(sizes)), layout="constrained")
+        panel = figure.add_subplot()
+        names = [cable.name for cable in answer.cables]
+        bars = panel.barh(names, sizes, height=0.7, color=COLOURS[0])
+        panel.bar_label(bars, [number(size) for size in sizes], padding=3, fontsize="small")
+        panel.invert_yaxis()
+        panel.margins(x=0.12)
+        panel.set_xlabel(scale.label("tension"))
+        panel.grid(visible=False, axis="y")
+        panel.set_axisbelow(True)
+        within = [bound for bound in (least, most) if 0.0 < bound < 3.0 * max(sizes)]
+        for bound in within:
+            panel.axvline(bound, color=COLOURS[1], linewidth=1.2, label="bound" if bound == within[0] else None)
+        if within:
+            panel.legend(loc="upper right", frameon=False, fontsize="small", bbox_to_anchor=(1.0, 1.12))
+        set_title(figure, title.format(answer.machine.name))
+        note_setting(figure, setting_of(answer.machine))
+        fix_layout(figure)
+    return figure
+
+
+def _figures(answer: Tensions) -> dict[str, Drawing]:
+    if any(cable.tension is None for cable in answer.cables):
+        return {}
+    return {"tensions": Drawing("Tension of each cable, and the bounds that are near.", partial(_figure, answer))}
+
+
+TENSIONS = Description(
+    title="Tensions of the cables",
+    fields=(
+        *FIRST_FIELDS,
+        Field("capacity", unit="N", long_name="distance of the load from the end of what the cables can hold"),
+        Field("wrench_closure", long_name="positive where cables without an upper bound hold any wrench"),
+        Field("required", long_name="number of loads that the capacity is about"),
+        Field("min_tension", lambda answer: answer.bounds[0], "N", "least tension that is allowed"),
+        Field("max_tension", lambda answer: answer.bounds[1], "N", "greatest tension that is allowed"),
+        Records(
+            "cables",
+            "cable",
+            (
+                Field("name"),
+                Field("tension", unit="N", long_name="tension at the platform"),
+                Field("base_tension", unit="N", long_name="tension where the cable leaves the base"),
+                Field("reserve", unit="N", long_name="distance of the tension from the nearer bound"),
+                Field("length", unit="m", long_name="unstretched length to the drum side of its pulley"),
+                Field("sag", unit="m", long_name="greatest distance from the line of its ends"),
+                Field("stiffness_share", long_name="share of a straight cable's stiffness along that line"),
+            ),
+        ),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=_figures,
+    answered=lambda answer: answer.cables[0].tension is not None,
+    files={"tensions.json": "json", "tensions.csv": "csv", "tensions.nc": "nc"},
+)
+TENSIONS_QUESTION = Question(
+    example="kinetostat tensions cogiro --set cables.linear_density='0.064 kg/m' -o tensions",
+    answer=tensions,
+    options=(
+        Option(
+            "wrenches",
+            "file",
+            "CSV file of loads that must be held at this pose, for the capacity; heads such as load.force.2 [N]",
+            metavar="FILE",
+        ),
+    ),
+    output="tensions.json, tensions.csv, tensions.nc and the figure",
+)
