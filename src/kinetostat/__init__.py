@@ -21,6 +21,7 @@ _HOMES = {
     "analyze": "kinetostat.studies.analysis",
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",
+    "capability": "kinetostat.studies.capability",
     "modes": "kinetostat.studies.vibration",
     "dynamics": "kinetostat.studies.dynamics",
     "state_of": "kinetostat.equilibrium.state",
@@ -58,17 +59,18 @@ _SHOWN = {
     "Command": "kinetostat.studies.commanding",
     "CorrectionTable": "kinetostat.studies.corrections",
     "Carrying": "kinetostat.studies.carrying",
+    "Capability": "kinetostat.studies.capability",
     "Budget": "kinetostat.studies.budget.budget",
     "Result": "kinetostat.studies.optimisation.result",
 }
 """Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
 __all__ = [
-    "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "carrying_legs", "changed", "command",
-    "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export", "forward",
-    "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot", "register",
-    "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions", "under_load",
-    "validate", "validate_measured", "workspace",
+    "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
+    "changed", "command", "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export",
+    "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot",
+    "register", "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions",
+    "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

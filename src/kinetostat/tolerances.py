@@ -245,6 +245,8 @@ does not reach the other one. Without it, round-off times infinity would make en
 UNFELT = 1e-11
 """Share of the load that a spring can have per unit load of the platform below which what it adds to C is round-off:
 legs that share a load by least energy leave some 1e-12 of it in a spring that should feel nothing."""
+SAME_VERTEX = 1e-10
+"""Share of the size of a polytope within which two vertices are one, and of a slope below which a face is not met."""
 DEPENDENT_GENERATORS = 1e-9
 """Determinant of orthonormal internal loads in some drives below which these are dependent: the face that they would
 make of a set of wrenches is one that others make, or none."""

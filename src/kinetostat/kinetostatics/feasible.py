@@ -194,11 +194,13 @@ class Face:
     Attributes:
         normal: a twist, base axes, at the tool point; of no certain size.
         lower, upper: W, infinite where nothing bounds the set.
+        drives: numbers of the drives that are at their bounds there.
     """
 
     normal: Twist
     lower: Scalar
     upper: Scalar
+    drives: tuple[int, ...] = ()
 
     @property
     def room(self) -> Scalar:
@@ -232,7 +234,7 @@ def wrench_faces(
             before = amount * carried[drive]
             lower, upper = lower + smaller(*ends) - before, upper + larger(*ends) - before
             normal = normal + given.shares[drive] * amount
-        faces.append(Face(normal, lower, upper))
+        faces.append(Face(normal, lower, upper, tuple(drive for drive, _ in mix)))
     return faces
 
 

@@ -94,15 +94,19 @@ class Response:
         return transmission(self.configuration, self.legs, self.guide)
 
     @cached_property
-    def faces(self) -> list[Face]:
-        """The wrenches that the drives hold beside the loads that count already, theory (80).
+    def drive_loads(self) -> list[Scalar]:
+        """Load of each drive by the loads that count already, N or N·m.
 
-        Of a machine that is meant under its loads, drives carry what they carry at rest; NaN where that is not known.
+        Of a machine that is meant under its loads, it is what it carries at rest; NaN where that is not known.
         """
-        shares, unknown = self.transmission.shares, [math.nan] * len(self.drives)
-        at_rest = (self.loaded or {}).get("drive_loads", unknown)
-        carried = at_rest if self.meant_loaded else [self.load.work(share) for share in shares]
-        return wrench_faces(self.transmission, [(drive.lower, drive.upper) for drive in self.drives], carried)
+        if self.meant_loaded:
+            return list((self.loaded or {}).get("drive_loads", [math.nan] * len(self.drives)))
+        return [self.load.work(share) for share in self.transmission.shares]
+
+    @cached_property
+    def faces(self) -> list[Face]:
+        """The wrenches that the drives hold beside the loads that count already, theory (80)."""
+        return wrench_faces(self.transmission, [(drive.lower, drive.upper) for drive in self.drives], self.drive_loads)
 
     @property
     def undecided(self) -> bool:

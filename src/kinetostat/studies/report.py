@@ -19,7 +19,7 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
-from kinetostat.machine.limits import is_set
+from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
@@ -31,6 +31,7 @@ from kinetostat.spec.study import study_toml
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.budget.budget import budget
 from kinetostat.studies.bundled import bundled_studies, is_study
+from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
@@ -176,6 +177,9 @@ REPORT_QUESTIONS = (
     ReportQuestion("requirements", lambda known: requirements(known.state)),
     ReportQuestion("under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded),
     ReportQuestion("budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances)),
+    ReportQuestion(
+        "capability", lambda known: capability(known.state), lambda known: bool(limits_of_drives(known.state))
+    ),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
     ReportQuestion(
         "maps",
@@ -193,8 +197,8 @@ REPORT_QUESTIONS = (
     ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
 )
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
-error budget where the file has tolerances, vibrations where it has masses, and frequencies over the poses of the maps
-where there are modes."""
+error budget where the file has tolerances, capability where it limits its drives, vibrations where it has masses, and
+frequencies over the poses of the maps where there are modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
 
@@ -241,6 +245,11 @@ def gather(
     return known
 
 
+def _has_limits(state: MachineState) -> bool:
+    """Whether the file limits loads or speeds of its drives."""
+    return bool(limits_of_drives(state))
+
+
 def _has_mass(machine: Machine) -> bool:
     """Whether the file says what the platform or its payload weighs."""
     return bool(machine.tables["tool"].mass or machine.tables["tool"].payload)
@@ -272,8 +281,7 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
         machine: whose pose has an answer.
         count: of points of each.
     """
-    limited = machine.tables["limits"]
-    kinds = FARTHEST_LIMITED if any(map(is_set, vars(limited).values())) else FARTHEST_FREE
+    kinds = FARTHEST_LIMITED if limits_set(machine.tables["limits"]) else FARTHEST_FREE
     coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
     ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
     length, ranges = float(state_of(machine).configuration.length), []

@@ -111,7 +111,7 @@ def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> Fitte
     for stiffness in along:
         forces = (display.number(k, "N/m", "rigid") for k in (stiffness.force, stiffness.force_held))
         moments = (display.number(k, "N·m/rad", "rigid") for k in (stiffness.moment, stiffness.moment_held))
-        table.add_row(_direction(stiffness.direction), *forces, *moments)
+        table.add_row(direction_words(stiffness.direction), *forces, *moments)
     return table
 
 
@@ -128,11 +128,12 @@ def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES)]
     alike = len(pairs) - len(others)
     if alike == 1:
-        return next(_direction(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES))
-    return f"any ⊥ {_direction(others[0])}" if others else "any"
+        return next(direction_words(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES))
+    return f"any ⊥ {direction_words(others[0])}" if others else "any"
 
 
-def _direction(vector: Sequence[float]) -> str:
+def direction_words(vector: Sequence[float]) -> str:
+    """A direction by its three numbers, "+0.71 +0.00 -0.71"."""
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
@@ -149,7 +150,7 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
     for i, screw in enumerate(screws, 1):
         point = "–" if screw.point is None else _point(screw.point, display)
         cells = (display.number(screw.eigenvalue, "N/rad", "infinite"), display.number(screw.pitch, "m", "infinite"))
-        table.add_row(str(i), *cells, _direction(screw.direction), point)
+        table.add_row(str(i), *cells, direction_words(screw.direction), point)
     return table
 
 

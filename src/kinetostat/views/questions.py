@@ -28,6 +28,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute natural frequencies and modes, and the receptance of the tool",
         "views.vibration.MODES_QUESTION",
     ),
+    "capability": (
+        "compute the forces, moments and speeds that the drives allow at a pose",
+        "views.capability.CAPABILITY_QUESTION",
+    ),
     "budget": (
         "compute the error of the tool that tolerances allow, and what it is made of",
         "views.budget.BUDGET_QUESTION",
@@ -59,6 +63,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.guidelines.Guidelines": "views.guidelines.GUIDELINES",
     "studies.commanding.Command": "views.command.COMMAND",
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
+    "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.budget.Budget": "views.budget.BUDGET",
     "studies.budget.budget.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
     "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",

@@ -1,0 +1,300 @@
+"""The question of what the drives of a machine can do at its pose: forces, moments and speeds in every direction.
+
+Sets of wrenches and twists as such are in `kinetostatics.feasible`; here they are cut to forces at no moment, moments
+at no force, and motions without turning or moving, and put into sentences.
+
+Source: theory (79)-(82). At the tool point, base axes.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest, state_of
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.feasible import (
+    BLOCKS,
+    Transmission,
+    drive_limits,
+    greatest_ball,
+    greatest_speed,
+)
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.actuators import name_of
+from kinetostat.machine.limits import is_set
+from kinetostat.machine.machine import Machine
+from kinetostat.numerics.polytopes import reach_along, vertices
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.indices import unit_direction
+from kinetostat.studies.quantities import refuse_absent
+from kinetostat.tolerances import DEPENDENT
+
+NO_REST = "{} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
+
+
+@dataclass(frozen=True)
+class DriveAtPose:
+    """A drive at a pose.
+
+    Attributes:
+        name: of the joint that it drives.
+        lower, upper: least and greatest load, N or N·m, positive where its joint is pulled open; infinite if not set.
+        carried: what it carries by the loads that count, N or N·m.
+        speed: greatest speed, m/s or rad/s; infinite if not set.
+        slides: whether it is linear.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    carried: float
+    speed: float
+    slides: bool
+
+
+@dataclass(frozen=True)
+class CapabilitySet:
+    """All forces, moments, speeds or angular speeds that the drives allow: a convex polytope about zero.
+
+    Attributes:
+        name: "force", "moment", "speed" or "rate".
+        unit: SI.
+        least: radius of the largest ball in it: what the drives allow in whichever direction; negative where they do
+            not hold the loads that count already.
+        greatest: in the best direction; infinite where structure holds it without a drive.
+        weakest: unit vector of the direction in which it is least [3].
+        limited_by: names of the drives that are at their limits there.
+        normals: of its half-spaces [m x 3].
+        bounds: of these, A x <= b [m].
+        directions: a basis of the directions that it has, as columns [3 x k]: those in which drives limit a load, or
+            structure allows a motion.
+        vertices: [n x 3]; none where it has no end, or the loads are not held.
+    """
+
+    name: str
+    unit: str
+    least: float
+    greatest: float
+    weakest: tuple[float, ...]
+    limited_by: tuple[str, ...]
+    normals: Array
+    bounds: Array
+    directions: Array
+    vertices: Array
+
+    def along(self, direction: Sequence[float]) -> float:
+        """The greatest amount along a direction, in SI; 0 where the machine cannot move so.
+
+        Args:
+            direction: three numbers of any size, base axes.
+
+        Raises:
+            InputError: the direction is zero.
+        """
+        way = np.array(unit_direction(direction, "direction"))
+        stopped = np.linalg.norm(way - self.directions @ (self.directions.T @ way)) > DEPENDENT
+        if stopped:
+            return 0.0 if self.name in ("speed", "rate") else math.inf
+        return reach_along(self.normals, self.bounds, way)
+
+
+@dataclass(frozen=True, eq=False)
+class Capability(Immutable):
+    """The forces, moments and speeds that the drives of a machine allow at its pose.
+
+    Attributes:
+        state: of the machine.
+        status: of the pose.
+        message: the answer in a sentence or two.
+        drives: with their limits and what they carry.
+        sets: of forces, moments, speeds and angular speeds, as far as the file limits drives and the machine has them.
+        direction: that was asked for, base axes; empty if none.
+    """
+
+    state: MachineState
+    status: Status
+    message: str
+    drives: tuple[DriveAtPose, ...] = ()
+    sets: tuple[CapabilitySet, ...] = ()
+    direction: tuple[float, ...] = ()
+
+    @property
+    def machine(self) -> Machine:
+        """The machine with its pose."""
+        return self.state.machine
+
+    @property
+    def loads_left_out(self) -> str:
+        """A sentence on the loads of the file that do not count; empty where all do."""
+        return self.state.left_out
+
+    def set_of(self, name: str) -> CapabilitySet | None:
+        """The set of a name, "force", "moment", "speed" or "rate"; None where there is none."""
+        return next((each for each in self.sets if each.name == name), None)
+
+
+@checked
+def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> Capability:
+    """Find which forces, moments and speeds the drives of a machine allow at its pose.
+
+    Loads come beside those of the file: the platform's to first order, or all of them at rest where `machine.loaded`.
+
+    Args:
+        machine: with its pose, or its state; its drives are limited by [limits], and by [load] if they only pull.
+        along: a direction that is looked at, base axes; none if empty.
+
+    Raises:
+        InputError: nothing limits the drives, or the direction is zero.
+    """
+    state = state_of(machine)
+    direction = tuple(unit_direction(along, "along")) if along else ()
+    kinds = limits_of_drives(state)
+    if not kinds:
+        refuse_absent(state, ["least_wrench_force"])
+    if state.status is not Status.OK:
+        return Capability(state, state.status, state.refusal)
+    if state.machine.loaded and not (state.at_rest is not None and state.stands):
+        return Capability(state, Status.NO_REST, NO_REST.format(state.machine.name))
+    response = _with_loads(state)
+    drives = _drives(response)
+    sets = []
+    for block in ("translation", "rotation"):
+        loads = _wrenches(response, drives, block) if "load" in kinds else None
+        rates = _twists(response, drives, block) if "speed" in kinds else None
+        sets += [each for each in (loads, rates) if each is not None]
+    return Capability(state, Status.OK, _message(state.machine, sets), drives, tuple(sets), direction)
+
+
+def limits_of_drives(state: MachineState) -> set[str]:
+    """Return which of "load" and "speed" the file of a machine limits of its drives; none where it limits neither."""
+    drives = drive_limits(state.machine, state.configuration)
+    loads = any(is_set(drive.lower) or is_set(drive.upper) for drive in drives)
+    speeds = any(is_set(drive.speed) for drive in drives)
+    return {what for what, known in (("load", loads), ("speed", speeds)) if known}
+
+
+def _with_loads(state: MachineState) -> Response:
+    """The machine at its pose, with what its drives carry at rest where it is meant so."""
+    if not state.machine.loaded or state.at_rest is None:
+        return state.free
+    carried = [float(load[0]) for _, load in actuator_loads_at_rest(state.at_rest)]
+    return replace(state.free, loaded={"drive_loads": carried})
+
+
+def _drives(response: Response) -> tuple[DriveAtPose, ...]:
+    return tuple(
+        DriveAtPose(
+            name_of(drive.spring),
+            float(drive.lower),
+            float(drive.upper),
+            float(carried),
+            float(drive.speed),
+            drive.spring.joint.point is None,
+        )
+        for drive, carried in zip(response.drives, response.drive_loads, strict=True)
+    )
+
+
+def _wrenches(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet:
+    """The forces at no moment, or the moments at no force, that the drives hold beside the loads that count."""
+    part = BLOCKS[block]
+    length = float(response.configuration.length)
+    normals, bounds, names = [], [], []
+    for face in response.faces:
+        normal = np.array(face.normal.components(), dtype=float)
+        whole = np.linalg.norm(normal * np.repeat([length, 1.0], 3))
+        if np.linalg.norm(normal[part]) * (length if block == "rotation" else 1.0) <= DEPENDENT * whole:
+            continue
+        for sign, bound in ((1.0, face.upper), (-1.0, -face.lower)):
+            normals.append(sign * normal[part])
+            bounds.append(float(bound))
+            names.append(tuple(drives[drive].name for drive in face.drives))
+    matrix = np.array(normals).reshape(-1, 3)
+    least = float(greatest_ball(response.faces, part, length))
+    name, unit = ("force", "N") if block == "translation" else ("moment", "N·m")
+    return _set(name, unit, least, matrix, np.array(bounds), _row_space(matrix), names)
+
+
+def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
+    """The velocities without turning, or the turns about the tool point, that the drives allow; None if it has none."""
+    given, part = response.transmission, BLOCKS[block]
+    if given.wrenches is None:
+        return None
+    stopped = np.array([wrench.components() for wrench in given.constraints], dtype=float).reshape(-1, 6)[:, part]
+    directions = _null_space(stopped, given, block)
+    if not directions.shape[1]:
+        return None
+    rates = np.array([wrench.components() for wrench in given.wrenches], dtype=float).reshape(-1, 6)[:, part]
+    rates = rates @ directions @ directions.T
+    felt = np.linalg.norm(rates, axis=1) > DEPENDENT * np.linalg.norm(rates, axis=1).max(initial=0.0)
+    speeds = np.array([drive.speed for drive in drives])
+    names = [(drive.name,) for drive, seen in zip(drives, felt, strict=True) if seen]
+    least = float(greatest_speed(given, [drive.speed for drive in response.drives], part))
+    name, unit = ("speed", "m/s") if block == "translation" else ("rate", "rad/s")
+    matrix, bounds = np.vstack([rates[felt], -rates[felt]]), np.tile(speeds[felt], 2)
+    return _set(name, unit, least, matrix, bounds, directions, names * 2)
+
+
+def _set(
+    name: str,
+    unit: str,
+    least: float,
+    normals: Array,
+    bounds: Array,
+    directions: Array,
+    names: Sequence[tuple[str, ...]],
+) -> CapabilitySet:
+    sizes = np.linalg.norm(normals, axis=1)
+    reaches = bounds / sizes
+    ended = None
+    if len(bounds) and (bounds > 0.0).all():
+        ended = vertices((normals / sizes[:, None]) @ directions, reaches)
+    corners = np.zeros((0, 3)) if ended is None else ended @ directions.T
+    greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else math.inf
+    if not np.isfinite(least):
+        return CapabilitySet(name, unit, least, greatest, (), (), normals, bounds, directions, corners)
+    worst = int(np.argmin(reaches))
+    weakest = tuple(float(c) for c in normals[worst] / sizes[worst])
+    return CapabilitySet(name, unit, least, greatest, weakest, names[worst], normals, bounds, directions, corners)
+
+
+def _row_space(matrix: Array) -> Array:
+    """An orthonormal basis of the directions that some row feels [3 x k]."""
+    if not len(matrix):
+        return np.zeros((3, 0))
+    _, values, rows = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(rows[values > DEPENDENT * values[0]].T)
+
+
+def _null_space(stopped: Array, given: Transmission, block: str) -> Array:
+    """An orthonormal basis of the directions that no wrench of structure stops [3 x k]."""
+    scaled = stopped / float(given.length) if block == "rotation" else stopped
+    if not len(scaled):
+        return np.eye(3)
+    _, values, rows = np.linalg.svd(scaled)
+    return np.asarray(rows[int((values > DEPENDENT).sum()) :].T)
+
+
+SENTENCES = {
+    "force": "hold {} in whichever direction a force acts",
+    "moment": "hold {} about whichever axis a moment acts",
+    "speed": "move the tool at {} in whichever direction",
+    "rate": "turn the tool at {} about whichever axis",
+}
+"""Phrases about the least amount of a set, which stands in the braces."""
+
+
+def _message(machine: Machine, sets: Sequence[CapabilitySet]) -> str:
+    phrases = [
+        SENTENCES[each.name].format(machine.display.show(each.least, each.unit))
+        for each in sets
+        if each.name in ("force", "speed") and math.isfinite(each.least)
+    ]
+    if any(each.least < 0.0 for each in sets):
+        return "The drives do not hold the loads that count already."
+    return f"The drives {' and '.join(phrases)}." if phrases else "No drive limits a force or a speed of the tool here."
