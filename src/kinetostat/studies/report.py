@@ -245,11 +245,6 @@ def gather(
     return known
 
 
-def _has_limits(state: MachineState) -> bool:
-    """Whether the file limits loads or speeds of its drives."""
-    return bool(limits_of_drives(state))
-
-
 def _has_mass(machine: Machine) -> bool:
     """Whether the file says what the platform or its payload weighs."""
     return bool(machine.tables["tool"].mass or machine.tables["tool"].payload)
