@@ -7,7 +7,7 @@ its file. A row of `ROWS` says where one may vary more widely. Stiffnesses need 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from math import radians
+from math import cos, pi, radians, sin
 
 import pytest
 from hypothesis import settings
@@ -269,3 +269,31 @@ def with_bodies(name, settings):
             given |= {"mass": 3.0, "centre_of_mass": [0.1 * number, 0.05, 0.02]}
             given |= {"inertia": [0.3, 0.4, 0.5, 0.02, -0.03, 0.04]}
     return build(document, "bodies")
+
+
+def hangprinter():
+    """A printer that hangs on cables: three pairs of parallel ones from low anchors, and three from the ceiling."""
+
+    def turned(angle, x, y, z):
+        cosine, sine = cos(angle), sin(angle)
+        return [cosine * x - sine * y, sine * x + cosine * y, z]
+
+    rows = []
+    for k in range(3):
+        low, high = 2.0 * pi * k / 3.0 - 0.5 * pi, 2.0 * pi * k / 3.0 + pi / 6.0
+        rows += [(turned(low, 1.8, y, -0.12), turned(low, 0.12, y, 0.0), 25.0) for y in (-0.16, 0.16)]
+        rows.append((turned(high, 0.15, 0.0, 2.6), turned(high, 0.15, 0.0, 0.0), 18.0))
+    cables = [
+        f'[[legs]]\nname = "cable {k}"\ntype = "cable"\nfrom = {near}\nto = {far}\nstiffness = 20000\npreload = {pull}'
+        for k, (near, far, pull) in enumerate(rows, 1)
+    ]
+    head = """
+        schema = 1
+        name = "Hangprinter"
+        family = "legs"
+        platform.point = [0, 0, 0]
+        tool = {offset = [0, 0, -0.1], mass = "1.1 kg", centre_of_mass = [0, 0, 0.05]}
+        load.gravity = [0, 0, -9.81]
+        pose = {x = 0, y = 0, z = 0, roll = 0, pitch = 0, yaw = 0}
+    """
+    return build("\n".join([head, *cables]))

@@ -10,19 +10,23 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from kinetostat import build, export, load
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.kernel import closes_inside
+from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
-from kinetostat.exchange.machine_functions import ENTRIES
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import actuator_targets
+from kinetostat.studies.under_load import under_load
+from machines import hangprinter
 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
 QUICKLY = "-O0"
@@ -278,3 +282,32 @@ def test_names_in_a_file_are_never_code(tmp_path):
         assert "int x;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
         assert "int y;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
     subprocess.run([COMPILERS[0], *WARNINGS, "-c", str(source), "-o", str(tmp_path / "pkm.o")], check=True)
+
+
+def test_a_hanging_printer_stands_where_it_should_after_the_exported_command(tmp_path):
+    """Its cables are commanded by C; where the loaded model then comes to rest is found by SciPy and the solver."""
+    machine = hangprinter()
+    functions = Functions(machine, tmp_path)
+    names = [path for path in values(machine) if path.startswith("pose.")]
+    drawn = np.random.default_rng(4).uniform(-1.0, 1.0, (4, 6))
+    poses = np.ascontiguousarray(drawn * [0.5, 0.5, 0.4, 0.0, 0.0, 0.0] + [0.0, 0.0, 0.4, 0.0, 0.0, 0.0])
+    codes, coordinates = functions.at("command", poses, 9)
+    assert not codes.any()
+
+    def at(pose):
+        return with_values(machine, dict(zip(names, map(float, pose), strict=True)))
+
+    def place(loaded):
+        state = under_load(loaded)
+        return np.array(respond(loaded).reference.components()) + state.displacement[3:]
+
+    for pose, commanded in zip(poses, coordinates, strict=True):
+        wanted = np.array(respond(at(pose)).reference.components())
+        before = np.linalg.norm(place(at(pose)) - wanted)
+        assert before > 3e-4, "m"
+        found = least_squares(
+            lambda p, goal=commanded: [float(a.coordinate) - c for a, c in zip(stand(at(p)), goal, strict=True)],
+            pose, xtol=1e-15, ftol=1e-15, gtol=1e-15,
+        )  # fmt: skip
+        assert np.abs(found.fun).max() < 1e-12, "the cables are as long as at one pose"
+        assert np.linalg.norm(place(at(found.x)) - wanted) < 1e-6 * before

@@ -21,7 +21,7 @@ from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
 from kinetostat.numerics.motions import of_scalars
-from kinetostat.tolerances import DEPENDENT
+from kinetostat.tolerances import DEPENDENT, PARALLEL_AXES
 
 SIGNS = {"": 0.0, "pulls": 1.0, "pushes": -1.0}
 """Sign of the loads that a spring carries if it carries those of one sign only, by what its file says."""
@@ -389,21 +389,42 @@ def elastic_leg(
 
 
 def _rod(leg: Leg, units: Units, weights: Sequence[Vector]) -> tuple[Array, Array] | None:
-    """Both ends of a leg that is a rod between two joints with one centre each, and its springs along it."""
-    if len(leg.lines) != 1:
+    """Both ends of a leg that is a rod between two joints with one centre each, and its springs along it.
+
+    A family says so by the line of its force. A leg of a file is judged by its numbers; those of a program are judged
+    before it is traced (`cut.cut_machine`).
+    """
+    if len(leg.lines) > 1:
         return None
-    (line,), turning = leg.lines, [number for number, element in enumerate(leg.chain) if element.freedoms]
+    turning = [number for number, element in enumerate(leg.chain) if element.freedoms]
     slides = [number for number, element in enumerate(leg.chain) if element.springs]
     ends = [leg.chain[n].freedoms[0].point for n in (0, -1) if leg.chain[n].freedoms]
-    if len(ends) != 2 or slides != list(range(slides[0], slides[-1] + 1)) or set(slides) & set(turning):
+    if len(ends) != 2 or not slides or slides != list(range(slides[0], slides[-1] + 1)) or set(slides) & set(turning):
         return None
     points = [ends[number > slides[0]] for number in turning]
     centred = all(j.point is p for n, p in zip(turning, points, strict=True) for j in leg.chain[n].freedoms)
-    straight = all(spring.joint.point is None and spring.joint.axis is line.direction for spring in leg.springs)
-    if not (centred and straight and all(any(point is end for end in ends) for point in weights)):
+    if not (centred and all(any(point is end for end in ends) for point in weights)):
         return None
     near, far = (units.points([end])[:, 0] for end in ends if end is not None)
-    return near, far
+    if leg.lines:
+        straight = all(s.joint.point is None and s.joint.axis is leg.lines[0].direction for s in leg.springs)
+    else:
+        axes = [joint for number in turning for joint in leg.chain[number].freedoms]
+        at_base = sum(joint.point is ends[0] for joint in axes)
+        balls = min(at_base, len(axes) - at_base) >= 2 and len(axes) >= 5 and not any(j.pitch for j in axes)
+        straight = balls and all(
+            s.joint.point is None and _is_along(s.joint.axis, far - near, units) for s in leg.springs
+        )
+    return (near, far) if straight else None
+
+
+def _is_along(axis: Vector, span: Array, units: Units) -> bool:
+    """Whether an axis has the direction of a rod [n x 3] at all poses; of a program it has been judged before."""
+    if units.count is None:
+        return True
+    across = np.cross(of_scalars(axis.components(), units.count), span)
+    sizes = np.linalg.norm(across, axis=1) / np.linalg.norm(span, axis=1)
+    return bool(np.all(sizes[np.isfinite(sizes)] < PARALLEL_AXES))
 
 
 def _idle(chain: Chain, springs: Sequence[Spring | None]) -> Array:

@@ -25,6 +25,9 @@ from kinetostat.machine.machine import Machine
 TENSIONS = ("load.min_tension", "load.max_tension")
 """Leaf paths of what makes preloads a choice."""
 
+PLACES = frozenset(("point", "axis", "first_axis", "second_axis"))
+"""Words of leaf paths that place joints of machines written leg by leg."""
+
 
 @dataclass(frozen=True)
 class ElasticRod:
@@ -125,6 +128,11 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
     state = state_of(machine)
     with np.errstate(all="ignore"):
         machine_cut = cut(mechanism_of(machine, state.configuration, state.joints))
+    # Legs of a file are rods by their numbers, which must then stay as they are.
+    if any(not leg.lines for leg in state.configuration.legs) and any(
+        PLACES.intersection(p.split(".")) for p in varying
+    ):
+        return None
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
