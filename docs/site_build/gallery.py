@@ -11,6 +11,7 @@ from kinetostat.engine.kernel import closes_inside
 from kinetostat.exchange.formats import export
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.views.live_page import VIEWER, viewer
 from kinetostat.views.picture import Theme, machine_picture
 
 FOLDER, LIVE = "generated", "live"
@@ -44,10 +45,11 @@ def moves(name: str) -> bool:
 
 
 def write_pages(app: Sphinx, error: Exception | None) -> None:
-    """Put the pages of bundled machines beside those of the site."""
+    """Put the pages of bundled machines beside those of the site, and the one that shows the machine of its address."""
     if error is not None or app.builder.name != "html":
         return
     (Path(app.outdir) / LIVE).mkdir(exist_ok=True)
+    (Path(app.outdir) / LIVE / VIEWER).write_text(viewer(), "utf-8")
     for name in filter(moves, bundled()):
         export(load(name), Path(app.outdir) / LIVE / f"{name}.html")
 

@@ -24,7 +24,6 @@ PAGES = {
         "functions",
         "loads",
         "capability",
-        "drives",
         "vibration",
         "budget",
         "calibration",

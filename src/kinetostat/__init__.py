@@ -23,7 +23,6 @@ _HOMES = {
     "under_load": "kinetostat.studies.under_load",
     "capability": "kinetostat.studies.capability",
     "modes": "kinetostat.studies.vibration",
-    "drives": "kinetostat.studies.drives",
     "dynamics": "kinetostat.studies.dynamics",
     "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
@@ -68,10 +67,10 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
-    "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "evaluate", "evaluate_grid",
-    "export", "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize",
-    "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space",
-    "tensions", "under_load", "validate", "validate_measured", "workspace",
+    "changed", "command", "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export",
+    "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot",
+    "register", "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions",
+    "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

@@ -1,29 +1,34 @@
 """The page of a machine in a real browser, opened from disk: its formulas, its looks, its address, its manners."""
 
+import base64
 import json
 import re
+import zlib
 
 import numpy as np
 import pytest
 from browser import browser, needs_chromium
 
-from kinetostat import export, load
+from kinetostat import analyze, export, load
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.kernel import closes_inside
+from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
-from kinetostat.exchange.machine_functions import ENTRIES
+from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
-from kinetostat.machine.parameters import values
-from kinetostat.spec.errors import InputError
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.studies.attribution import by_part
+from kinetostat.views.live_page import viewer
 
 POSES = 1000
 AGREED = 1e-12
 LARGEST_PAGE = 500_000
 """Bytes of a page at most."""
+LONGEST_ADDRESS = 8192
 PROGRAMS = """rows => rows.map(row => {
     const out = new Float64Array(42);
-    const status = programs.answers(row, out);
+    const status = opened.programs.answers(row, out);
     return [status, ...Array.from(out, x => Number.isFinite(x) ? x : String(x))];
 })"""
 
@@ -54,10 +59,179 @@ def test_the_file_in_a_page_is_the_machine(pages):
     assert data["fileName"] == "tripteron.toml"
 
 
-def test_states_of_rest_are_refused(tmp_path):
-    machine = load("hexapod", ["load.force=[0, 0, -10]"])
-    with pytest.raises(InputError, match="--to c"):
-        export(machine, tmp_path / "page.html", outputs=["displacement_z"])
+def test_the_papers_machine_fits_into_an_address(tmp_path):
+    for name in ("zhang-gosselin-4dof", "hexapod", "tripteron"):
+        text = export(load(name), tmp_path / "link.txt", to="link")[0].read_text("ascii")
+        assert re.fullmatch(r"viewer\.html#m=[\w-]+\n", text)
+        assert len(text) <= LONGEST_ADDRESS, name
+
+
+@pytest.fixture(scope="module")
+def viewer_page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("viewer") / "viewer.html"
+    path.write_text(viewer(), "utf-8")
+    return path
+
+
+def ready(watched, address):
+    watched.tab.goto("about:blank")
+    watched.tab.goto(address)
+    watched.tab.wait_for_function("document.documentElement.dataset.check")
+    assert watched.tab.evaluate("document.documentElement.dataset.check") == "ok"
+
+
+@needs_chromium
+def test_an_address_gives_the_numbers_of_its_page(pages, viewer_page, tmp_path):
+    """Programs that are data give the very numbers of the printed ones, and the pose is in the address too."""
+    with browser() as new_tab:
+        watched = new_tab()
+        for name in ("zhang-gosselin-4dof", "hexapod-hardware", "planar-3rrr"):
+            machine = load(name)
+            home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
+            rows = (np.array(home) + 0.05 * np.random.default_rng(2).uniform(-1, 1, (50, len(home)))).tolist()
+            ready(watched, pages[name].as_uri())
+            expected = watched.tab.evaluate(PROGRAMS, rows)
+            link = export(machine, tmp_path / "link.txt", to="link")[0].read_text("ascii").strip()
+            first = next(key for key in values(machine) if key.startswith("pose.")).removeprefix("pose.")
+            ready(watched, f"{viewer_page.as_uri()}#{link.partition('#')[2]}&{first}=0.0123")
+            assert watched.tab.evaluate(PROGRAMS, rows) == expected
+            assert watched.tab.title() == machine.name
+            assert watched.tab.evaluate("location.hash").endswith(f"&{first}=0.0123")
+            watched.tab.wait_for_function("document.querySelector('.slider input[type=number]').value !== ''")
+            assert float(watched.tab.get_by_role("spinbutton").first.input_value()) == pytest.approx(12.3)
+            assert not watched.complaints
+            assert watched.hosts <= {""}
+
+
+def damaged(content):
+    text = json.dumps(content, separators=(",", ":")).encode()
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return base64.urlsafe_b64encode(deflate.compress(text) + deflate.flush()).decode().rstrip("=")
+
+
+def opened_content(link):
+    text = link.split("#m=")[1].strip()
+    return json.loads(zlib.decompress(base64.urlsafe_b64decode(text + "=" * (-len(text) % 4)), -15))
+
+
+EVIL = "1);globalThis.evil=1;("
+
+
+@pytest.fixture(scope="module")
+def link_content(tmp_path_factory):
+    path = export(load("delta"), tmp_path_factory.mktemp("link") / "link.txt", to="link")[0]
+    return opened_content(path.read_text("ascii"))
+
+
+@needs_chromium
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda c: c["packed"]["answers"].update(code="#" + EVIL), "cannot be opened"),
+        (lambda c: c["packed"]["answers"]["numbers"].__setitem__(0, EVIL), "a number is damaged"),
+        (lambda c: c["packed"]["answers"].update(references="$" * 9), "a reference is damaged"),
+        (lambda c: c["packed"]["answers"].update(code="c"), "an operation is damaged"),
+        (lambda c: c["packed"]["answers"].update(code="#" * 500000), "too long"),
+        (lambda c: c.update(format=2), "of another version"),
+        (lambda c: c["data"].update(name="<img src=x onerror=globalThis.evil=1>" * 9), ""),
+        (lambda c: c["data"]["actuators"][0].update(name="<img src=x onerror=globalThis.evil=1>"), ""),
+        (lambda c: c["data"]["actuators"][0].update(si="<img src=x onerror=globalThis.evil=1>"), ""),
+        (lambda c: c["data"]["inputs"][0].update(name="<img src=x onerror=globalThis.evil=1>"), ""),
+    ],
+)
+def test_an_address_is_data_and_never_code(change, says, viewer_page, link_content):
+    content = json.loads(json.dumps(link_content))
+    change(content)
+    with browser() as new_tab:
+        watched = new_tab()
+        watched.tab.goto(f"{viewer_page.as_uri()}#m={damaged(content)}")
+        watched.tab.wait_for_function("document.querySelector('#status').textContent")
+        assert says in watched.text("#status")
+        assert watched.tab.evaluate("globalThis.evil ?? 0") == 0
+        assert watched.tab.locator("img").count() == 0
+
+
+@needs_chromium
+def test_a_viewer_without_a_machine_says_what_it_is_for(viewer_page):
+    with browser() as new_tab:
+        watched = new_tab()
+        watched.tab.goto(viewer_page.as_uri())
+        watched.tab.wait_for_function("document.querySelector('#status').textContent")
+        assert "the machine that its address describes" in watched.text("#status")
+        watched.tab.goto("about:blank")
+        watched.tab.goto(f"{viewer_page.as_uri()}#m=abc")
+        watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+        assert not watched.complaints
+
+
+@needs_chromium
+def test_the_pose_follows_an_actuator(pages):
+    machine = load("hexapod")
+    wanted = with_values(machine, {"pose.x": 0.004, "pose.roll": 0.05})
+    coordinates = [float(actuator.coordinate) for actuator in stand(wanted)]
+    with browser() as new_tab:
+        watched = new_tab()
+        ready(watched, pages["hexapod"].as_uri())
+        home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
+        found = watched.tab.evaluate(
+            "([wanted, start]) => poseOf(wanted, start, opened.data, opened.programs)", [coordinates, home]
+        )
+        expected = [float(value) for key, value in values(wanted).items() if key.startswith("pose.")]
+        assert found == pytest.approx(expected, abs=1e-13)
+        field = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
+        field.fill("96")
+        field.press("Enter")
+        watched.tab.wait_for_function("location.hash.includes('x=')")
+        assert float(field.input_value()) == pytest.approx(96.0)
+        field.fill("500")
+        field.press("Enter")
+        watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+        assert "No pose nearby" in watched.text("#status")
+        assert not watched.complaints
+
+
+@needs_chromium
+def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path):
+    machine = load("hexapod", ["load.force=[20, -30, -100]", "tool.mass=2 kg"])
+    names = ["frequency_1", "displacement_z", "displacement_rx"]
+    page = export(machine, tmp_path / "page.html", outputs=names, inputs=["load.force.2"])[0]
+    home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
+    home["load.force.2"] = -100.0
+    spread = [0.01, 0.01, 0.01, 0.1, 0.1, 0.1, 80.0]
+    rows = np.array([*home.values()]) + np.random.default_rng(3).uniform(-1, 1, (100, 7)) * spread
+    table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
+    expected = evaluate(machine, table, names)
+    analysis = analyze(machine)
+    with browser() as new_tab:
+        watched = new_tab()
+        ready(watched, page.as_uri())
+        found = watched.tab.evaluate(
+            """rows => rows.map(row => {
+                const { data, programs } = opened, free = new Float64Array(43), loaded = new Float64Array(8);
+                const status = programs.answers(row, free);
+                programs.loaded(row, loaded, restOf(row, data.rest, programs));
+                return [status, free[42], loaded[6], loaded[7]];
+            })""",
+            rows.tolist(),
+        )
+        shares = watched.tab.evaluate(
+            """() => {
+                const out = new Float64Array(6 * opened.data.parts.length), C = new Float64Array(43);
+                const home = opened.data.inputs.map(({ home }) => home);
+                opened.programs.shares(home, out); opened.programs.answers(home, C);
+                return opened.data.parts.map((name, n) => [name, out[6 * n + 5] / C[20]]);
+            }"""
+        )
+        assert not watched.complaints
+    found = np.array(found)
+    np.testing.assert_array_equal(found[:, 0], expected.status)
+    np.testing.assert_allclose(found[:, 1], expected.values["frequency_1"], rtol=1e-9)
+    for k, name in enumerate(names[1:], 2):
+        np.testing.assert_allclose(found[:, k], expected.values[name], rtol=1e-9, atol=1e-14)
+    parts = {part: sum(c.compliance_share[5] for c in rows) for part, rows in by_part(analysis.attribution).items()}
+    assert {name: share for name, share in shares if share > 1e-9} == pytest.approx(
+        {name: share for name, share in parts.items() if share > 1e-9}, rel=1e-10
+    )
 
 
 @needs_chromium
@@ -114,11 +288,12 @@ def test_a_page_follows_its_address_and_its_sliders(pages):
         expected = evaluate(machine, table, ["stiffness_z"]).values["stiffness_z"][0]
         shown = watched.tab.locator("#matrix tr:last-child td:last-child").inner_text()
         assert float(shown) == pytest.approx(1e-6 * expected, rel=1e-3)
-        before = watched.text("#actuators")
+        length = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
+        before = length.input_value()
         watched.tab.get_by_role("slider", name="z, mm").focus()
         watched.tab.keyboard.press("ArrowRight")
-        watched.until_changed("#actuators", before)
         watched.tab.wait_for_function("location.hash.includes('z=')")
+        assert length.input_value() != before
         watched.tab.get_by_role("button", name="As in the file").click()
         watched.tab.wait_for_function("location.hash === ''")
         watched.tab.get_by_role("button", name="Compliance C").click()

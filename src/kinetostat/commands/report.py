@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.result import Result
 
 EXPORT_FORMATS = (
-    "mjcf", "mjcf-vibration", "urdf", "c", "mex", "linuxcnc", "fmu", "page", "glb", "step", "csv", "netcdf", "mat",
-    "modes", "state-space", "klipper", "reprapfirmware", "nastran", "abaqus", "ansys",
+    "mjcf", "mjcf-vibration", "urdf", "c", "mex", "linuxcnc", "fmu", "page", "link", "glb", "step", "csv", "netcdf",
+    "mat", "modes", "state-space", "klipper", "reprapfirmware", "nastran", "abaqus", "ansys",
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, where
+from kinetostat.algebra.scalar import Scalar, is_zero, where
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.engine.trace import Body, Graph, Operand, Traced
@@ -21,10 +21,11 @@ from kinetostat.kinematics.closing import Joints, closing_equations, within_reac
 from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.assembly import compliance_shares
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, in_order
 from kinetostat.vibration.slopes import vibrating
@@ -276,6 +277,42 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
     formula = formula_of(given, (), results, result_of(status), paths)
     legs = zip((leg.name for leg in configuration.legs), map(len, points), strict=True)
     return TracedPlacement(formula, tuple(actuators), tuple(legs))
+
+
+@dataclass(frozen=True)
+class TracedShares:
+    """The compliance that parts of a machine contribute.
+
+    Attributes:
+        formula: whose results are what each part contributes to each diagonal entry of C, [part x 6] row by row, SI;
+            NaN where the status is not OK.
+        parts: names of the parts, those of springs that are not rigid.
+    """
+
+    formula: TracedFormula
+    parts: tuple[str, ...]
+
+
+def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
+    """Trace what the parts of a machine contribute to its compliance.
+
+    Args:
+        kind: of a machine.
+        form: how its parameters enter.
+        closed: as for `objectives_of`.
+    """
+    given = traced_machine(kind, form)
+    joints, columns = traced_joints(given, closed)
+    response = respond(given.machine, joints)
+    accepted = response.status < Status.OK + 0.5
+    parts: dict[str, list[Scalar]] = {}
+    for spring, share in zip(springs(response.configuration), compliance_shares(response.statics), strict=True):
+        diagonal = [share.entry(i, i) for i in range(6)]
+        if not all(is_zero(entry) for entry in diagonal):
+            known = parts.get(str(spring.of))
+            parts[str(spring.of)] = [a + b for a, b in zip(known, diagonal, strict=True)] if known else diagonal
+    results = [result_of(where(accepted, value, math.nan)) for row in parts.values() for value in row]
+    return TracedShares(formula_of(given, columns, results, result_of(response.status), ()), tuple(parts))
 
 
 def new_inputs(graph: Graph, count: int) -> tuple[Traced, ...]:

@@ -1,5 +1,7 @@
 """Prints a traced graph as straight-line source code of another language: no loop, no call but those of the table.
 
+`pack_graph` writes it as a short text that fits into an address: data, no code, which the reader checks.
+
 Each operation is a row of `NOTATION`. An operation that is used once stands inside of the expression that uses it, as
 long as a line stays short; everything else has a line and a name of its own. Nothing is rounded: numbers are printed
 with all digits, and operations stay those of the graph, so that the code gives what machine code and NumPy give.
@@ -146,3 +148,68 @@ def literal(number: float, language: Language) -> str:
     if math.isinf(number):
         return language.infinity if number > 0.0 else f"-{language.infinity}"
     return repr(float(number))
+
+
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+"""Digits of packed counts, five bits each; those of the second half say that another digit follows."""
+NUMBER, EARLIER = "#", "@"
+"""Letters of a packed program for a number of its table, and for a value that was kept."""
+
+
+def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str, object]:
+    """Write what some results need as a program for a stack: short, and data rather than code.
+
+    Each letter of `code` does one thing. `#` lays a number on the stack, and `@` a value that was kept; which one, the
+    next count of `references` says. Kept are the inputs and, in capitals, what operations give that is used again;
+    the value that was kept or used last is counted 0, so that counts are small. A letter from a on is an operation of
+    `NOTATION` that takes its operands from the stack and lays its value there. At the end the results lie there.
+
+    Args:
+        inputs: all inputs of the graph, of which the first one is counted 0 at the start.
+        results: nodes of the graph, or numbers.
+
+    Returns:
+        Texts `code` and `references`, and the list `numbers`, where words stand for what JSON cannot write.
+
+    Raises:
+        ValueError: a result needs another input.
+    """
+    used = needed(results)
+    uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
+    uses.update(result.number for result in results if isinstance(result, Node))
+    letters = {operation: chr(ord("a") + place) for place, operation in enumerate(NOTATION)}
+    kept = [given.number for given in inputs]
+    numbers: dict[str, int] = {}  # by their digits, so that 0 is not -0
+    code: list[str] = []
+    counts: list[int] = []
+    waiting: list[tuple[Operand, bool]] = [(result, False) for result in reversed(results)]
+    while waiting:
+        operand, ready = waiting.pop()
+        if not isinstance(operand, Node):
+            code.append(NUMBER)
+            counts.append(numbers.setdefault(repr(float(operand)), len(numbers)))
+        elif ready:
+            again = uses[operand.number] > 1
+            code.append(letters[operand.operation].upper() if again else letters[operand.operation])
+            if again:
+                kept.insert(0, operand.number)
+        elif operand.number in kept:
+            counts.append(kept.index(operand.number))
+            kept.insert(0, kept.pop(counts[-1]))
+            code.append(EARLIER)
+        elif operand.operation == "input":
+            raise ValueError("a result depends on an input that is not given")
+        else:
+            waiting.append((operand, True))
+            waiting += [(earlier, False) for earlier in reversed(operand.operands)]
+    table = [float(digits) if math.isfinite(float(digits)) else digits for digits in numbers]
+    return {"code": "".join(code), "references": "".join(map(_digits, counts)), "numbers": table}
+
+
+def _digits(count: int) -> str:
+    """A count in digits of `LETTERS`, the least first."""
+    text = ""
+    while count >= 32:
+        text += LETTERS[32 + count % 32]
+        count //= 32
+    return text + LETTERS[count]

@@ -16,6 +16,7 @@ from hashlib import sha256
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from kinetostat.engine.machine_functions import MachineFunctions, functions_of
 from kinetostat.exchange.c_source import (
     STEPS_OF_COMMAND,
     ascii_units,
@@ -27,7 +28,6 @@ from kinetostat.exchange.c_source import (
     prefix_of,
     with_names,
 )
-from kinetostat.exchange.machine_functions import MachineFunctions, functions_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.machine.loading import as_toml
@@ -80,7 +80,7 @@ def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
     words = {
         "note": note(functions, "Made by"),
         "name": in_comment(functions.machine.name).replace('"', "'"),
-        "axes": listing([f"{letters[a]}: {path}" for a, (path, _) in zip(axes, functions.given, strict=True)]),
+        "axes": listing([f"{letters[a]}: {path}" for a, (path, _) in zip(axes, functions.arguments, strict=True)]),
         "joints": listing([f"{k}: {in_comment(a.name)}, {a.meaning}" for k, a in enumerate(functions.actuators)]),
         "library": f"{header}\n{source}",
         "joint_units": ", ".join(map(repr, joints)),
@@ -199,13 +199,13 @@ def _variables(functions: MachineFunctions) -> list[ModelVariable]:
     rows = [ModelVariable("time", "s", (0.0,), False, (), "time")]
     rows += [
         ModelVariable(path, si.get(kind, ""), (float(known[path]),), True, (), "first_input")
-        for path, kind in functions.given
+        for path, kind in functions.arguments
     ]
     if functions.square:
         rows += [ModelVariable(f"driven.{a.name}", a.unit, (float(a.coordinate),), True, (), "driven") for a in driven]
         rows += [
             ModelVariable(f"reached.{path.removeprefix(POSE)}", si[kind], (float(known[path]),), False, (), "reached")
-            for path, kind in functions.given[: functions.coordinates]
+            for path, kind in functions.arguments[: functions.coordinates]
         ]
     rows += [computed("K", "", "stiffness", 6, 6), computed("C", "", "compliance", 6, 6)]
     rows += [computed(f"coordinate.{a.name}", a.unit, "coordinates") for a in functions.actuators]

@@ -21,12 +21,21 @@ from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.form import objectives_of, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
+from kinetostat.engine.machine_functions import (
+    DISPLACEMENTS,
+    ENTRIES,
+    SHORTEST_SHARE,
+    STEPS_FORWARD,
+    MachineFunctions,
+    functions_of,
+    quantities_at,
+    sample_points,
+)
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import C, literal, print_graph
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.exchange.formats import ascii_line
-from kinetostat.exchange.machine_functions import ENTRIES, MachineFunctions, functions_of, quantities_at, sample_points
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
@@ -44,11 +53,8 @@ FILE_NAME = re.compile(r"[\w.-]+$", re.ASCII)
 TEMPLATES = Path(__file__).with_name("c")
 PLACE = 12
 """Numbers that place the tool: T and the columns of Q."""
-DISPLACEMENTS = [name for name in QUANTITIES if name.startswith("displacement_")]
-STEPS_FORWARD, STEPS_OF_COMMAND = 30, 30
-"""Steps of forward kinematics, and poses that are tried until the loaded tool is where it should be."""
-SHORTEST_SHARE = 1e-4
-"""Share of a step of forward kinematics below which no shorter one is tried."""
+STEPS_OF_COMMAND = 30
+"""Poses that are tried until the loaded tool is where it should be."""
 AGREED = 1e-10
 """Share of the largest number of its kind by which C and Python may differ in the test."""
 
@@ -197,8 +203,7 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         constants.append(f"static const int IS_SLIDE[MACHINE_ACTUATORS] = {{{sliding}}};")
         numbers |= {"CLOSED": CLOSED, "SHORTEST_SHARE": SHORTEST_SHARE, "STEPS_FORWARD": STEPS_FORWARD}
     if functions.rests:
-        size = len(step_of(functions.specimen, functions.form, functions.closed).body.results) - 1
-        numbers |= {"STATES": size, "STEPS_AT_REST": MOST_NEWTON_STEPS, "ONE_STEP_AWAY": ONE_STEP_AWAY}
+        numbers |= {"STATES": functions.states, "STEPS_AT_REST": MOST_NEWTON_STEPS, "ONE_STEP_AWAY": ONE_STEP_AWAY}
         numbers |= {"COMMANDED": COMMANDED, "STEPS_OF_COMMAND": STEPS_OF_COMMAND}
     constants += [f"#define {name} {number!r}" for name, number in numbers.items()]
     words = {
@@ -219,7 +224,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
         work["command"] = STEPS_OF_COMMAND * (work["rest"] + work["placement_at"])
-    given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.given)]
+    given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.arguments)]
     driven = [f"[{k}]: {in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
     sizes = (len(functions.inputs), functions.coordinates, len(functions.actuators), len(functions.quantities))

@@ -22,7 +22,7 @@ class Format:
     Attributes:
         name: the name as in `kinetostat export --to`.
         suffix: the suffix of its files.
-        writer: "module.function" in this package; the function takes an analysis and a path, writes, and returns the
+        writer: "module.function" in kinetostat; the function takes an analysis and a path, writes, and returns the
             paths of the files it made.
         summary: what is in it, for lists.
         other_suffixes: suffixes that are also common for its files.
@@ -52,82 +52,89 @@ class Format:
             if kind not in self.options:
                 able = ", ".join(form.name for form in KNOWN if kind in form.options)
                 raise InputError(f"The format {self.name} has no {kind} to choose; {able} have: use --to.")
-        module, _, function = self.writer.partition(".")
-        write: Callable[..., list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
+        module, _, function = self.writer.rpartition(".")
+        write: Callable[..., list[Path]] = getattr(import_module(f"kinetostat.{module}"), function)
         return write(analysis, path, **chosen)
 
 
 CHANNELS = ("inputs", "outputs")
 KNOWN = (
-    Format("mjcf", ".xml", "mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
+    Format("mjcf", ".xml", "exchange.mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format(
         "mjcf-vibration",
         ".xml",
-        "mjcf.write_vibrating",
+        "exchange.mjcf.write_vibrating",
         "the same with the machine's own masses and no damping: it vibrates as the machine does",
     ),
     Format(
         "urdf",
         ".urdf",
-        "urdf_export.write",
+        "exchange.urdf_export.write",
         "machine as URDF with closed loops and stiffnesses; read back by new --from",
     ),
     Format(
         "c",
         ".c",
-        "c_source.write",
+        "exchange.c_source.write",
         "functions in C99: K, C, actuators, derivatives, the way back, the command under load",
         options=CHANNELS,
     ),
     Format(
         "mex",
         ".c",
-        "c_programs.write_mex",
+        "exchange.c_programs.write_mex",
         "the same functions for MATLAB and Octave: C with the adapter that mex compiles",
         options=CHANNELS,
     ),
     Format(
         "linuxcnc",
         ".comp",
-        "c_programs.write_linuxcnc",
+        "exchange.c_programs.write_linuxcnc",
         "kinematics for LinuxCNC, compensated under load if wanted: a component for halcompile",
     ),
     Format(
         "fmu",
         ".fmu",
-        "c_programs.write_fmu",
+        "exchange.c_programs.write_fmu",
         "model of FMI 3.0 for co-simulation: K, C, actuators and the way back, from pose and parameters",
         options=CHANNELS,
     ),
     Format(
         "page",
         ".html",
-        "page.write",
+        "views.live_page.write",
         "one file for a browser: picture, sliders, K, C, actuators and a map, by the machine's own formulas",
         options=CHANNELS,
     ),
-    Format("glb", ".glb", "solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
+    Format(
+        "link",
+        ".txt",
+        "views.live_page.write_link",
+        "the same as the end of an address, of at most 8 kB for most machines, for a viewer page",
+        options=CHANNELS,
+    ),
+    Format("glb", ".glb", "exchange.solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
     Format(
         "step",
         ".step",
-        "solids.write_step",
+        "exchange.solids.write_step",
         "solids of the machine as exact bodies, an assembly for CAD programs",
         (".stp",),
     ),
-    Format("csv", ".csv", "results.write_csv", "results at the pose, a number a line with its unit"),
-    Format("netcdf", ".nc", "results.write_netcdf", "results at the pose, labelled, with units"),
-    Format("mat", ".mat", "results.write_mat", "K, C, pose and reference point for MATLAB"),
+    Format("csv", ".csv", "exchange.results.write_csv", "results at the pose, a number a line with its unit"),
+    Format("netcdf", ".nc", "exchange.results.write_netcdf", "results at the pose, labelled, with units"),
+    Format("mat", ".mat", "exchange.results.write_mat", "K, C, pose and reference point for MATLAB"),
     Format(
         "modes",
         ".csv",
-        "vibration_files.write_modes",
+        "exchange.vibration_files.write_modes",
         "natural frequencies, motions of the tool and modal masses, as modes -o writes them",
         (".nc",),
     ),
     Format(
         "state-space",
         ".mat",
-        "vibration_files.write_state_space",
+        "exchange.vibration_files.write_state_space",
         "A, B, C, D of the vibrating machine, from chosen forces to chosen motions",
         (".nc",),
         options=CHANNELS,
@@ -135,20 +142,20 @@ KNOWN = (
     Format(
         "klipper",
         ".cfg",
-        "height_map.write_klipper",
+        "exchange.height_map.write_klipper",
         "heights over x and y that keep the loaded tool at its z, as a mesh of Klipper",
         options=("over",),
     ),
     Format(
         "reprapfirmware",
         ".csv",
-        "height_map.write_reprapfirmware",
+        "exchange.height_map.write_reprapfirmware",
         "the same as a height map of RepRapFirmware",
         options=("over",),
     ),
-    Format("nastran", ".bdf", "finite_elements.write_nastran", "K at the tool point as DMIG"),
-    Format("abaqus", ".inp", "finite_elements.write_abaqus", "K at the tool point as a linear user element"),
-    Format("ansys", ".mac", "finite_elements.write_ansys", "K at the tool point as MATRIX27, in APDL"),
+    Format("nastran", ".bdf", "exchange.finite_elements.write_nastran", "K at the tool point as DMIG"),
+    Format("abaqus", ".inp", "exchange.finite_elements.write_abaqus", "K at the tool point as a linear user element"),
+    Format("ansys", ".mac", "exchange.finite_elements.write_ansys", "K at the tool point as MATRIX27, in APDL"),
 )
 """Every format, machines first; a suffix belongs to the first of those that have it."""
 

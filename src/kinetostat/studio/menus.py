@@ -24,6 +24,9 @@ REPORTS = (
     ("report, PDF", ".pdf", "for a design review, to print"),
 )
 """Name, suffix and description of each kind of report."""
+SHARED = ("page", "link")
+"""Formats for people who have no kinetostat."""
+SHARE = "Share and export: reports, the machine as a page or a link, and formats of other programs"
 BUSY = "Another file is being written; wait until it is done."
 WRITING = Turns(2, BUSY)
 """Files of all tabs that are written at a time."""
@@ -37,14 +40,15 @@ class FilesMenu:
         self._session = session
         self._process: asyncio.subprocess.Process | None = None
         self._busy = False
-        self._button = icon_button("ios_share", "Export: reports, and formats of other programs", lambda: None, "files")
+        self._button = icon_button("ios_share", SHARE, lambda: None, "files")
         with self._button, ui.menu().props('auto-close max-height="90vh"'):
             for name, suffix, summary in REPORTS:
                 self._item(name, suffix, summary, ["report"])
-            ui.separator()
-            for known_format in KNOWN:
-                words = ["export", "--to", known_format.name]
-                self._item(known_format.name, known_format.suffix, known_format.summary, words)
+            for shared in (True, False):
+                for known in (known for known in KNOWN if (known.name in SHARED) is shared):
+                    self._item(known.name, known.suffix, known.summary, ["export", "--to", known.name])
+                if shared:
+                    ui.separator()
 
     def _item(self, name: str, suffix: str, summary: str, words: Sequence[str]) -> None:
         item = ui.menu_item(on_click=lambda: self._choose(words, suffix)).props("dense").mark(f"file-{name}")

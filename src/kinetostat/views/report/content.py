@@ -80,7 +80,20 @@ class Listing:
     text: str
 
 
-Block: TypeAlias = "Paragraph | Bullets | Table | Figure | Formula | Listing | Section"
+@dataclass(frozen=True)
+class InnerPage:
+    """A whole page inside of a report that is a page itself; no other report has one.
+
+    Attributes:
+        title: what it shows.
+        text: HTML.
+    """
+
+    title: str
+    text: str
+
+
+Block: TypeAlias = "Paragraph | Bullets | Table | Figure | Formula | Listing | InnerPage | Section"
 
 
 @dataclass(frozen=True)

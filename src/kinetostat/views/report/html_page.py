@@ -16,6 +16,7 @@ from kinetostat.views.report.content import (
     Bullets,
     Figure,
     Formula,
+    InnerPage,
     Listing,
     Paragraph,
     Report,
@@ -87,6 +88,10 @@ class _Writer:
                 return f'<p class="formula">{shown}<span>({next(self._formulas)})</span></p>'
             case Listing(caption, text):
                 return f'<p class="listing">{escape(caption)}</p><pre>{escape(text.rstrip())}</pre>'
+            case InnerPage(title, text):
+                return (
+                    f'<iframe class="machine" title="{escape(title)}" loading="lazy" srcdoc="{escape(text)}"></iframe>'
+                )
         raise TypeError(f"a page cannot show {type(block).__name__}")
 
     def _table(self, block: Table) -> str:

@@ -11,18 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.kernel import closes_inside
+from kinetostat.engine.machine_functions import functions_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.report import REPORT_STEPS, Answers, Texts, gather, texts_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.answers import plain_of
+from kinetostat.views.live_page import page_of
 from kinetostat.views.report.answers import (
     ANSWERS_WITH_SECTIONS,
     answer_sections,
@@ -30,7 +34,7 @@ from kinetostat.views.report.answers import (
     study_section,
     validation_section,
 )
-from kinetostat.views.report.content import Report
+from kinetostat.views.report.content import InnerPage, Paragraph, Report, Section
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
@@ -216,6 +220,7 @@ def report_of(
         workspace_section(answers),
         *design_sections(answers),
         validation_section(validation),
+        *(moving_sections(analysis) if live else []),
         method_section(),
         record_section(origin, engine),
     ]
@@ -226,6 +231,16 @@ def report_of(
         tuple(sections),
         {"machine.toml": origin.machine_file, "results.json": origin.results},
     )
+
+
+def moving_sections(analysis: Analysis) -> list[Section]:
+    """A section with the page that moves the machine; none where legs have no closed form, so that it has no page."""
+    machine = analysis.machine
+    if machine.family.chains is not None and not closes_inside(machine):
+        return []
+    words = Paragraph("Sliders move the machine, and all numbers follow: they are computed here, by its own formulas.")
+    page = page_of(functions_of(machine, (), ()), "machine")
+    return [Section("The machine to move", (words, InnerPage(f"{machine.name} to move", page)))]
 
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:

@@ -1,0 +1,220 @@
+"""The machine as a page: one HTML file with its formulas, a picture, matrices and a map that follow sliders.
+
+The formulas are the traced graph of the machine, printed as JavaScript, so that the page needs no server and asks for
+nothing. When it opens it compares itself with numbers that Python has computed pose by pose. The same machine can be
+the end of an address: then its programs are data, which any such page makes functions of.
+"""
+
+import json
+import math
+import zlib
+from base64 import urlsafe_b64encode
+from collections.abc import Sequence
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from kinetostat.engine.form import objectives_of, step_of
+from kinetostat.engine.gradient import with_gradients
+from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
+from kinetostat.engine.machine_functions import (
+    DISPLACEMENTS,
+    ENTRIES,
+    SHORTEST_SHARE,
+    STEPS_FORWARD,
+    MachineFunctions,
+    functions_of,
+    sample_points,
+)
+from kinetostat.engine.printed import JAVASCRIPT, NOTATION, pack_graph, print_graph
+from kinetostat.engine.trace import Body
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import as_toml
+from kinetostat.machine.parameters import POSE, values, with_values
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.storage import write_text
+from kinetostat.tolerances import CLOSED
+from kinetostat.units import KINDS
+from kinetostat.views.page import whole_page
+
+TEMPLATES = Path(__file__).with_name("live")
+SPAN, TURN, SHARE = 0.4, math.radians(30.0), 0.5
+"""Ranges of sliders about the value in the file: of lengths, in units of the machine's length; of angles, rad; of other
+numbers, as a share of themselves."""
+FORMAT, VIEWER = 1, "viewer.html"
+"""Version of what an address holds, and the page that the documentation has for it."""
+LONGEST_ADDRESS = 8000
+"""Characters of a machine as part of an address; what it can do without is left out until it fits."""
+SPARE = (("shares", "parts"), ("slopes", "forward"), ("", "file"))
+"""What an address can do without, first the first: programs, and the data that go with them."""
+
+
+def write(
+    analysis: Analysis, path: Path, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+) -> list[Path]:
+    """Write the page of a machine.
+
+    Args:
+        analysis: the analysis of the machine at its pose.
+        path: the path of the page.
+        inputs: leaf paths of parameters that get a slider beside the coordinates of the pose, as "tool.offset.2".
+        outputs: names of quantities that the page shows beside K and C, as "frequency_1".
+
+    Raises:
+        InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
+    """
+    functions = functions_of(analysis.machine, inputs or (), outputs or ())
+    write_text(path, page_of(functions, path.stem))
+    return [path]
+
+
+def write_link(
+    analysis: Analysis, path: Path, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+) -> list[Path]:
+    """Write the machine as the end of an address: its programs and data, which any page of a machine opens.
+
+    Args:
+        analysis: the analysis of the machine at its pose.
+        path: the path of a text file with one line, "viewer.html#m=...".
+        inputs, outputs: as for `write`.
+
+    Raises:
+        InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
+    """
+    functions = functions_of(analysis.machine, inputs or (), outputs or ())
+    write_text(path, f"{VIEWER}#m={address_of(functions, path.stem)}\n")
+    return [path]
+
+
+def page_of(functions: MachineFunctions, stem: str) -> str:
+    """Return the page of a machine as a text; `stem` is the name of the machine file that it offers."""
+    data = _data(functions, stem)
+    programs = [_program(functions, name, body) for name, body in _bodies(functions).items()]
+    return _page(functions.machine.name, data, "\n".join(["const builtIn = {};", *programs]))
+
+
+def viewer() -> str:
+    """Return the page that shows the machine of its address, as a text."""
+    return _page("kinetostat", None, "const builtIn = {};")
+
+
+def address_of(functions: MachineFunctions, stem: str) -> str:
+    """Return a machine as letters, digits, - and _: JSON, compressed, in base 64.
+
+    The programs are data there (`engine.printed.pack_graph`), which the page checks before it makes functions of them.
+    """
+    data = _data(functions, stem)
+    data["samples"] = data["samples"][:1]
+    packed = {name: pack_graph(body.columns, [*body.results, body.code]) for name, body in _bodies(functions).items()}
+    for program, word in SPARE:
+        text = _compressed_text({"format": FORMAT, "data": data, "packed": packed})
+        if len(text) <= LONGEST_ADDRESS:
+            break
+        packed.pop(program, None)
+        data[word] = None
+    return _compressed_text({"format": FORMAT, "data": data, "packed": packed})
+
+
+def _compressed_text(content: object) -> str:
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 9)
+    return urlsafe_b64encode(deflate.compress(text.encode("utf-8")) + deflate.flush()).decode("ascii").rstrip("=")
+
+
+def _page(name: str, data: object, programs: str) -> str:
+    operations = [form.format("{0}", "{1}", "{2}", **JAVASCRIPT.functions) for form in NOTATION.values()]
+    words = {
+        "name": escape(name),
+        "version": version("kinetostat"),
+        "data": json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"),
+        "programs": programs,
+        "script": (TEMPLATES / "page.js").read_text("utf-8"),
+        "formulas": (TEMPLATES / "formulas.js")
+        .read_text("utf-8")
+        .replace("$operations", json.dumps(operations))
+        .replace("$statuses", json.dumps([status.sentence for status in Status])),
+    }
+    body = Template((TEMPLATES / "page.html").read_text("utf-8")).substitute(words)
+    return whole_page(name, (TEMPLATES / "page.css").read_text("utf-8"), [body])
+
+
+def _bodies(functions: MachineFunctions) -> dict[str, Body]:
+    """The programs of a page, by name."""
+    kind, form, closed = functions.specimen, functions.form, functions.closed
+    free = [name for name in functions.quantities if not QUANTITIES[name].loaded]
+    placement = functions.placement.formula
+    driven = placement.body.results[: len(functions.actuators)]
+    bodies = {
+        "answers": objectives_of(kind, form, [((name, 1.0),) for name in (*ENTRIES, *free)], closed=closed).body,
+        "places": placement.body,
+        "shares": functions.shares.formula.body,
+    }
+    if functions.square:
+        body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
+        bodies["slopes"] = with_gradients(body, placement.inputs)
+    if functions.rests:
+        loaded = [name for name in functions.quantities if QUANTITIES[name].loaded]
+        wanted = [((name, 1.0),) for name in (*DISPLACEMENTS, *loaded)]
+        bodies["first"] = step_of(kind, form, closed, True).body
+        bodies["step"] = step_of(kind, form, closed).body
+        bodies["loaded"] = objectives_of(kind, form, wanted, closed=closed).body
+    return bodies
+
+
+def _program(functions: MachineFunctions, name: str, body: Body) -> str:
+    """A body as a function of JavaScript from inputs `p` and coordinates of a state `s` to results in `o`."""
+    given = len(functions.inputs)
+    names = [f"p[{k}]" if k < given else f"s[{k - given}]" for k in range(len(body.columns))]
+    printed = print_graph(body.columns, names, [*body.results, body.code], JAVASCRIPT)
+    lines = [*printed.lines, *(f"o[{k}] = {value};" for k, value in enumerate(printed.results[:-1]))]
+    return f"builtIn.{name} = (p, o, s) => {{\n{chr(10).join(lines)}\nreturn {printed.results[-1]};\n}};"
+
+
+def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
+    """The data of the page beside its programs."""
+    machine = functions.machine
+    known = values(machine)
+    rows = []
+    for path, kind in functions.arguments:
+        home = float(known[path])
+        span = {"length": SPAN * functions.length, "angle": TURN}.get(kind, SHARE * abs(home) or 1.0)
+        label = path.removeprefix(POSE)
+        rows.append({"name": label, "si": KINDS[kind].unit, "home": home, "low": home - span, "high": home + span})
+    columns = sample_points(functions)
+    points = np.array(list(columns.values())).T
+    quantities = [
+        {"name": name, "si": QUANTITIES[name].unit, "loaded": bool(QUANTITIES[name].loaded)}
+        for name in functions.quantities
+    ]
+    forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
+    rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY} if functions.rests else None
+    return {
+        "name": machine.name,
+        "inputs": rows,
+        "actuators": [{"name": a.name, "si": a.unit} for a in functions.actuators],
+        "legs": functions.placement.legs,
+        "parts": functions.shares.parts,
+        "quantities": quantities,
+        "planar": machine.family.planar,
+        "components": machine.family.components,
+        "length": functions.length,
+        "forward": forward if functions.square else None,
+        "rest": rest,
+        "samples": [_sample(functions, row.tolist()) for row in points],
+        "file": as_toml(machine),
+        "fileName": f"{stem}.toml",
+    }
+
+
+def _sample(functions: MachineFunctions, point: list[float]) -> dict[str, object]:
+    """A point, and the entries of C and K there as Python computes them; words where JSON has no numbers."""
+    response = respond(with_values(functions.machine, dict(zip(functions.inputs, point, strict=True))))
+    numbers = [float(QUANTITIES[name].value(response)) for name in ENTRIES]
+    words = [n if math.isfinite(n) else None if math.isnan(n) else "inf" if n > 0.0 else "-inf" for n in numbers]
+    return {"values": point, "expected": words}
