@@ -25,6 +25,7 @@ PAGES = {
         "loads",
         "capability",
         "vibration",
+        "servo",
         "budget",
         "calibration",
         "design",

@@ -24,6 +24,7 @@ _HOMES = {
     "capability": "kinetostat.studies.capability",
     "modes": "kinetostat.studies.vibration",
     "dynamics": "kinetostat.studies.dynamics",
+    "servo": "kinetostat.studies.servo",
     "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
     "carrying_legs": "kinetostat.studies.carrying",
@@ -59,6 +60,7 @@ _SHOWN = {
     "Command": "kinetostat.studies.commanding",
     "CorrectionTable": "kinetostat.studies.corrections",
     "Carrying": "kinetostat.studies.carrying",
+    "Servo": "kinetostat.studies.servo",
     "Capability": "kinetostat.studies.capability",
     "Budget": "kinetostat.studies.budget.budget",
     "Result": "kinetostat.studies.optimisation.result",
@@ -67,10 +69,10 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
-    "changed", "command", "compare", "compile", "correction_table", "dynamics", "evaluate", "evaluate_grid", "export",
-    "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize", "plot",
-    "register", "report", "reproduce", "requirements", "save", "sensitivity", "state_of", "state_space", "tensions",
-    "under_load", "validate", "validate_measured", "workspace",
+    "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "evaluate", "evaluate_grid",
+    "export", "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize",
+    "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo", "state_of",
+    "state_space", "tensions", "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

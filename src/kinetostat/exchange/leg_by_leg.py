@@ -109,7 +109,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
     tool, load_given = _tool(machine, turn), _load(machine, turn)
     document |= {"tool": tool} if tool else {}
-    for name in ("drives", "damping", "cutting"):
+    for name in ("drives", "servo", "damping", "cutting"):
         usual = vars(COMMON[name]())
         given = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
         document |= {name: given} if given else {}

@@ -15,6 +15,7 @@ from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
 from kinetostat.machine.leg import Leg, comparable
+from kinetostat.machine.machine import springs
 from kinetostat.machine.rods import rods
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
@@ -115,6 +116,21 @@ def actuator_load(response: Response, sliding: bool) -> Scalar:
         return at_rest.get("actuator_force" if sliding else "actuator_moment", math.nan)
     loads = actuator_loads(response.configuration, response.statics, response.load)
     return -_least([-load for spring, load in loads if (spring.joint.point is None) is sliding])
+
+
+def reversal_error(response: Response, row: int) -> Scalar:
+    """Motion of the tool along a component that is lost where all drives reverse, at worst, m or rad.
+
+    Args:
+        response: of a pose; at T, base axes.
+        row: of rx ry rz x y z = 0 ... 5.
+
+    Source: theory (102).
+    """
+    pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
+    twists = [twist for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
+    moved = zip(twists, response.drives, strict=True)
+    return total([abs(twist.components()[row]) * drive.lost_motion for twist, drive in moved])
 
 
 def _least(values: Sequence[Scalar]) -> Scalar:

@@ -38,12 +38,14 @@ class DriveLimits:
         lower, upper: least and greatest load, N or N·m: positive in the sense in which the actuator's joint is pulled
             open; infinite if not limited.
         speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
+        lost_motion: what its joint misses between both senses of motion, m or rad, theory (102).
     """
 
     spring: Spring
     lower: Scalar
     upper: Scalar
     speed: Scalar
+    lost_motion: Scalar = 0.0
 
 
 def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveLimits, ...]:
@@ -64,8 +66,29 @@ def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveL
                 greatest = smaller(most, load.max_tension)
             lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
         speed = limits.actuator_speed if slides else limits.actuator_turning_speed
-        result.append(DriveLimits(spring, lower, upper, speed))
+        result.append(DriveLimits(spring, lower, upper, speed, lost_motion(machine, slides)))
     return tuple(result)
+
+
+def lost_motion(machine: Machine, slides: bool) -> Scalar:
+    """Lost motion of the joint of a drive between both senses: its play, and friction that no integral part removes.
+
+    Args:
+        machine: with its tables [drives] and [servo].
+        slides: whether the drive is linear.
+
+    Returns:
+        m, or rad of a rotary drive.
+
+    Source: theory (102).
+    """
+    drives, servo = machine.tables["drives"], machine.tables["servo"]
+    play = (1.0 - servo.position_at_load) * (drives.backlash if slides else drives.angular_backlash)
+    absent = is_zero(drives.rotor_friction) or not is_zero(servo.integral_time)
+    if absent or is_zero(servo.velocity_gain) or is_zero(servo.position_gain):
+        return play
+    turns = drives.lead * (0.5 / math.pi) if slides else reciprocal(drives.ratio)
+    return play + 2.0 * drives.rotor_friction * turns * reciprocal(servo.velocity_gain * servo.position_gain)
 
 
 def driven_springs(configuration: Configuration) -> list[Spring]:

@@ -22,6 +22,7 @@ from kinetostat.kinetostatics.extremes import (
     greatest_stiffness,
     least_stiffness,
     longest_leg,
+    reversal_error,
     shortest_leg,
 )
 from kinetostat.kinetostatics.feasible import (
@@ -63,7 +64,8 @@ class MapQuantity:
         modal: whether it is about natural vibrations, so that the machine must have masses.
         cut: whether it is about the receptance across a cut, which is computed pose by pose and has no derivatives.
         cables: whether it is about the tensions of cables, or what they can hold; it has no derivatives.
-        driven: what of its drives it is about: "load" or "speed", which the file must then limit; empty if neither.
+        driven: what of its drives it is about: "load" or "speed", which the file must then limit, or "reversal", for
+            which it must give lost motion; empty if nothing.
     """
 
     name: str
@@ -275,6 +277,22 @@ def _speed_along(response: Response, row: int) -> Scalar:
     return greatest_speed_along(response.transmission, [drive.speed for drive in response.drives], row)
 
 
+def _of_reversal() -> list[MapQuantity]:
+    """Lost motion of the tool where all drives reverse, by component."""
+    return [
+        MapQuantity(
+            f"reversal_error_{name}",
+            "rad" if row in ROTATIONS else "m",
+            rf"$e_{{\mathrm{{{name}}}}}$",
+            partial(reversal_error, row=row),
+            (name,),
+            "less",
+            driven="reversal",
+        )
+        for row, name in enumerate(COMPONENTS)
+    ]
+
+
 def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
@@ -336,6 +354,7 @@ QUANTITIES = {
             needs=LIMITS["actuator_moment"].needs,
         ),
         *_of_drives(),
+        *_of_reversal(),
         *_frequencies("frequency"),
         *_of_the_cut(),
         *_of_loaded_state(),
@@ -383,6 +402,7 @@ GROUPS = {
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
     "greatest_wrench": tuple(f"greatest_wrench_{name}" for name in COMPONENTS),
     "greatest_twist": tuple(f"greatest_twist_{name}" for name in COMPONENTS),
+    "reversal_error": tuple(f"reversal_error_{name}" for name in COMPONENTS),
     "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
     "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),
     "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),

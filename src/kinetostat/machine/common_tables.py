@@ -61,6 +61,33 @@ class Drives:
         float,
         Quantity("ratio", "share of the rotor's power that gear or screw pass on, and back", positive=True, most=1.0),
     ] = 1.0
+    backlash: Annotated[float, Quantity("length", "lost motion of a linear actuator where its direction reverses")] = (
+        0.0
+    )
+    angular_backlash: Annotated[float, Quantity("angle", "lost motion of a rotary actuator likewise")] = 0.0
+
+
+@table
+class ServoGains:
+    """Table [servo], in any machine file: the loops of all drives, whose transmissions have the actuators' stiffness.
+
+    The position loop asks for a speed in proportion to the error, the velocity loop for a torque in proportion to what
+    is missing of that speed, and for its integral.
+    """
+
+    position_gain: Annotated[float, Quantity("rate", "speed that the position loop asks for, per position error")] = 0.0
+    velocity_gain: Annotated[
+        float, Quantity("torsional damping", "torque of the rotor that the velocity loop asks for, per speed error")
+    ] = 0.0
+    integral_time: Annotated[
+        float, Quantity("duration", "in which the integral part of the velocity loop grows as large; 0: it has none")
+    ] = 0.0
+    position_at_load: Annotated[
+        float,
+        Quantity(
+            "ratio", "share of the position measured behind the transmission; 0: at the motor, 1: by a scale", most=1.0
+        ),
+    ] = 0.0
 
 
 @table
@@ -168,13 +195,14 @@ STATES = {"free": False, "loaded": True}
 COMMON = {
     "tool": Tool,
     "drives": Drives,
+    "servo": ServoGains,
     "damping": Damping,
     "cutting": Cutting,
     "load": Load,
     "cables": CableTable,
     "limits": Limits,
 }
-OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "damping.", "cutting.")
+OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
 """Beginnings of the fields on which nothing depends but vibrations."""
 ROUND_OFF_OF_TENSOR = 1e-4
 """Share of its size by which a tensor may miss what bodies have: files give a few digits."""

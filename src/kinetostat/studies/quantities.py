@@ -186,6 +186,21 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
             )
 
 
+LOST_MOTION = ("drives.backlash", "drives.angular_backlash", "drives.rotor_friction")
+
+
+def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence[Parameter]) -> None:
+    """Refuse a reversal error of a machine whose file gives its drives no lost motion."""
+    given = values(state.machine)
+    if any(parameter.path in LOST_MOTION for parameter in varied):
+        return
+    if not any(given[field] for field in LOST_MOTION):
+        raise InputError(
+            f'"{name}" is not known: the file of {state.machine.name} gives its drives no lost motion; write '
+            'backlash = "5 um" (angular_backlash of rotary drives), say, in the table [drives].'
+        )
+
+
 LIMITS_OF_DRIVES = {
     "load": ("limits.actuator_force", '"2 kN"', "limits.actuator_moment", '"20 N*m"'),
     "speed": ("limits.actuator_speed", '"0.5 m/s"', "limits.actuator_turning_speed", '"3 rad/s"'),
@@ -199,6 +214,9 @@ def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: 
     for name in names:
         what = QUANTITIES[name].driven
         if not what:
+            continue
+        if what == "reversal":
+            _refuse_without_lost_motion(state, name, varied)
             continue
         drives = drive_limits(state.machine, state.configuration)
         linear, first, rotary, second = LIMITS_OF_DRIVES[what]

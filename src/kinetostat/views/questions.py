@@ -28,6 +28,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute natural frequencies and modes, and the receptance of the tool",
         "views.vibration.MODES_QUESTION",
     ),
+    "servo": (
+        "compute the stiffness and the damping of the tool with servo loops closed",
+        "views.servo.SERVO_QUESTION",
+    ),
     "capability": (
         "compute the forces, moments and speeds that the drives allow at a pose",
         "views.capability.CAPABILITY_QUESTION",
@@ -63,6 +67,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.guidelines.Guidelines": "views.guidelines.GUIDELINES",
     "studies.commanding.Command": "views.command.COMMAND",
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
+    "studies.servo.Servo": "views.servo.SERVO",
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.budget.Budget": "views.budget.BUDGET",
     "studies.budget.budget.PossibleErrors": "views.budget.POSSIBLE_ERRORS",

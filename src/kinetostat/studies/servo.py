@@ -1,0 +1,209 @@
+"""The question of how stiff and how damped the tool of a machine is with its servo loops closed.
+
+The stiffness of an actuator is then that of its transmission, between motor and joint, and [servo] says how the motor
+is held. Loops as such are in `vibration.servo`.
+
+Source: theory (98)-(101). At the tool point, base axes.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kinetostat.arrays import Array, Complex
+from kinetostat.equilibrium.drives import rotor_turns
+from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.feasible import driven_springs
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.indices import unit_direction
+from kinetostat.studies.vibration import HIGHEST, Vibration, modes
+from kinetostat.tolerances import UNFELT
+from kinetostat.vibration.servo import ClosedLoops, ServoLoop, slowest_decay
+
+RANGE = (0.001, 5.0)
+"""Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still."""
+POINTS = 1200
+GROWS = 1e-9
+"""Real part of a pole, as a share of its size, from which it grows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Servo(Immutable):
+    """The tool of a machine with its servo loops closed.
+
+    Attributes:
+        state: of the machine.
+        status: of the pose.
+        message: the answer in a sentence or two.
+        loops: with their machine; None without an answer.
+        standing: free stiffness with motors that stand still, by component, N/m or N·m/rad.
+        static: free stiffness at 0 Hz with the loops closed.
+        least: least free stiffness over the frequencies of the response, and where it is, Hz.
+        poles: rad/s.
+        stable: whether all of them decay.
+        slowest: frequency (Hz) and damping ratio of the least damped one; None where none swings.
+        assumed: whether nothing is said of the machine's own damping, so that it is a usual one.
+        direction: in which the tool is pushed for the response; empty for x, y and z.
+    """
+
+    state: MachineState
+    status: Status
+    message: str
+    loops: ClosedLoops | None = None
+    standing: tuple[float, ...] = ()
+    static: tuple[float, ...] = ()
+    least: tuple[tuple[float, float], ...] = ()
+    poles: tuple[complex, ...] = ()
+    stable: bool = True
+    slowest: tuple[float, float] | None = None
+    assumed: bool = False
+    direction: tuple[float, ...] = ()
+
+    @property
+    def machine(self) -> Machine:
+        """The machine with its pose."""
+        return self.state.machine
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components that the machine has."""
+        return self.machine.family.component_names
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies for curves, Hz."""
+        if self.loops is None:
+            return np.zeros(0)
+        known = self.loops.modes.frequencies
+        return np.geomspace(RANGE[0] * known[0], RANGE[1] * known[min(5, len(known) - 1)], POINTS)
+
+    @checked
+    def receptance(self, frequencies: Sequence[float]) -> Complex:
+        """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
+
+        Args:
+            frequencies: Hz.
+
+        Raises:
+            InputError: there is no answer, or a frequency is not a number up to 1e20.
+        """
+        if self.loops is None:
+            raise InputError(f"{self.machine.name} has no servo response at this pose: {self.message}")
+        given = np.asarray(frequencies, dtype=float).reshape(-1)
+        if not (np.abs(given) <= HIGHEST).all():
+            raise InputError(f"frequencies must be numbers in Hz, up to {HIGHEST:g}.")
+        return self.loops.receptance(given)
+
+
+@checked
+def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo:
+    """Find the stiffness and the damping of a machine's tool with its servo loops closed.
+
+    Args:
+        machine: with its pose, masses and [servo], or its state; about its state under load where `machine.loaded`.
+        along: direction in which the tool is pushed for the response, base axes; x, y and z if empty.
+
+    Raises:
+        InputError: nothing says the gains, rotors have no inertia, an actuator has no stiffness of its transmission,
+            nothing says a mass, or the direction is zero.
+    """
+    state = state_of(machine)
+    direction = tuple(unit_direction(along, "along")) if along else ()
+    loops = _loops(state)
+    still = with_values(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
+    vibration = modes(still)
+    if vibration.solution is None or vibration.damping is None or not vibration.solution.ringing:
+        return Servo(state, vibration.status, vibration.message)
+    return replace(_answer(state, vibration, loops), direction=direction)
+
+
+def _loops(state: MachineState) -> dict[str, ServoLoop]:
+    """The loop of each drive, by the name of its actuator."""
+    machine = state.machine
+    table, drives = machine.tables["servo"], machine.tables["drives"]
+    for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
+        if not getattr(table, name):
+            raise InputError(
+                f"servo.{name} of {machine.name} is 0, so that its motors are not held; write {name} = {example}, say, "
+                "in the table [servo]."
+            )
+    if not drives.rotor_inertia:
+        raise InputError(
+            f"drives.rotor_inertia of {machine.name} is 0, and a loop without inertia has no dynamics; write "
+            'rotor_inertia = "2e-5 kg*m**2", say, in the table [drives].'
+        )
+    loops = {}
+    for spring in driven_springs(state.configuration):
+        stiffness = float(spring.stiffness)
+        if math.isinf(stiffness):
+            raise InputError(
+                f"{spring.name} of {machine.name} is rigid; its stiffness is that of the transmission between motor "
+                "and joint, which a servo loop needs: give it one."
+            )
+        square = float(rotor_turns(spring, drives)) ** 2
+        loops[spring.of] = ServoLoop(
+            stiffness,
+            square * drives.rotor_inertia,
+            square * drives.rotor_damping,
+            square * table.velocity_gain,
+            table.position_gain,
+            table.integral_time,
+            table.position_at_load,
+        )
+    return loops
+
+
+def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoop]) -> Servo:
+    solution, damping = vibration.solution, vibration.damping
+    if solution is None or damping is None:
+        raise ValueError("a vibration without modes has no loops")
+    closed = ClosedLoops(solution, damping, tuple(named[drive.name] for drive in solution.drives))
+    parts = list(state.machine.family.components)
+    still = solution.tool @ solution.tool.T
+    poles = closed.poles()
+    stable = bool((poles.real <= GROWS * np.abs(poles)).all())
+    answer = Servo(
+        state,
+        Status.OK,
+        "",
+        closed,
+        _free_stiffness(still, still, parts),
+        _free_stiffness(closed.receptance(np.zeros(1))[0].real, still, parts),
+        poles=tuple(complex(pole) for pole in poles),
+        stable=stable,
+        assumed=vibration.assumed,
+    )
+    given = answer.frequencies
+    slowest = slowest_decay(poles, (0.0, float(given[-1])))
+    sizes = np.abs(closed.receptance(given))[:, parts, parts]
+    least = tuple((float(1.0 / row.max()), float(given[row.argmax()])) for row in sizes.T)
+    return replace(answer, least=least, slowest=slowest, message=_message(answer, slowest))
+
+
+def _free_stiffness(compliance: Array, still: Array, parts: Sequence[int]) -> tuple[float, ...]:
+    """The reciprocals of a diagonal [6 x 6]; infinite where it is round-off beside that of motors that stand still."""
+    pairs = [(float(compliance[i, i]), float(still[i, i])) for i in parts]
+    return tuple(math.inf if abs(soft) <= UNFELT * least else 1.0 / soft for soft, least in pairs)
+
+
+def _message(answer: Servo, slowest: tuple[float, float] | None) -> str:
+    show = answer.machine.display.show
+    if not answer.stable:
+        growing = max(answer.poles, key=lambda pole: pole.real)
+        return (
+            f"The loops are unstable: a motion of {show(abs(growing) / (2.0 * math.pi), 'Hz')} grows; lower "
+            "servo.velocity_gain or servo.position_gain, or measure more of the position at the motor."
+        )
+    if slowest is None:
+        return "The loops are stable, and nothing swings."
+    frequency, ratio = slowest
+    damping = f"{100.0 * ratio:.3g} % of critical damping"
+    return f"The loops are stable; the least damped motion has {show(frequency, 'Hz')} and {damping}."

@@ -1,0 +1,159 @@
+"""Stiffness and damping of the tool with servo loops closed: the question, the description of its answer, a picture."""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Complex
+from kinetostat.display import number
+from kinetostat.studies.servo import Servo, servo
+from kinetostat.studies.setting import pose_of, setting_of
+from kinetostat.vibration.receptance import along, receptance
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
+from kinetostat.views.tables import numeric_table
+from kinetostat.views.vibration import RESPONSE, axis_of
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+RIGID = "rigid"
+
+
+def _unit(component: str) -> str:
+    return "N·m/rad" if len(component) == 2 else "N/m"
+
+
+def _lines(answer: Servo) -> Lines:
+    if answer.loops is None:
+        return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
+    lines = [("Pose", f"{pose_of(answer.machine)}."), ("Servo", answer.message)]
+    show, loop = answer.machine.display.show, answer.loops.loops[0]
+    unit = "N·m/rad" if answer.loops.modes.drives[0].turning else "N/m"
+    resists = "no limit" if math.isinf(loop.static_stiffness) else show(loop.static_stiffness, unit)
+    transmission = show(loop.transmission, unit)
+    lines.append(("Drive", f"The first drive holds {resists} at 0 Hz; its transmission has {transmission}."))
+    if answer.assumed:
+        lines.append(("Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."))
+    return lines
+
+
+def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
+    if answer.loops is None:
+        return
+    columns = ["motors still", "loops closed, 0 Hz", "least over frequency", "at Hz"]
+    table = numeric_table("Free stiffness of the tool", "", columns)
+    show = answer.machine.display.show
+    rows = zip(answer.components, answer.standing, answer.static, answer.least, strict=True)
+    for name, standing, static, (least, frequency) in rows:
+        shown = [RIGID if math.isinf(value) else show(value, _unit(name)) for value in (standing, static, least)]
+        table.add_row(name, *shown, number(frequency, digits=3))
+    yield table
+
+
+def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
+    rows = zip(answer.components, answer.standing, answer.static, answer.least, strict=False)
+    return [
+        {
+            "component": name,
+            "motors_still": None if math.isinf(standing) else standing,
+            "static": None if math.isinf(static) else static,
+            "least": least,
+            "least_at": frequency,
+        }
+        for name, standing, static, (least, frequency) in rows
+    ]
+
+
+def _response(answer: Servo) -> Complex:
+    parts = [COMPONENTS.index(name) for name in answer.components]
+    return answer.receptance(answer.frequencies.tolist())[:, parts][:, :, parts]
+
+
+def servo_figures(answer: Servo) -> dict[str, Drawing]:
+    """The drawing of the response; none without an answer, or where a motion grows."""
+    if answer.loops is None or not answer.stable:
+        return {}
+    caption = "Dynamic stiffness of the tool point with servo loops closed, and with motors that stand still."
+    return {"servo": Drawing(caption, partial(servo_figure, answer))}
+
+
+def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops closed") -> Figure:
+    """Draw the dynamic stiffness along directions over frequency, with loops closed and with motors that stand still.
+
+    Args:
+        answer: with its loops.
+        title: over the figure, with braces for the name of the machine.
+
+    Raises:
+        ValueError: the answer has no loops.
+    """
+    if answer.loops is None:
+        raise ValueError("there is nothing to draw")
+    given = answer.frequencies
+    scale = answer.machine.display.scale("N/m")
+    ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
+    ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
+    closed = answer.receptance(given.tolist())
+    still = receptance(answer.loops.modes, answer.loops.damping, given)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 3.8), layout="constrained")
+        panel = figure.add_subplot()
+        for place, (name, way) in enumerate(ways.items()):
+            colour = COLOURS[place]
+            curves = [1.0 / np.abs(along(part, np.array(way))) * scale.factor for part in (closed, still)]
+            panel.loglog(given, curves[0], color=colour, linestyle=DASHES[place], label=f"along {name}")
+            panel.loglog(given, curves[1], color=colour, linewidth=0.7, alpha=0.6)
+        panel.margins(x=0.0)
+        panel.set_xlabel("frequency (Hz)")
+        panel.set_ylabel(scale.label("dynamic stiffness"))
+        panel.legend(loc="best")
+        set_title(figure, title.format(answer.machine.name))
+        note_setting(figure, setting_of(answer.machine), "thin: motors that stand still")
+        fix_layout(figure)
+    return figure
+
+
+STIFFNESS = tuple(
+    Field(key, long_name=meaning)
+    for key, meaning in (
+        ("component", "of rx ry rz x y z"),
+        ("motors_still", "free stiffness with motors that stand still, N/m or N·m/rad"),
+        ("static", "free stiffness at 0 Hz with loops closed, N/m or N·m/rad; none where rigid"),
+        ("least", "least dynamic stiffness, N/m or N·m/rad"),
+        ("least_at", "frequency of the least, Hz"),
+    )
+)
+SERVO = Description(
+    title="Servo loops",
+    fields=(
+        *FIRST_FIELDS,
+        Field("stable"),
+        Field("slowest_frequency", lambda answer: answer.slowest and answer.slowest[0], "Hz"),
+        Field("slowest_ratio", lambda answer: answer.slowest and answer.slowest[1]),
+        Field("damping_assumed", "assumed"),
+        Records("stiffness", "row", STIFFNESS, _stiffnesses),
+        Field("poles_real", lambda answer: [pole.real for pole in answer.poles], "rad/s", forms=("json",)),
+        Field("poles_imaginary", lambda answer: [pole.imag for pole in answer.poles], "rad/s", forms=("json",)),
+        Field("receptance_real", lambda answer: _response(answer).real, axes=RESPONSE, forms=("nc",)),
+        Field("receptance_imaginary", lambda answer: _response(answer).imag, axes=RESPONSE, forms=("nc",)),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=servo_figures,
+    axes=(Axis("frequency", "frequencies", "Hz"), Axis("moved", "components"), Axis("loaded", "components")),
+    answered=lambda answer: answer.loops is not None,
+    files={"servo.json": "json", "servo.csv": "csv", "servo.nc": "nc"},
+)
+SERVO_QUESTION = Question(
+    example='kinetostat servo hexapod --set tool.mass="12 kg" --set servo.position_gain="50 1/s" -o servo',
+    answer=servo,
+    options=(Option("along", "direction", "direction in which the tool is pushed for the response", default=()),),
+    loaded="the loops about the state of rest under the loads, with tensions and weights",
+    output="servo.json, servo.csv, servo.nc and the figure",
+)
