@@ -133,13 +133,16 @@ def energy_and_gradient(hung, free, place, turned):
     length = np.linalg.norm(span, axis=2)
     longer = np.maximum(length - free, 0.0)
     along = span / length[:, :, None]
-    screws = np.concatenate([np.cross(arms, along) / LENGTH, along], axis=2)
+    (x, y, z), (a, b, c) = np.moveaxis(arms, 2, 0), np.moveaxis(along, 2, 0)
+    screws = np.stack([(y * c - z * b) / LENGTH, (z * a - x * c) / LENGTH, (x * b - y * a) / LENGTH, a, b, c], axis=2)
     centres = np.einsum("nij,nmj->nmi", turned, hung.centres)
     heights = place[:, None, 2] + centres[:, :, 2]
     energy = (0.5 * hung.stiffness * longer**2).sum(axis=1) + GRAVITY * (hung.masses * heights).sum(axis=1)
     gradient = np.einsum("nc,nck->nk", hung.stiffness * longer, screws)
     gradient[:, 5] += GRAVITY * hung.masses.sum(axis=1)
-    gradient[:, :3] += GRAVITY * np.einsum("nm,nmk->nk", hung.masses, np.cross(centres, [0.0, 0.0, 1.0])) / LENGTH
+    moment = np.einsum("nm,nmk->nk", hung.masses, centres)
+    gradient[:, 0] += GRAVITY * moment[:, 1] / LENGTH
+    gradient[:, 1] -= GRAVITY * moment[:, 0] / LENGTH
     return energy, gradient, screws
 
 
@@ -156,24 +159,32 @@ def rests_of(hung, most=STEPS):
         it is not at rest after so many steps.
     """
     place, turned, least = hung.place.copy(), hung.turned, np.full(len(hung), np.nan)
-    pace, rows = np.full(len(hung), 0.5), np.arange(len(hung))
-    for number in range(most):
+    rows = np.arange(len(hung))
+    for start in range(0, most, EVERY):
         part, free = hung.of(rows), free_lengths(hung.of(rows))
-        energy, gradient, screws = energy_and_gradient(part, free, place[rows], turned[rows])
-        drag = np.einsum("nc,nci,ncj->nij", part.stiffness, screws, screws)
-        drag = drag + DRAG * np.trace(drag, axis1=1, axis2=2)[:, None, None] * np.eye(6)
-        step = -pace[rows, None] * np.linalg.solve(drag, gradient[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 0.02 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-        there = step_by(place[rows], turned[rows], step)
-        lower = energy_and_gradient(part, free, *there)[0] <= energy
-        pace[rows] = np.where(lower, np.minimum(1.1 * pace[rows], 1.5), 0.5 * pace[rows])
-        place[rows[lower]], turned[rows[lower]] = there[0][lower], there[1][lower]
-        if number % EVERY == EVERY - 1:
-            place[rows], turned[rows], least[rows] = settled_places(part, free, place[rows], turned[rows])
-            rows = rows[np.isnan(least[rows])]
-            if not len(rows):
-                break
+        slowed = slowed_down(part, free, place[rows], turned[rows], min(EVERY, most - start))
+        place[rows], turned[rows], least[rows] = settled_places(part, free, *slowed)
+        rows = rows[np.isnan(least[rows])]
+        if not len(rows):
+            break
     return place, turned, least
+
+
+def slowed_down(hung, free, place, turned, steps):
+    """Places and orientations after some steps of the dashpots, each of them no longer than the energy falls."""
+    pace, here = np.full(len(hung), 0.5), [place, turned, *energy_and_gradient(hung, free, place, turned)]
+    for _ in range(steps):
+        place, turned, energy, gradient, screws = here
+        drag = np.swapaxes(screws, 1, 2) @ (hung.stiffness[:, :, None] * screws)
+        drag = drag + DRAG * np.trace(drag, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+        step = -pace[:, None] * np.linalg.solve(drag, gradient[:, :, None])[:, :, 0]
+        step *= np.minimum(1.0, 0.02 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        there = step_by(place, turned, step)
+        there = [*there, *energy_and_gradient(hung, free, *there)]
+        lower = there[2] <= energy
+        pace = np.where(lower, np.minimum(1.1 * pace, 1.5), 0.5 * pace)
+        here = [np.where(lower.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in zip(there, here, strict=True)]
+    return here[:2]
 
 
 def stiffnesses(hung, free, place, turned, size=1e-6):

@@ -24,6 +24,7 @@ PAGES = {
         "functions",
         "loads",
         "capability",
+        "drives",
         "vibration",
         "servo",
         "budget",

@@ -23,6 +23,7 @@ _HOMES = {
     "under_load": "kinetostat.studies.under_load",
     "capability": "kinetostat.studies.capability",
     "modes": "kinetostat.studies.vibration",
+    "drives": "kinetostat.studies.drives",
     "dynamics": "kinetostat.studies.dynamics",
     "servo": "kinetostat.studies.servo",
     "state_of": "kinetostat.equilibrium.state",

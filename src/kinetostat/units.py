@@ -89,6 +89,7 @@ KINDS = {
         Kind("thermal expansion", "m/(m·K)", "12 um/(m*K)"),
         Kind("speed", "m/s", "0.5 m/s"),
         Kind("acceleration", "m/s**2", "9.81 m/s**2"),
+        Kind("jerk", "m/s**3", "100 m/s**3"),
         Kind("direction", "", "1.0"),
         Kind("ratio", "m/m", "20 um/m"),
     )

@@ -19,7 +19,6 @@ CALLED_FROM_OUTSIDE = {
     "mass_at_drives": "M over the drives, for programs",
     "gravity_at_drives": "g over the drives, for programs",
     "coriolis_at_drives": "C over the drives, for programs",
-    "forces_on_path": "points of a motion, for tests until a study asks",
     "shares_of": "shares by name, for programs",
     "to_pandas": "tables of pandas, for programs",
     "engines": "what is installed, for tests and benchmarks",

@@ -136,6 +136,7 @@ UNITS = {
     "torsional friction": (0, 0),
     "rate": (0, 0),
     "speed": (0, 0),
+    "jerk": (0, 0),
     "cutting pressure": (0, 0),
     "duration": (0, 0),
     "acceleration": (1, 0),

@@ -64,6 +64,7 @@ class PathForces:
 
     Attributes:
         drives: numbers of each drive, see `motion.numbers.OF_DRIVE` [drives x numbers x n], SI.
+        wrench: at the tool point, see `motion.numbers.tool_wrench` [6 x n], N·m and N; none if nobody asked.
         joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
         inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
         status: `Status` codes [n].
@@ -71,6 +72,7 @@ class PathForces:
 
     drives: Array
     joints: Array
+    wrench: Array
     inertia: Array
     status: Codes
 
@@ -159,7 +161,8 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
     return PathForces(
         results[:end].reshape(size, len(OF_DRIVE), path.size),
         results[end:pairs].reshape(len(loaded), 2, path.size),
-        results[pairs:],
+        results[pairs : pairs + 6],
+        results[pairs + 6 :],
         status,
     )
 

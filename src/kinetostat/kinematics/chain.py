@@ -76,16 +76,17 @@ class Chain:
             amounts: all given amounts of the machine [n x amounts].
             errors: small screw motions [n x 6] or [1 x 6], by the number of motions behind which they stand.
         """
-        count, errors = len(coordinates), errors or {}
+        count, small = len(coordinates), _motions_of(errors or {})
         motion, before, carried = still(count), [], []
         for number, step in enumerate(self._steps(coordinates, amounts)):
             before.append(motion)
-            motion = _beside(motion, errors.get(number))
+            motion = motion @ small[number] if number in small else motion
             carried.append(motion)
-            motion = motion @ step
+            motion = motion @ step if number or 0 in small else step  # nothing stands before the first
         before.append(motion)
         screws = each_twist(carried, self.twists) if carried else np.zeros((count, 0, 6))
-        return PlacedChain(tuple(before), _beside(motion, errors.get(len(carried))), screws)
+        end = motion @ small[len(carried)] if len(carried) in small else motion
+        return PlacedChain(tuple(before), end, screws)
 
     def _steps(self, coordinates: Array, amounts: Array | None) -> list[Motions]:
         """The displacement by each motion alone."""
@@ -115,8 +116,14 @@ def _matches(numbers: tuple[int, ...], count: int) -> Array:
     return (np.array(numbers, dtype=int)[:, None] == np.arange(count)).astype(float)
 
 
-def _beside(motion: Motions, error: Array | None) -> Motions:
-    return motion if error is None else motion @ exponential(error)
+def _motions_of(errors: Mapping[int, Array]) -> dict[int, Motions]:
+    """The displacements by small screw motions, all of them in one step."""
+    if not errors:
+        return {}
+    every = exponential(np.concatenate(list(errors.values())))
+    ends = np.cumsum([len(error) for error in errors.values()]).tolist()
+    places = zip(errors, [0, *ends], ends, strict=False)
+    return {number: Motions(every.rotation[a:b], every.translation[a:b]) for number, a, b in places}
 
 
 def closing_gap(platform: Motions, end: Motions) -> Array:

@@ -3,7 +3,7 @@
 Source: theory (89)-(93). SI.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import Wrench
@@ -11,7 +11,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.machine import Configuration
-from kinetostat.motion.forces import PARTS, ForceDemand, drive_forces, leg_wrenches
+from kinetostat.motion.forces import NOTHING, PARTS, ForceDemand, drive_forces, leg_wrenches, sign
 from kinetostat.motion.operators import MachineAtPose, forces_along, mass_at_drives
 from kinetostat.motion.rates import PoseRates
 
@@ -71,12 +71,7 @@ def joint_numbers(here: MachineAtPose, direction: PoseRates, joints: list[Loaded
 
     The moment of a slide, which has no point, is 0.0.
     """
-    _, demand_by_part = forces_along(here, direction)
-    whole: ForceDemand | None = None
-    for demand in demand_by_part.values():
-        whole = demand if whole is None else whole + demand
-    if whole is None:
-        return []
+    whole = _sum_of(forces_along(here, direction)[1])
     wrenches = leg_wrenches(here.rigid, whole, drive_forces(here.rigid, here.statics, whole))
     shrink, results = 1.0 / here.rigid.length, []
     for joint in joints:
@@ -89,6 +84,13 @@ def joint_numbers(here: MachineAtPose, direction: PoseRates, joints: list[Loaded
             0.0 if point is None else _moment(passed, (point - here.rigid.origin) * shrink, here.rigid.length)
         )
     return results
+
+
+def _sum_of(demand_by_part: Mapping[str, ForceDemand]) -> ForceDemand:
+    first, *others = demand_by_part.values()
+    for demand in others:
+        first = first + demand
+    return first
 
 
 def _moment(wrench: Wrench, at: Vector, length: Scalar) -> Scalar:
@@ -105,6 +107,29 @@ def reflected_inertia(here: MachineAtPose) -> list[Scalar]:
     return [row[number] for number, row in enumerate(mass_at_drives(here))]
 
 
+def tool_wrench(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
+    """The wrench at the tool point that would deflect springs as the motion does: moment (N·m), force (N) [6].
+
+    It is less what masses, process and joints ask for, taken to the platform by virtual work; rotors and their friction
+    act behind the springs of their drives, and are left out.
+    """
+    motion, demand_by_part = forces_along(here, direction)
+    demand = _sum_of(demand_by_part)
+    whole = list((NOTHING - demand.platform).components())
+    for leg, moving, forces in zip(here.rigid.legs, motion.legs, demand.legs, strict=True):
+        row = list(forces)
+        for place, number in enumerate(leg.drives, leg.passive):
+            drive, rate = here.rigid.drives[number], moving.rates[place]
+            row[place] = (
+                row[place] - drive.inertia * moving.change[place] - drive.viscous * rate - drive.coulomb * sign(rate)
+            )
+        for solved, force in zip(leg.solved, row, strict=True):
+            whole = [a - b * force for a, b in zip(whole, solved, strict=True)]
+    length = here.rigid.length
+    return [*(part * length for part in whole[:3]), *whole[3:]]
+
+
 def motion_details(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
-    """The loads of all joints, two numbers each, and the reflected inertia of all drives."""
-    return [*joint_numbers(here, direction, joints_of(here.configuration)), *reflected_inertia(here)]
+    """The loads of all joints, two numbers each, the wrench at the tool, and the reflected inertia of all drives."""
+    loads = joint_numbers(here, direction, joints_of(here.configuration))
+    return [*loads, *tool_wrench(here, direction), *reflected_inertia(here)]

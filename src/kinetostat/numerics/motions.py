@@ -18,8 +18,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.column import stacked_columns
 from kinetostat.numerics.iteration import with_rows
 
-NEXT, AFTER = [1, 2, 0], [2, 0, 1]
-"""The axes that come next in turn, and after these."""
+IDENTITY = np.eye(3)
 SMALL_ANGLE = 0.05
 """Angle, rad, below which quotients like (t - sin t) / t^3 are taken from their series: the fourth term is 1e-16."""
 
@@ -79,12 +78,11 @@ def still(count: int) -> Motions:
 def exponential(twists: Array) -> Motions:
     """The displacement by a screw motion for one unit of time [n x 6]."""
     turning, moving = twists[:, :3], twists[:, 3:]
-    angle = np.linalg.norm(turning, axis=1)
-    first, second, third = _quotients(angle)
+    first, second, third = _quotients(_lengths(turning))
     skew = skew_of(turning)
     squared = skew @ skew
-    rotation = np.eye(3) + first[:, None, None] * skew + second[:, None, None] * squared
-    along = np.eye(3) + second[:, None, None] * skew + third[:, None, None] * squared
+    rotation = IDENTITY + first[:, None, None] * skew + second[:, None, None] * squared
+    along = IDENTITY + second[:, None, None] * skew + third[:, None, None] * squared
     return Motions(rotation, np.einsum("nij,nj->ni", along, moving))
 
 
@@ -171,7 +169,7 @@ def logarithm(motions: Motions) -> Array:
         ],
         axis=1,
     )
-    angle = np.arctan2(np.linalg.norm(sines, axis=1), 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
+    angle = np.arctan2(_lengths(sines), 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
     first, second, _ = _quotients(angle)
     turning = sines / first[:, None]
     skew = skew_of(turning)
@@ -180,25 +178,45 @@ def logarithm(motions: Motions) -> Array:
     square = np.where(small, 1.0, angle * angle)
     series = 1.0 / 12.0 + angle**2 / 720.0 + angle**4 / 30240.0 + angle**6 / 1209600.0
     rest = np.where(small, series, (1.0 - 0.5 * first / second) / square)
-    back = np.eye(3) - 0.5 * skew + rest[:, None, None] * (skew @ skew)
+    back = IDENTITY - 0.5 * skew + rest[:, None, None] * (skew @ skew)
     return np.concatenate([turning, np.einsum("nij,nj->ni", back, motions.translation)], axis=1)
 
 
 def _quotients(angle: Array) -> tuple[Array, Array, Array]:
     """sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 [n]."""
-    small, square = angle < SMALL_ANGLE, angle * angle
+    small = angle < SMALL_ANGLE
+    if small.all():  # as of errors: nothing but series is needed
+        return _series(angle)
     safe = np.where(small, 1.0, angle)
-    first = np.where(small, 1.0 - square / 6.0 + square**2 / 120.0 - square**3 / 5040.0, np.sin(safe) / safe)
-    half = np.where(small, 1.0 - square / 24.0 + square**2 / 1920.0, np.sin(0.5 * safe) / (0.5 * safe))
-    third = np.where(
-        small, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0 - square**3 / 362880.0, (safe - np.sin(safe)) / safe**3
-    )
+    sine, half = np.sin(safe), np.sin(0.5 * safe) / (0.5 * safe)
+    closed = sine / safe, 0.5 * half * half, (safe - sine) / safe**3
+    if not small.any():
+        return closed
+    first, second, third = (np.where(small, *both) for both in zip(_series(angle), closed, strict=True))
+    return first, second, third
+
+
+def _series(angle: Array) -> tuple[Array, Array, Array]:
+    """The same by their series, for small angles."""
+    square = angle * angle
+    fourth, sixth = square**2, square**3
+    first = 1.0 - square / 6.0 + fourth / 120.0 - sixth / 5040.0
+    half = 1.0 - square / 24.0 + fourth / 1920.0
+    third = 1.0 / 6.0 - square / 120.0 + fourth / 5040.0 - sixth / 362880.0
     return first, 0.5 * half * half, third
+
+
+def _lengths(vectors: Array) -> Array:
+    """The lengths of vectors [n x 3], in half of the time that NumPy's function takes for a few of them."""
+    return np.sqrt(np.add.reduce(vectors * vectors, axis=1))
 
 
 def cross(a: Array, b: Array) -> Array:
     """The vector product over the last axis, in less than half of the time that NumPy's takes for a few of them."""
-    return np.asarray(a[..., NEXT] * b[..., AFTER] - a[..., AFTER] * b[..., NEXT])
+    (a0, a1, a2), (b0, b1, b2) = ([v[..., k] for k in range(3)] for v in (a, b))
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=np.result_type(a, b))
+    result[..., 0], result[..., 1], result[..., 2] = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+    return result
 
 
 def skew_of(vectors: Array) -> Array:

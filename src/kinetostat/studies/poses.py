@@ -99,7 +99,7 @@ def read_columns(
         if given.count(leaf) > 1:
             raise InputError(f"{leaf} is given by two columns of the poses; remove one of them.")
     pairs = list(zip(columns, fields, strict=True))
-    values = [_values(column, field.quantity, where) for column, field in pairs]
+    values = [column_values(column, field.quantity, where) for column, field in pairs]
     lengths = dict.fromkeys(len(array) for array in values)
     count = max(lengths)
     if set(lengths) - {1, count}:
@@ -126,7 +126,7 @@ def _with_angles(machine: Machine, columns: Sequence[GivenColumn], where: Where)
             continue
         if part in parts.setdefault(form, {}):
             raise InputError(f"{form}.{part} is given by two columns of the poses; remove one of them.")
-        parts[form][part] = _values(column, ANGLE if form == "tilt" else PURE, where)
+        parts[form][part] = column_values(column, ANGLE if form == "tilt" else PURE, where)
     if not parts:
         return columns
     given = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
@@ -143,8 +143,12 @@ def _field(machine: Machine, name: object) -> Parameter:
         raise InputError(f"in the columns of the poses, {error}") from None
 
 
-def _values(column: GivenColumn, quantity: Quantity, where: Where) -> Array:
-    """Return the values of a column in SI."""
+def column_values(column: GivenColumn, quantity: Quantity, where: Where) -> Array:
+    """Return the values of a column in SI.
+
+    Raises:
+        InputError: a value is not finite, of another kind or not allowed.
+    """
     values = _numbers(column, quantity)
     if values is None:
         entries = _entries(column).tolist()

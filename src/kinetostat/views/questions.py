@@ -24,6 +24,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute the tensions of cables, their sag, and what they can hold besides",
         "views.tensions.TENSIONS_QUESTION",
     ),
+    "drives": (
+        "compute what a motion asks of the drives: force, speed, power and energy",
+        "views.drives.DRIVES_QUESTION",
+    ),
     "modes": (
         "compute natural frequencies and modes, and the receptance of the tool",
         "views.vibration.MODES_QUESTION",
@@ -56,6 +60,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.assembly.Forward": "views.forward.FORWARD",
     "studies.under_load.LoadedState": "views.analysis.LOADED",
     "studies.tensions.Tensions": "views.tensions.TENSIONS",
+    "studies.drives.DriveLoads": "views.drives.DRIVES",
     "studies.vibration.Vibration": "views.vibration.VIBRATION",
     "studies.evaluation.PoseAnswers": "views.path.PATH",
     "xarray.Dataset": "views.grid.GRID",

@@ -1,0 +1,380 @@
+"""Drives along a motion: speed, force, power and energy, at the drive and at its motor, and what joints and tool feel.
+
+Parts are rigid (theory section 20); what the tool deflects is what springs do under the same forces, one pose after the
+other. Formulas are in `motion`, motions in `motions`. Nothing is drawn here.
+
+Source: theory (97).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from kinetostat.arrays import Array
+from kinetostat.engine.batch import NUMPY_SLAB
+from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
+from kinetostat.equilibrium.drives import rotor_turns
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.forward import leg_names
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
+from kinetostat.machine.column import stacked_columns
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE
+from kinetostat.motion.forces import PARTS
+from kinetostat.motion.numbers import joints_of
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.dynamics import driven_springs, rigid_form_of, senses_of_drives
+from kinetostat.studies.motions import Motion, read_motion
+from kinetostat.studies.vibration import modes
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+
+SLOW = 1.0 / 3.0
+"""Share of the lowest natural frequency up to which springs follow a motion as at rest, within an eighth."""
+
+
+@dataclass(frozen=True)
+class DriveLoad:
+    """A drive along a motion; quantities of a linear drive are N, m/s, m, those of a rotary one N·m, rad/s, rad.
+
+    Attributes:
+        name: of the drive.
+        slides: whether it is linear.
+        turns: radians of its rotor per m or rad of its coordinate; 1 where the file gives neither lead nor ratio: its
+            motor is then the drive itself.
+        rotary: whether its motor turns.
+        coordinate: least and greatest.
+        speed, acceleration, force: greatest sizes at the drive.
+        rms_force: root of the mean square of the force over time.
+        parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
+        motor_speed, motor_torque, rms_torque: at the motor: rad/s and N·m, or of a linear motor m/s and N.
+        power: greatest power that the motor gives, W; least power, where it brakes, W.
+        energy: that the motor gives in the motion, and of it what it takes back while it brakes, J.
+        reflected: greatest inertia that it accelerates while the others stand still, at the motor, without its rotor:
+            kg·m², or kg of a linear motor; None where drives cannot move one by one.
+        inertia_ratio: of that to its rotor's; None without a rotor.
+    """
+
+    name: str
+    slides: bool
+    turns: float
+    rotary: bool
+    coordinate: tuple[float, float]
+    speed: float
+    acceleration: float
+    force: float
+    rms_force: float
+    parts: Mapping[str, float]
+    motor_speed: float
+    motor_torque: float
+    rms_torque: float
+    power: tuple[float, float]
+    energy: tuple[float, float]
+    reflected: float | None
+    inertia_ratio: float | None
+
+    @property
+    def unit(self) -> str:
+        """Of its force."""
+        return "N" if self.slides else "N·m"
+
+    @property
+    def motor_unit(self) -> str:
+        """Of its motor's torque or force."""
+        return "N·m" if self.rotary else "N"
+
+
+@dataclass(frozen=True)
+class JointLoad:
+    """The greatest force, N, and moment about its point, N·m, that a joint passes on; a slide's moment is None."""
+
+    name: str
+    force: float
+    moment: float | None
+
+
+@dataclass(frozen=True)
+class DriveCurves:
+    """Drives at all points of a motion [drives x n], SI.
+
+    Attributes:
+        coordinate, speed, acceleration, force: at the drive.
+        parts: of the force [drives x parts x n].
+        motor_speed, motor_torque, power, energy: at the motor; the energy is that since the beginning, J.
+    """
+
+    coordinate: Array
+    speed: Array
+    acceleration: Array
+    force: Array
+    parts: Array
+    motor_speed: Array
+    motor_torque: Array
+    power: Array
+    energy: Array
+
+
+@dataclass(frozen=True, eq=False)
+class DriveLoads(Immutable):
+    """The demands of a motion on the drives of a machine.
+
+    Attributes:
+        machine: with its masses.
+        status: of the first pose that has no answer, else OK.
+        message: the answer in a sentence.
+        motion: the motion; None without an answer.
+        drives: each drive; none without an answer.
+        joints: the load of each joint.
+        curves: all of it over time; None without an answer.
+        deflection: of the tool point [n x 6], rad and m, quasi-static; NaN where K does not hold it.
+        worst: number of the point at which a drive has the greatest share of its greatest force, and that drive's name.
+        frequency: lowest natural frequency at the pose of the machine, Hz; None where it is not known.
+        excited: share of the motion's acceleration, of its mean square, that is faster than a third of that frequency.
+    """
+
+    machine: Machine
+    status: Status
+    message: str
+    motion: Motion | None = None
+    drives: tuple[DriveLoad, ...] = ()
+    joints: tuple[JointLoad, ...] = ()
+    curves: DriveCurves | None = None
+    deflection: Array | None = None
+    worst: tuple[int, str] | None = None
+    frequency: float | None = None
+    excited: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"<Drives of {self.machine.name!r}: {self.message}>"
+
+    @property
+    def greatest_deflection(self) -> tuple[float, int] | None:
+        """The greatest displacement of the tool point, m, and the number of its point; None where it is not known."""
+        if self.deflection is None or np.isnan(self.deflection).all():
+            return None
+        sizes = np.linalg.norm(self.deflection[:, 3:], axis=1)
+        return float(np.nanmax(sizes)), int(np.nanargmax(sizes))
+
+
+@checked
+def drives(machine: Machine | MachineState, motion: Path | Motion, points: int = 400) -> DriveLoads:
+    """Compute what a motion asks of the drives of a machine of rigid parts.
+
+    Args:
+        machine: with masses, friction, and lead or ratio of its drives.
+        motion: a motion, or the path of its CSV file (`studies.motions.read_motion`).
+        points: of the motion that are looked at, about.
+
+    Raises:
+        InputError: the file is not a motion, or the drives do not hold the machine.
+    """
+    state = state_of(machine)
+    form = rigid_form_of(state)
+    if not _weighs(state, form):
+        raise InputError(
+            f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
+            'drives; give it one, e.g. --set tool.mass="5 kg".'
+        )
+    moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
+    forces = forces_on_path(form, moved.path, joints=True)
+    lost = np.flatnonzero(forces.status != Status.OK)
+    if lost.size:
+        status = Status(int(forces.status[lost[0]]))
+        return DriveLoads(
+            state.machine,
+            status,
+            f"The motion cannot be followed: at {moved.times[lost[0]]:.4g} s the pose is "
+            f"{status.word.replace('_', ' ')}. {status.sentence}",
+        )
+    curves = _curves(state, moved, forces)
+    summaries = _summaries(state, moved, forces, curves)
+    joints = [
+        JointLoad(joint.name, float(load[0].max()), _moment(load, joint.turns, float(state.configuration.length)))
+        for joint, load in zip(joints_of(state.configuration), forces.joints, strict=True)
+    ]
+    shares = np.abs(curves.force) / np.maximum(np.abs(curves.force).max(axis=1, keepdims=True), 1e-300)
+    largest = max(range(len(summaries)), key=lambda k: abs(summaries[k].motor_torque))
+    worst = int(np.argmax(shares[largest])), summaries[largest].name
+    frequency, excited = _excitation(state, moved)
+    return DriveLoads(
+        state.machine,
+        Status.OK,
+        _message(state.machine, moved, summaries),
+        moved,
+        tuple(summaries),
+        tuple(joints),
+        curves,
+        _deflections(state.machine, moved, forces),
+        worst,
+        frequency,
+        excited,
+    )
+
+
+def _moment(load: Array, turns: bool, length: float) -> float | None:
+    """The greatest moment that a joint passes on, N·m; 0 where it is round-off of its force."""
+    if not turns:
+        return None
+    moment = float(load[1].max())
+    return moment if moment > ROUND_OFF_OF_ENTRY * float(load[0].max()) * length else 0.0
+
+
+def _weighs(state: MachineState, form: RigidForm) -> bool:
+    rigid = form.at(state).rigid
+    loads = any(abs(float(part)) > 0.0 for part in rigid.process.components())
+    heavy = bool(rigid.platform) or any(leg.masses for leg in rigid.legs)
+    friction = any(drive.inertia or drive.viscous or drive.coulomb for drive in rigid.drives)
+    return (
+        loads or heavy or friction or any(part.coulomb or part.viscous for leg in rigid.legs for part in leg.friction)
+    )
+
+
+def _coordinates(state: MachineState, motion: Motion) -> Array:
+    """Coordinates of the drives along a motion [drives x n]."""
+    machine, count = state.machine, motion.path.size
+    driven = driven_springs(state.configuration)
+    every = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
+    chosen = [number for number, spring in enumerate(every) if any(spring is other for other in driven)]
+    with np.errstate(all="ignore"):
+        there = states_at(machine, {POSE + name: column for name, column in motion.path.pose.items()}, count)
+        if there.joints is None:
+            actuators = actuators_of(there.configuration)
+        else:
+            actuators = [a.at(there.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
+        rows = stacked_columns([actuators[number].coordinate for number in chosen], count).T
+    slides = np.array([spring.joint.point is None for spring in driven])
+    return np.where(slides[:, None], rows, np.unwrap(rows, axis=1))
+
+
+def _curves(state: MachineState, motion: Motion, forces: PathForces) -> DriveCurves:
+    """Drives and, theory (97), their motors at all points."""
+    senses = senses_of_drives(state)[:, None]
+    speed, acceleration = forces.drives[:, 0] * senses, forces.drives[:, 1] * senses
+    parts = forces.drives[:, 2:] * senses[:, :, None]
+    force = parts.sum(axis=1)
+    turns, table = _turns(state)[:, None], state.machine.tables["drives"]
+    rotary = _rotary(state)[:, None]
+    rotor = np.where(rotary, table.rotor_inertia, 0.0) * acceleration * turns
+    rotor = rotor + np.where(rotary, table.rotor_damping * speed * turns + table.rotor_friction * np.sign(speed), 0.0)
+    passed = force / turns - rotor  # through gear or screw, to the machine
+    loss = np.where(passed * speed > 0.0, 1.0 / table.efficiency, table.efficiency)
+    torque = rotor + passed * loss
+    power = torque * speed * turns
+    steps = 0.5 * (power[:, 1:] + power[:, :-1]) * np.diff(motion.times)
+    energy = np.concatenate([np.zeros((len(power), 1)), np.cumsum(steps, axis=1)], axis=1)
+    place = _coordinates(state, motion)
+    return DriveCurves(place, speed, acceleration, force, parts, speed * turns, torque, power, energy)
+
+
+def _rotary(state: MachineState) -> Array:
+    """Whether the motor of each drive turns: that of a linear drive does where the file gives its lead."""
+    springs = driven_springs(state.configuration)
+    return np.array(
+        [s.joint.point is not None or rotor_turns(s, state.machine.tables["drives"]) > 0.0 for s in springs]
+    )
+
+
+def _turns(state: MachineState) -> Array:
+    """Turns of the rotor per unit of each drive's coordinate, rad; 1 where the motor is the drive itself."""
+    springs = driven_springs(state.configuration)
+    given = np.array([float(rotor_turns(spring, state.machine.tables["drives"])) for spring in springs])
+    return np.where(given > 0.0, given, 1.0)
+
+
+def root_mean_square(times: Array, rows: Array) -> Array:
+    """Roots of the mean squares of curves over time [rows]."""
+    square = np.trapezoid(rows * rows, times, axis=-1)
+    return np.asarray(np.sqrt(square / max(times[-1] - times[0], 1e-300)))
+
+
+def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: DriveCurves) -> list[DriveLoad]:
+    turns, rotary, table = _turns(state), _rotary(state), state.machine.tables["drives"]
+    rms_force, rms_torque = (root_mean_square(motion.times, rows) for rows in (curves.force, curves.motor_torque))
+    result = []
+    for k, spring in enumerate(driven_springs(state.configuration)):
+        rotor = float(table.rotor_inertia) if rotary[k] else 0.0
+        reflected = float(forces.inertia[k].max() / turns[k] ** 2) - rotor if len(forces.inertia) else None
+        braking = np.minimum(0.5 * (curves.power[k, 1:] + curves.power[k, :-1]), 0.0) * np.diff(motion.times)
+        result.append(
+            DriveLoad(
+                name_of(spring),
+                spring.joint.point is None,
+                float(turns[k]),
+                bool(rotary[k]),
+                (float(curves.coordinate[k].min()), float(curves.coordinate[k].max())),
+                _size(curves.speed[k]),
+                _size(curves.acceleration[k]),
+                _size(curves.force[k]),
+                float(rms_force[k]),
+                {part: _size(curves.parts[k, i]) for i, part in enumerate(PARTS)},
+                _size(curves.motor_speed[k]),
+                _size(curves.motor_torque[k]),
+                float(rms_torque[k]),
+                (float(curves.power[k].max()), float(min(curves.power[k].min(), 0.0))),
+                (float(curves.energy[k, -1]), float(-braking.sum())),
+                reflected,
+                reflected / rotor if reflected is not None and rotor else None,
+            )
+        )
+    return result
+
+
+def _size(row: Array) -> float:
+    return float(np.abs(row).max())
+
+
+def _deflections(machine: Machine, motion: Motion, forces: PathForces) -> Array:
+    """Deflections of the tool point by C at each pose and the wrench there [n x 6]."""
+    result = np.full((motion.path.size, 6), np.nan)
+    for start in range(0, motion.path.size, NUMPY_SLAB):
+        part = slice(start, min(start + NUMPY_SLAB, motion.path.size))
+        columns = {POSE + name: rows[part] for name, rows in motion.path.pose.items()}
+        with np.errstate(all="ignore"):
+            response = states_at(machine, columns, part.stop - start).free
+            rows = [
+                [
+                    np.broadcast_to(np.asarray(response.compliance.entry(i, j), dtype=float), part.stop - start)
+                    for j in range(6)
+                ]
+                for i in range(6)
+            ]
+            moved = np.einsum("ijn,jn->ni", np.array(rows), forces.wrench[:, part])
+            good = np.broadcast_to(np.asarray(response.status) == Status.OK, part.stop - start)
+        result[part] = np.where(good[:, None] & np.isfinite(moved), moved, np.nan)
+    return result
+
+
+def _excitation(state: MachineState, motion: Motion) -> tuple[float | None, float]:
+    """The lowest natural frequency, Hz, and the share of the motion's accelerations above a third of it."""
+    try:
+        answer = modes(state)
+    except InputError:  # nothing has a mass, or no spring deflects
+        return None, 0.0
+    if answer.solution is None or not answer.solution.ringing or motion.duration <= 0.0:
+        return None, 0.0
+    lowest = float(answer.solution.frequencies[0])
+    count = 4096
+    even = np.linspace(motion.times[0], motion.times[-1], count, endpoint=False)
+    spectrum = np.zeros(count // 2 + 1)
+    for name, rows in motion.path.accelerations.items():
+        scale = 1.0 if name in ("x", "y", "z") else float(state.configuration.length)
+        spectrum += np.abs(np.fft.rfft(scale * np.interp(even, motion.times, rows))) ** 2
+    fast = np.fft.rfftfreq(count, motion.duration / count) > SLOW * lowest
+    whole = float(spectrum.sum())
+    return lowest, float(spectrum[fast].sum()) / whole if whole > 0.0 else 0.0
+
+
+def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> str:
+    show = machine.display.show
+    worst = max(summaries, key=lambda drive: drive.motor_torque)
+    fast = max(summaries, key=lambda drive: drive.motor_speed)
+    speed = f"{fast.motor_speed * 30.0 / np.pi:.4g} 1/min" if fast.rotary else show(fast.motor_speed, "m") + "/s"
+    return (
+        f"Along {motion.kind}, the motors give up to {show(worst.motor_torque, worst.motor_unit)} ({worst.name}), "
+        f"{show(worst.rms_torque, worst.motor_unit)} in the mean square, at up to {speed}, and up to "
+        f"{max(drive.power[0] for drive in summaries):.4g} W each."
+    )

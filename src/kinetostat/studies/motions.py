@@ -1,0 +1,372 @@
+"""Motions: poses over time from a CSV file, as positions, rates and accelerations of the coordinates of the pose.
+
+The head of the file says which kind it is: poses at times; moves with a feed rate, which begin and end at rest; or
+sines about the pose of the machine. Nothing is computed about the machine here.
+
+Source: theory (94)-(96).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from kinetostat.arrays import Array
+from kinetostat.engine.moving import Path as MovedPath
+from kinetostat.frozen import dataclass
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.orientation import ANGLES, part_of
+from kinetostat.machine.parameters import POSE, values
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity
+from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
+
+TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
+QUANTITIES = {
+    TIME: Quantity("duration", "when the pose is reached"),
+    FEED: Quantity("speed", "greatest speed of the move", positive=True),
+    ACCELERATION: Quantity("acceleration", "greatest acceleration along the path", positive=True),
+    JERK: Quantity("jerk", "greatest jerk along the path", positive=True),
+}
+SHAPES = ("line", "through", "arc")
+"""Words of the column `shape`: a straight line to the pose, a point through which the next arc leads, an arc to it."""
+STRAIGHT = 1e-9
+"""Sine of the angle between two chords of an arc below which it is a straight line."""
+SMOOTH = 5
+"""Degree of the spline through poses at times: with it, accelerations have no corner."""
+AROUND_SINES = 256
+"""Points in a period of the fastest sine, at least."""
+MOST_PERIODS = 200
+"""Periods of the fastest sine in a motion of sines."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion of a machine.
+
+    Attributes:
+        kind: what it is, in a few words.
+        times: of its points, s [n]; a point stands twice where the acceleration jumps.
+        path: coordinates of the pose with their rates and accelerations.
+        periodic: whether it closes and goes on for ever.
+    """
+
+    kind: str
+    times: Array
+    path: MovedPath
+    periodic: bool = False
+
+    @property
+    def duration(self) -> float:
+        """From its first point to its last, s."""
+        return float(self.times[-1] - self.times[0])
+
+
+def read_motion(machine: Machine, path: Path, points: int = 400) -> Motion:
+    """Read a motion from a CSV file, whose head says the unit of each column.
+
+    Beside fields of the pose, all notations of orientation among them, there may be
+
+    - `time`: the pose is reached then; a spline of degree five leads through all of them;
+    - `feed`, and if wanted `acceleration`, `jerk` and `shape`: each pose is the end of a move that begins and ends at
+      rest, with these limits: trapezoids of speed, or with a jerk seven phases. `shape` is line, through or arc;
+    - `field`, `amplitude`, `frequency`, `phase` instead: a line for each coordinate that swings about its pose.
+
+    Args:
+        machine: whose pose moves; what no column names stays as it is.
+        path: of the file.
+        points: at which a motion is looked at, about.
+
+    Raises:
+        InputError: the file cannot be read, or is not a motion.
+    """
+    columns, numbers = columns_of(path)
+    given = {column.name: column for column in columns}
+    try:
+        if FIELD in given:
+            return _sines(machine, given, points)
+        special = {name: given.pop(name) for name in (*QUANTITIES, SHAPE) if name in given}
+
+        def where(name: str, row: int) -> str:
+            return f"line {numbers[row]}, column {name}"
+
+        amounts = {
+            name: column_values(column, QUANTITIES[name], where) for name, column in special.items() if name != SHAPE
+        }
+        coordinates = _coordinates(machine, list(given.values()), where)
+        if TIME in amounts:
+            _refuse(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
+            return _through_poses(coordinates, amounts[TIME], points)
+        if FEED not in amounts:
+            raise InputError(
+                "it has neither times nor a feed rate; add a column such as time [s] or feed [mm/s] beside the pose."
+            )
+        if ACCELERATION not in amounts:
+            raise InputError("it has a feed rate but no acceleration; add a column such as acceleration [m/s**2].")
+        shapes = _shapes(special.get(SHAPE), len(numbers))
+        return _moves(machine, coordinates, amounts, shapes, points)
+    except InputError as error:
+        raise InputError(f'"{path}": {error}') from None
+
+
+def _refuse(given: Mapping[str, GivenColumn], names: Sequence[str], what: str) -> None:
+    for name in names:
+        if name in given:
+            raise InputError(f"{what} has no column {name}; remove it.")
+
+
+def _coordinates(machine: Machine, columns: Sequence[GivenColumn], where: Where) -> dict[str, Array]:
+    """All coordinates of the pose by name, at each line."""
+    poses = read_columns(machine, columns, where)
+    for path in poses.leaves:
+        if not path.startswith(POSE):
+            raise InputError(f"{path} does not move; a motion has coordinates of the pose alone.")
+    here = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
+    if any(part_of(column.name)[0] for column in columns):  # angles of quaternions and matrices may jump by a turn
+        leaves = {
+            path: np.unwrap(rows) if path.removeprefix(POSE) in ANGLES else rows for path, rows in poses.leaves.items()
+        }
+        poses = replace(poses, values=tuple(leaves[field.leaves[0]] for field in poses.fields))
+    return {
+        path.removeprefix(POSE): np.array(poses.leaves.get(path, np.full(poses.count, value)), dtype=float)
+        for path, value in here.items()
+    }
+
+
+def _through_poses(coordinates: Mapping[str, Array], times: Array, points: int) -> Motion:
+    """The spline through poses at times, theory (94); periodic where it ends at its first pose."""
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(times) < 2 or late.size:
+        after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
+        raise InputError(f"times must grow from line to line, but {after}; put the poses in their order.")
+    unwound = {name: np.array(rows) for name, rows in coordinates.items()}
+    closed = len(times) > SMOOTH + 1 and all(abs(rows[0] - rows[-1]) < 1e-12 for rows in unwound.values())
+    degree = min(SMOOTH, len(times) - 1)
+    stacked = np.stack(list(unwound.values()), axis=1)
+    if closed:
+        stacked[-1] = stacked[0]
+    spline = make_interp_spline(times, stacked, k=degree, bc_type="periodic" if closed else None)
+    fine = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], points + 1)]))
+    rows = [np.asarray(spline(fine, nu=order)) for order in range(3)]
+    kind = f"{len(times)} poses over {times[-1] - times[0]:.4g} s"
+    return Motion(kind, fine, _path(list(unwound), rows), closed)
+
+
+def _path(names: Sequence[str], rows: Sequence[Array]) -> MovedPath:
+    """Coordinates, rates and accelerations [n x coordinates] by name."""
+    parts = [dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows]
+    return MovedPath(*parts)
+
+
+def _shapes(column: GivenColumn | None, count: int) -> list[str]:
+    if column is None:
+        return ["line"] * count
+    words = [str(word).strip().lower() or "line" for word in column.entries]
+    for word in words:
+        if word not in SHAPES:
+            raise InputError(f"{shorten(word)} is not a shape of a move; write {', '.join(SHAPES)}.")
+    if "through" in (words[0], words[-1]) or words[0] == "arc":
+        raise InputError(
+            "the first pose is where the motion begins, and the last one ends a move: neither is on an arc."
+        )
+    for before, word in pairwise(words):
+        if (before == "through") is not (word == "arc"):
+            raise InputError("an arc needs a line with the shape through before it, and that one an arc behind it.")
+    return words
+
+
+def _moves(
+    machine: Machine, coordinates: Mapping[str, Array], amounts: Mapping[str, Array], shapes: Sequence[str], points: int
+) -> Motion:
+    """Moves one after the other, each from rest to rest, theory (95) and (96)."""
+    names = list(coordinates)
+    table = np.stack([coordinates[name] for name in names], axis=1)
+    places = [number for number, name in enumerate(names) if name in ("x", "y", "z")]
+    ends = [row for row, shape in enumerate(shapes) if shape != "through"]
+    if len(ends) < 2:
+        raise InputError("it has only one pose; give the pose where the motion begins and those to which it moves.")
+    lengths = float(machine.configure().length) if machine.family.chains is None else float(machine.chains().length)
+    curves = [
+        _curve(table, start, end, places, lengths, shapes[end] == "arc")
+        for start, end in pairwise(ends)
+        if np.abs(table[end] - table[start]).max() > 0.0
+    ]
+    if not curves:
+        raise InputError("all of its poses are alike, so that nothing moves; change a coordinate from line to line.")
+    rows_of = [end for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
+    each = max(2, points // max(1, 4 * len(curves)))
+    times, rows, clock = [], [[], [], []], 0.0  # type: ignore[var-annotated]
+    for curve, row in zip(curves, rows_of, strict=True):
+        jerk = float(amounts[JERK][row]) if JERK in amounts else np.inf
+        phases = profile(curve.length, float(amounts[FEED][row]), float(amounts[ACCELERATION][row]), jerk)
+        time, run = along_profile(phases, each)
+        place, slope, bend = curve.at(run[0])
+        parts = place, slope * run[1][:, None], bend * run[1][:, None] ** 2 + slope * run[2][:, None]
+        for part, more in zip(rows, parts, strict=True):
+            part.append(more)
+        times.append(clock + time)
+        clock += float(time[-1])
+    kind = f"{len(curves)} moves of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
+    return Motion(kind, np.concatenate(times), _path(names, [np.concatenate(part) for part in rows]))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line or an arc in the coordinates of the pose, by the length on the path.
+
+    Attributes:
+        start, end: of all coordinates.
+        length: of the path: that of P, or of turns alone, by a point at the machine's length from their axis, m.
+        arc: centre, two vectors of the size of its radius, and its angle, of the coordinates at `places`; None of a
+            line.
+        places: which coordinates are those of P.
+    """
+
+    start: Array
+    end: Array
+    length: float
+    places: tuple[int, ...]
+    arc: tuple[Array, Array, Array, float] | None = None
+
+    def at(self, lengths: Array) -> tuple[Array, Array, Array]:
+        """Coordinates with their first and second derivatives by the length [n x coordinates]."""
+        share = (lengths / self.length)[:, None]
+        slope = np.broadcast_to((self.end - self.start) / self.length, (len(lengths), len(self.start))).copy()
+        place, bend = self.start + (self.end - self.start) * share, np.zeros_like(slope)
+        if self.arc is not None:
+            centre, first, second, angle = self.arc
+            turned, rate = share * angle, angle / self.length
+            at, across = (
+                np.cos(turned) * first + np.sin(turned) * second,
+                np.cos(turned) * second - np.sin(turned) * first,
+            )
+            place[:, self.places], slope[:, self.places], bend[:, self.places] = (
+                centre + at,
+                across * rate,
+                -at * rate**2,
+            )
+        return place, slope, bend
+
+
+def _curve(table: Array, start: int, end: int, places: Sequence[int], size: float, round_: bool) -> Curve:
+    first, last = table[start], table[end]
+    chord = last[places] - first[places]
+    length = float(np.linalg.norm(chord))
+    arc = _arc(first[places], table[end - 1][places], last[places]) if round_ else None
+    if arc is not None:
+        length = float(np.linalg.norm(arc[1]) * arc[3])
+    turned = float(np.linalg.norm(np.delete(last - first, places)))
+    return Curve(first, last, length or turned * size, tuple(places), arc)
+
+
+def _arc(start: Array, middle: Array, end: Array) -> tuple[Array, Array, Array, float] | None:
+    """The circle through three points from the first to the last by way of the second; None where it is straight."""
+    along, across = middle - start, end - start
+    sizes = along @ along, across @ across
+    both = along @ across
+    square = sizes[0] * sizes[1] - both * both
+    if square <= STRAIGHT**2 * sizes[0] * sizes[1]:
+        return None
+    centre = start + (
+        (sizes[0] * sizes[1] - sizes[1] * both) * along + (sizes[0] * sizes[1] - sizes[0] * both) * across
+    ) / (2.0 * square)
+    first = start - centre
+    radius = np.linalg.norm(first)
+    side = along - (along @ first) / radius**2 * first
+    second = side / np.linalg.norm(side) * radius
+    turns = [np.arctan2((p - centre) @ second, (p - centre) @ first) % (2.0 * np.pi) for p in (middle, end)]
+    if turns[0] > turns[1]:
+        second, turns[1] = -second, 2.0 * np.pi - turns[1]
+    return centre, first, second, float(turns[1])
+
+
+def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> list[tuple[float, float, float]]:
+    """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (96).
+
+    Args:
+        length: of the path, m.
+        feed, acceleration, jerk: greatest values along it; an infinite jerk leaves three phases of seven.
+    """
+    if np.isinf(jerk):
+        speed = min(feed, np.sqrt(length * acceleration))
+        rise, cruise = speed / acceleration, length / speed - speed / acceleration
+        return [(rise, acceleration, acceleration), (cruise, 0.0, 0.0), (rise, -acceleration, -acceleration)]
+    speed = np.cbrt(length**2 * jerk / 4.0)
+    if speed * jerk > acceleration**2:
+        lag = acceleration**2 / jerk
+        speed = 0.5 * (np.sqrt(lag**2 + 4.0 * acceleration * length) - lag)
+    speed = min(feed, float(speed))
+    grows = acceleration / jerk if speed * jerk > acceleration**2 else float(np.sqrt(speed / jerk))
+    most = jerk * grows
+    holds = max(speed / most - grows, 0.0)
+    cruise = max(length / speed - (2.0 * grows + holds), 0.0)
+    rise = [(grows, 0.0, most), (holds, most, most), (grows, most, 0.0)]
+    return [*rise, (cruise, 0.0, 0.0), *((time, -a, -b) for time, a, b in rise)]
+
+
+def along_profile(
+    phases: Sequence[tuple[float, float, float]], points: int
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Times (s) in all phases, so many in each with both of its ends, and length, speed and acceleration then."""
+    times, lengths, speeds, gains = [], [], [], []
+    clock = at = speed = 0.0
+    for duration, first, last in phases:
+        if duration <= 0.0:
+            continue
+        time = np.linspace(0.0, duration, points)
+        jerk = (last - first) / duration
+        gains.append(first + jerk * time)
+        speeds.append(speed + first * time + jerk * time**2 / 2.0)
+        lengths.append(at + speed * time + first * time**2 / 2.0 + jerk * time**3 / 6.0)
+        times.append(clock + time)
+        clock, at, speed = clock + duration, float(lengths[-1][-1]), float(speeds[-1][-1])
+    return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(gains))
+
+
+def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
+    """Sines about the pose of the machine: of shakers and flight simulators, theory (94)."""
+    for name in given:
+        if name not in (FIELD, "amplitude", "frequency", "phase"):
+            raise InputError(
+                f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase."
+            )
+    for name in ("amplitude", "frequency"):
+        if name not in given:
+            raise InputError(f"a motion of sines has no column {name}; add one, e.g. amplitude, frequency [Hz].")
+    here = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
+    names = [path.removeprefix(POSE) for path in here]
+    rows = []
+    for number, word in enumerate(given[FIELD].entries):
+        name = str(word).strip().removeprefix(POSE)
+        if name not in names:
+            raise InputError(f"{shorten(word)} is not a coordinate of the pose; write one of {', '.join(names)}.")
+        unit = given["amplitude"].unit
+        one_row = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in given.items()}
+        field = GivenColumn(name, one_row["amplitude"].entries, unit)
+        amplitude = read_columns(machine, [field], _place).values[0][0]
+        frequency = column_values(one_row["frequency"], Quantity("frequency", "", positive=True), _place)[0]
+        phase = column_values(one_row["phase"], Quantity("angle", ""), _place)[0] if "phase" in given else 0.0
+        rows.append((name, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
+    fastest, slowest = max(row[2] for row in rows), min(row[2] for row in rows)
+    if fastest > MOST_PERIODS * slowest:
+        raise InputError(
+            f"the fastest sine swings more than {MOST_PERIODS} times in a period of the slowest; part them."
+        )
+    count = max(points, int(np.ceil(AROUND_SINES * fastest / slowest)))
+    times = np.linspace(0.0, 2.0 * np.pi / slowest, count + 1)
+    pose = {name: np.full(times.shape, here[POSE + name]) for name in names}
+    rates, gains = ({name: np.zeros(times.shape) for name in names} for _ in range(2))
+    for name, amplitude, turning, phase in rows:
+        angle = turning * times + phase
+        pose[name] = pose[name] + amplitude * np.sin(angle)
+        rates[name] = rates[name] + amplitude * turning * np.cos(angle)
+        gains[name] = gains[name] - amplitude * turning**2 * np.sin(angle)
+    closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
+    return Motion(f"{len(rows)} sines, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
+
+
+def _place(name: str, _row: int) -> str:
+    return f"column {name}"

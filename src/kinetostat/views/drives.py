@@ -1,0 +1,355 @@
+"""Drives along a motion: the question, and the description of its answer. Nothing is computed here."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.arrays import Array
+from kinetostat.display import DASH, number
+from kinetostat.machine.parameters import POSE
+from kinetostat.motion.forces import PARTS
+from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
+from kinetostat.studies.plain_data import columns_csv
+from kinetostat.studies.setting import setting_of
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
+from kinetostat.views.tables import numeric_table
+
+PER_MINUTE = 30.0 / np.pi
+"""Turns per minute of 1 rad/s."""
+MOST_LEGEND = 8
+"""Drives that a legend names."""
+
+
+def _curves(answer: DriveLoads) -> DriveCurves:
+    if answer.curves is None:
+        raise ValueError("an answer without curves has none to show")
+    return answer.curves
+
+
+def _lines(answer: DriveLoads) -> Lines:
+    yield "Drives", answer.message
+    if answer.motion is None or answer.worst is None:
+        return
+    show, (point, name) = answer.machine.display.show, answer.worst
+    yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
+    given, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
+    whole = number(max(given + back, 0.0))
+    yield "Energy", f"All motors together give {whole} J, and take back {number(back)} J while they brake."
+    if answer.greatest_deflection is not None:
+        size, where = answer.greatest_deflection
+        shown = answer.machine.display.show_deflection(size, "m")
+        yield "Deflection", f"The tool deflects by up to {shown}, at {answer.motion.times[where]:.4g} s, as if at rest."
+    if answer.frequency is not None:
+        slow = answer.excited < 1e-3
+        ending = "springs follow it as at rest." if slow else "the machine rings, and the tool deflects further."
+        yield (
+            "Vibration",
+            f"The lowest natural frequency is {number(answer.frequency)} Hz; {number(100.0 * answer.excited)} % of the "
+            f"motion's accelerations are faster than a third of it, so that {ending}",
+        )
+    if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
+        example = show(0.01, "m")
+        yield (
+            "Motors",
+            f'The file gives no lead, so that motors are taken for linear ones; write lead = "{example}" in [drives].',
+        )
+
+
+def _pose(answer: DriveLoads, point: int) -> str:
+    if answer.motion is None:
+        return ""
+    show = answer.machine.display.show
+    units = {p: "m" if p in ("x", "y", "z", "length") else "rad" for p in answer.motion.path.pose}
+    return ", ".join(
+        f"{name} {show(float(rows[point]), units[name])}" for name, rows in answer.motion.path.pose.items()
+    )
+
+
+def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
+    if not answer.drives:
+        return
+    display = answer.machine.display
+    heads = ["from", "to", "speed", "acceleration", "force", "mean square"]
+    table = numeric_table("Drives: greatest values", "drive", heads)
+    for drive in answer.drives:
+        length = "m" if drive.slides else "rad"
+        scale = display.scale(length)
+        places = [display.show(end, length) for end in drive.coordinate]
+        rates = [
+            f"{number(v * scale.factor)} {scale.unit}/s{s}" for v, s in ((drive.speed, ""), (drive.acceleration, "²"))
+        ]
+        table.add_row(
+            drive.name, *places, *rates, *(display.show(f, drive.unit) for f in (drive.force, drive.rms_force))
+        )
+    yield table
+    table = numeric_table(
+        "Motors", "motor", ["speed", "torque", "mean square", "power", "energy", "load inertia", "ratio"]
+    )
+    for drive in answer.drives:
+        inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
+        ratio = DASH if drive.inertia_ratio is None else number(drive.inertia_ratio)
+        torques = (display.show(torque, drive.motor_unit) for torque in (drive.motor_torque, drive.rms_torque))
+        work = (f"{number(drive.power[0])} W", f"{number(drive.energy[0])} J")
+        table.add_row(drive.name, _motor_speed(drive), *torques, *work, inertia, ratio)
+    yield table
+    shown = [part for part in PARTS if any(drive.parts[part] > 0.0 for drive in answer.drives)]
+    table = numeric_table("Force of the drives: greatest size of each part", "drive", shown)
+    for drive in answer.drives:
+        table.add_row(drive.name, *(display.show(drive.parts[part], drive.unit) for part in shown))
+    yield table
+    if full:
+        table = numeric_table("Joints: greatest loads", "joint", ["force", "moment"])
+        for joint in answer.joints:
+            moment = DASH if joint.moment is None else display.show(joint.moment, "N·m")
+            table.add_row(joint.name, display.show(joint.force, "N"), moment)
+        yield table
+
+
+def _motor_speed(drive: DriveLoad) -> str:
+    return f"{number(drive.motor_speed * PER_MINUTE)} 1/min" if drive.rotary else f"{number(drive.motor_speed)} m/s"
+
+
+def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the motion") -> Figure:
+    """Draw speed, force and power of all drives over time."""
+    curves, display = _curves(answer), answer.machine.display
+    groups = [(what, [d.slides is s for d in answer.drives]) for what, s in (("m", True), ("rad", False))]
+    rows: list[tuple[Array, str, list[bool]]] = []
+    for length, chosen in groups:
+        if any(chosen):
+            scale, force = display.scale(length), display.scale("N" if length == "m" else "N·m")
+            rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
+            rows.append((curves.force * force.factor, force.label("force" if length == "m" else "torque"), chosen))
+    rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.6, 0.9 + 1.7 * len(rows)), layout="constrained")
+        panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
+        for panel, (values, label, chosen) in zip(panels, rows, strict=True):
+            _lines_over_time(panel, answer, values, chosen)
+            panel.set_ylabel(label)
+        panels[-1].set_xlabel("time (s)")
+        if len(answer.drives) <= MOST_LEGEND:
+            handles, names = panels[-1].get_legend_handles_labels()
+            figure.legend(handles, names, loc="outside right upper", frameon=False, fontsize="small")
+        set_title(figure, title.format(answer.machine.name))
+        _note(figure, answer)
+        fix_layout(figure)
+    return figure
+
+
+def _note(figure: Figure, answer: DriveLoads) -> None:
+    if answer.motion is not None:
+        moving = [POSE + name for name in answer.motion.path.pose]
+        note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind)
+
+
+def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
+    if answer.motion is None:
+        return
+    panel.axhline(0.0, color="#b0b0b0", linewidth=0.8)
+    for k, drive in enumerate(answer.drives):
+        if chosen[k]:
+            dashed = "--" if k >= len(COLOURS) else "-"
+            panel.plot(
+                answer.motion.times, values[k], dashed, color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=drive.name
+            )
+
+
+def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> Figure:
+    """Draw the torque of each motor over its speed, with its greatest values and its mean squares as points."""
+    curves, display = _curves(answer), answer.machine.display
+    kinds = [(True, PER_MINUTE, "speed (1/min)", "torque"), (False, 1.0, "speed (m/s)", "force")]
+    shown = [kind for kind in kinds if any(drive.rotary is kind[0] for drive in answer.drives)]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.6, 0.9 + 3.4 * len(shown)), layout="constrained")
+        for panel, (rotary, factor, label, what) in zip(
+            figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True
+        ):
+            scale = display.scale("N·m" if rotary else "N")
+            for k, drive in enumerate(answer.drives):
+                if drive.rotary is not rotary:
+                    continue
+                colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
+                panel.plot(np.abs(curves.motor_speed[k]) * factor, torque, color=colour, linewidth=0.9, alpha=0.7)
+                times = np.zeros(1) if answer.motion is None else answer.motion.times
+                mean = float(root_mean_square(times, curves.motor_speed[k])) * factor
+                panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=5, label=drive.name)
+                panel.plot(
+                    drive.motor_speed * factor, drive.motor_torque * scale.factor, "+", color=colour, markersize=9
+                )
+            panel.set_xlabel(label)
+            panel.set_ylabel(scale.label(what))
+            panel.set_xlim(left=0.0)
+            panel.set_ylim(bottom=0.0)
+            panel.legend(
+                frameon=False,
+                fontsize="small",
+                title=f"mean squares;\n+ greatest {what}\nand speed",
+                title_fontsize="small",
+                loc="upper left",
+                bbox_to_anchor=(1.0, 1.0),
+            )
+        set_title(figure, title.format(answer.machine.name))
+        _note(figure, answer)
+        fix_layout(figure)
+    return figure
+
+
+def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}") -> Figure:
+    """Draw the parts of the force of the drive that does most."""
+    curves, display = _curves(answer), answer.machine.display
+    name = "" if answer.worst is None else answer.worst[1]
+    k = next(i for i, drive in enumerate(answer.drives) if drive.name == name)
+    scale = display.scale(answer.drives[k].unit)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.6, 3.2), layout="constrained")
+        panel = figure.add_subplot()
+        times = () if answer.motion is None else answer.motion.times
+        for i, part in enumerate(PARTS):
+            if np.any(curves.parts[k, i]):
+                panel.plot(times, curves.parts[k, i] * scale.factor, color=COLOURS[i], linewidth=1.1, label=part)
+        panel.plot(times, curves.force[k] * scale.factor, color="black", linewidth=1.4, label="whole")
+        panel.set_xlabel("time (s)")
+        panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
+        panel.legend(frameon=False, fontsize="small", ncols=3)
+        set_title(figure, title.format(answer.machine.name, name))
+        _note(figure, answer)
+        fix_layout(figure)
+    return figure
+
+
+def _figures(answer: DriveLoads) -> dict[str, Drawing]:
+    if not answer.drives:
+        return {}
+    return {
+        "drives": Drawing("Speed, force and power of the drives along the motion.", partial(over_time_figure, answer)),
+        "speed_torque": Drawing("Torque and speed that the motors must give.", partial(speed_torque_figure, answer)),
+        "parts": Drawing("Parts of the force of the drive that does most.", partial(parts_figure, answer)),
+    }
+
+
+def curves_csv(answer: DriveLoads) -> str | None:
+    """Write all drives over time as CSV, SI: a row for each point of the motion."""
+    if answer.motion is None:
+        return None
+    curves, columns = _curves(answer), {"time [s]": answer.motion.times}
+    columns |= answer.motion.path.pose
+    for k, drive in enumerate(answer.drives):
+        length = "m" if drive.slides else "rad"
+        rows_of = (
+            ("coordinate", length, curves.coordinate),
+            ("speed", f"{length}/s", curves.speed),
+            ("acceleration", f"{length}/s**2", curves.acceleration),
+            ("force", drive.unit, curves.force),
+            ("motor torque", drive.motor_unit, curves.motor_torque),
+            ("power", "W", curves.power),
+            ("energy", "J", curves.energy),
+        )
+        columns |= {f"{drive.name} {what} [{unit}]": part[k] for what, unit, part in rows_of}
+    return columns_csv(columns)
+
+
+def _over_time(name: str, unit: str, meaning: str) -> Field:
+    """A curve of all drives; empty where there is no answer."""
+
+    def take(answer: DriveLoads) -> Array:
+        return np.zeros((0, 0)) if answer.curves is None else np.asarray(getattr(answer.curves, name))
+
+    return Field(f"{name}_over_time", take, unit, meaning, ("drive", "time"))
+
+
+DRIVES = Description(
+    title="Drives along the motion",
+    fields=(
+        *FIRST_FIELDS,
+        Field("motion", "motion.kind"),
+        Field("duration", "motion.duration", "s"),
+        Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst[0]]), "s"),
+        Field("worst_drive", lambda a: None if a.worst is None else a.worst[1]),
+        Field("frequency", unit="Hz", long_name="lowest natural frequency"),
+        Field("excited", long_name="share of accelerations faster than a third of the lowest natural frequency"),
+        Field("greatest_deflection", lambda a: a.greatest_deflection and a.greatest_deflection[0], "m"),
+        Records(
+            "drives",
+            "drive",
+            (
+                Field("name", column="drive_name"),
+                Field("linear", "slides"),
+                Field("coordinate_from", lambda d: d.coordinate[0], "", "least coordinate, m or rad"),
+                Field("coordinate_to", lambda d: d.coordinate[1], "", "greatest coordinate, m or rad"),
+                Field("speed", long_name="greatest speed, m/s or rad/s"),
+                Field("acceleration", long_name="greatest acceleration, m/s² or rad/s²"),
+                Field("force", long_name="greatest force or torque, N or N·m"),
+                Field("rms_force", long_name="root of the mean square of the force or torque, N or N·m"),
+                Field("parts", axes=("part",), column="greatest", long_name="greatest size of each part, N or N·m"),
+                Field("turns", long_name="radians of the rotor per m or rad of the coordinate"),
+                Field("motor_speed", long_name="greatest speed of the motor, rad/s or m/s"),
+                Field("motor_torque", long_name="greatest torque of the motor, N·m, or force, N"),
+                Field("rms_torque", long_name="root of the mean square of that"),
+                Field("power", lambda d: d.power[0], "W", "greatest power of the motor"),
+                Field("braking_power", lambda d: d.power[1], "W", "least power of the motor, where it brakes"),
+                Field("energy", lambda d: d.energy[0], "J", "energy that the motor gives"),
+                Field("braking_energy", lambda d: d.energy[1], "J", "energy that it takes back while it brakes"),
+                Field("reflected_inertia", "reflected", "", "of the load at the motor, kg·m², or kg"),
+                Field("inertia_ratio", long_name="of the load to the rotor"),
+            ),
+        ),
+        Records(
+            "joints",
+            "joint",
+            (
+                Field("name", column="joint_name"),
+                Field("force", "force", "N", "greatest force that the joint passes on", column="joint_force"),
+                Field("moment", "moment", "N·m", "greatest moment about its point", column="joint_moment"),
+            ),
+            forms=("json", "nc"),
+        ),
+        _over_time("coordinate", "", "m or rad"),
+        _over_time("speed", "", "m/s or rad/s"),
+        _over_time("acceleration", "", "m/s² or rad/s²"),
+        _over_time("force", "", "N or N·m"),
+        _over_time("motor_torque", "", "N·m, or N of a linear motor"),
+        _over_time("power", "W", "power of the motor"),
+        _over_time("energy", "J", "energy that the motor has given"),
+        Field(
+            "deflection",
+            lambda a: np.zeros((0, 6)) if a.deflection is None else a.deflection,
+            "",
+            "of the tool point, rad and m",
+            ("time", "component"),
+        ),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=_figures,
+    axes=(
+        Axis("time", lambda a: np.zeros(0) if a.motion is None else a.motion.times, "s"),
+        Axis("component", lambda _a: np.array(["rx", "ry", "rz", "x", "y", "z"])),
+    ),
+    answered=lambda answer: bool(answer.drives),
+    files={"drives.json": "json", "drives.csv": "csv", "drives.nc": "nc", "curves.csv": curves_csv},
+)
+
+
+DRIVES_QUESTION = Question(
+    example='kinetostat drives hexapod motion.csv --set drives.lead="10 mm" --set tool.mass="12 kg" -o drives',
+    answer=drives,
+    options=(
+        Option(
+            "motion",
+            "file",
+            "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md)",
+            metavar="MOTION",
+            first=True,
+            required=True,
+        ),
+        Option("points", "count", "number of points of the motion, about (default: 400)", default=400),
+    ),
+    output="drives.json, drives.csv, drives.nc, curves.csv and the figures",
+    full="show the loads of all joints as well",
+)

@@ -1,0 +1,96 @@
+"""Drives along a motion: by hand where a hexapod moves upright, and what holds of every answer."""
+
+import numpy as np
+import pytest
+
+from kinetostat.machine.loading import load
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.drives import drives
+
+UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
+MOVES = "feed [mm/s], acceleration [m/s**2], x [mm], roll [deg]\n300, 5, 0, 0\n300, 5, 15, 2\n300, 5, 0, 0\n"
+MASS = ("tool.mass=12 kg", "load.gravity=[0, 0, -9.81]")
+MOTORS = ("drives.lead=10 mm", "drives.rotor_inertia=5e-5", "drives.rotor_friction=0.05 N*m", "drives.efficiency=0.8")
+
+
+def answer_of(folder, text, *settings, name="hexapod"):
+    (folder / "motion.csv").write_text(text, "utf-8")
+    return drives(load(name, [*settings]), folder / "motion.csv")
+
+
+def test_six_legs_lift_a_platform_as_by_hand(tmp_path):
+    """Upright, legs of the slope c each carry m (g + z'') / (6 c)."""
+    answer = answer_of(tmp_path, UP, *MASS)
+    path, curves = answer.motion.path, answer.curves
+    machine = load("hexapod")
+    legs = machine.configure().legs
+    flat = [np.hypot(*(leg.path[-1] - leg.path[0]).components()[:2]) for leg in legs]
+    for k, across in enumerate(flat):
+        slope = np.sqrt(1.0 - (across / curves.coordinate[k]) ** 2)
+        expected = 12.0 * (9.81 + path.accelerations["z"]) / (6.0 * slope)
+        assert curves.force[k] == pytest.approx(expected, rel=1e-11)
+        assert curves.speed[k] == pytest.approx(path.rates["z"] * slope, abs=1e-12)
+
+
+def test_motors_without_losses_get_all_energy_back(tmp_path):
+    """And with a screw that loses a fifth either way, they give more at every moment."""
+    ideal, real = (answer_of(tmp_path, MOVES, *MASS, *MOTORS[:2], *more) for more in ((), MOTORS[3:]))
+    whole, moved = ideal.curves.energy[:, -1].sum(), np.abs(ideal.curves.energy).max()
+    assert abs(whole) < 1e-4 * moved
+    assert (real.curves.power - ideal.curves.power).min() > -1e-12 * np.abs(ideal.curves.power).max()
+    assert real.curves.energy[:, -1].sum() > 0.1 * moved
+
+
+def test_a_motor_feels_its_drive_through_the_screw(tmp_path):
+    plain = answer_of(tmp_path, MOVES, *MASS)
+    geared = answer_of(tmp_path, MOVES, *MASS, *MOTORS)
+    turns = 2.0 * np.pi / 0.01
+    rotor = 5e-5 * geared.curves.acceleration * turns + 0.05 * np.sign(geared.curves.speed)
+    load_ = plain.curves.force / turns
+    loss = np.where(load_ * geared.curves.speed > 0.0, 1.0 / 0.8, 0.8)
+    size = np.abs(geared.curves.motor_torque).max()
+    assert geared.curves.motor_torque == pytest.approx(rotor + load_ * loss, abs=1e-11 * size)
+    assert geared.drives[0].inertia_ratio == pytest.approx(plain.drives[0].reflected / turns**2 / 5e-5, rel=1e-9)
+    assert plain.drives[0].inertia_ratio is None
+
+
+def test_parts_add_up_and_say_what_is_greatest(tmp_path):
+    answer = answer_of(tmp_path, MOVES, *MASS, *MOTORS, "load.force=[5, 0, -20]")
+    assert answer.curves.parts.sum(axis=1) == pytest.approx(answer.curves.force)
+    for k, drive in enumerate(answer.drives):
+        assert drive.force == pytest.approx(np.abs(answer.curves.force[k]).max())
+        assert drive.rms_force <= drive.force
+        assert drive.power[0] >= 0.0 >= drive.power[1]
+    point, name = answer.worst
+    row = answer.curves.force[[drive.name for drive in answer.drives].index(name)]
+    assert abs(row[point]) == pytest.approx(np.abs(row).max())
+
+
+def test_joints_of_struts_pass_on_what_their_drives_do(tmp_path):
+    answer = answer_of(tmp_path, UP, *MASS)
+    forces = {joint.name: joint.force for joint in answer.joints}
+    for drive in answer.drives:
+        leg = drive.name.removesuffix(" actuator")
+        assert forces[f"{leg} base joint"] == pytest.approx(drive.force)
+        assert forces[f"{leg} platform joint"] == pytest.approx(drive.force)
+
+
+def test_the_tool_deflects_as_under_the_same_wrench(tmp_path):
+    answer = answer_of(tmp_path, UP, *MASS)
+    middle = int(np.argmin(np.abs(answer.motion.path.accelerations["z"][:-1])))
+    compliance = np.array(analyze(load("hexapod", [*MASS])).compliance)
+    wrench = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -12.0 * 9.81])
+    assert answer.motion.path.pose["z"][middle] == pytest.approx(0.135)
+    assert answer.deflection[middle] == pytest.approx(compliance @ wrench, abs=1e-12)
+
+
+def test_a_motion_out_of_reach_has_a_sentence(tmp_path):
+    answer = answer_of(tmp_path, UP.replace("3 mm", "3 m"), *MASS, name="hexapod-rus")
+    assert not answer.drives
+    assert "cannot be followed" in answer.message
+
+
+def test_a_machine_without_a_mass_is_refused(tmp_path):
+    with pytest.raises(InputError, match="mass, friction or a load"):
+        answer_of(tmp_path, UP)
