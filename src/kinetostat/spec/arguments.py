@@ -79,6 +79,8 @@ WORDS = {
     "to": 'the name of a format, e.g. "mjcf"',
     "inputs": 'names as texts, e.g. ["x", "z"]',
     "outputs": 'what moves as texts, e.g. ["x", "z"]',
+    "motion": "a motion, or the path of its CSV file",
+    "points": "a whole number from 2",
     "data": "the path of a CSV file of measured poses",
     "fit": 'groups or paths of parameters as texts, e.g. ["geometry", "zeros"]',
     "sigma": 'a standard deviation of lengths, e.g. "5 um"',

@@ -166,7 +166,7 @@ def drives(machine: Machine | MachineState, motion: Path | Motion, points: int =
 
     Args:
         machine: with masses, friction, and lead or ratio of its drives.
-        motion: a motion, or the path of its CSV file (`studies.motions.read_motion`).
+        motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines.
         points: of the motion that are looked at, about.
 
     Raises:
@@ -179,6 +179,8 @@ def drives(machine: Machine | MachineState, motion: Path | Motion, points: int =
             f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
             'drives; give it one, e.g. --set tool.mass="5 kg".'
         )
+    if points < 2:
+        raise InputError(f"points is {points}; a motion is looked at two points or more.")
     moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
     forces = forces_on_path(form, moved.path, joints=True)
     lost = np.flatnonzero(forces.status != Status.OK)
