@@ -27,8 +27,8 @@ BODY = {"tool.mass": 12.0, "tool.inertia.0": 0.3, "tool.inertia.1": 0.3, "tool.i
 ROTORS = {"drives.rotor_inertia": 2e-5, "drives.lead": 0.01, "drives.ratio": 20.0}
 NAMES = [f"frequency_{number}" for number in range(1, 7)]
 BY_MATRICES = {
-    "delta", "hexapod-hardware", "hexapod-rus", "orthoglide", "passive-leg-3dof-pu-rus", "passive-leg-4dof-rus",
-    "passive-leg-5dof-rus", "planar-3rrr", "tricept-rus", "tripteron",
+    "delta", "delta-linear", "hexapod-hardware", "hexapod-rus", "orthoglide", "passive-leg-3dof-pu-rus",
+    "passive-leg-4dof-rus", "passive-leg-5dof-rus", "planar-3rrr", "tricept-rus", "tripteron",
 }  # fmt: skip
 """Machines whose loops no rods cut: with massive links, sums over scalars do not give their frequencies."""
 

@@ -116,7 +116,7 @@ def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> t
 
 
 def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
-    """Links of the actuated legs, all as long as a field of [geometry] says; in pairs where `bars` is 2.
+    """Links of the actuated legs, as long as a field of [geometry] says, of all or of each; in pairs where `bars` is 2.
 
     Args:
         what: they are called.
@@ -127,10 +127,12 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
 
     def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
-        length = getattr(geometry, field)
+        actuated, given = actuated_legs(legs), getattr(geometry, field)
+        of_each = isinstance(given, tuple)
+        sizes = [given[leg.number - 1] if of_each and leg.number else given for leg in actuated]
         return [
             (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment, None if bars == 1 else place))
-            for leg in actuated_legs(legs)
+            for leg, length in zip(actuated, sizes, strict=True)
             for place, name in enumerate(names)
         ]
 

@@ -4,7 +4,8 @@ Sentences and tables show the record of a fit, so that an answer and a file that
 computed here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,13 @@ import numpy as np
 from kinetostat.display import DASH, Display, Scale, number, number_and_uncertainty
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studies.identification.firmware import (
+    FirmwareNumbers,
+    firmware_numbers,
+    klipper_text,
+    marlin_text,
+    reprap_text,
+)
 from kinetostat.studies.identification.fit import Tell
 from kinetostat.studies.identification.identification import (
     USUALLY_FITTED,
@@ -99,6 +107,9 @@ def _fit_tables(record: FitRecord, display: Display) -> Iterator[FittedTable]:
 
 def _tables(answer: Identification, _full: bool) -> Iterator[FittedTable]:
     yield from _fit_tables(_record(answer), answer.machine.display)
+    numbers = firmware_numbers(answer)
+    if numbers is not None:
+        yield _firmware_table(numbers)
     if answer.next is not None:
         yield _pose_table(answer.next, answer.machine.display)
 
@@ -157,6 +168,36 @@ def _pose_table(proposed: NextPoses, display: Display) -> FittedTable:
     return table
 
 
+def _firmware_table(numbers: FirmwareNumbers) -> FittedTable:
+    """The numbers of a printer's controller: words of Klipper, letters of M665 and M666, values and intervals."""
+    table = text_table("In the words of firmware (mm, deg)", "Klipper", "Marlin", "RepRapFirmware", "value", "±")
+    for column in table.columns[3:]:
+        column.justify = "right"
+    (marlin, height), (reprap, homed) = numbers.marlin_endstops, numbers.reprap_endstops
+    halves = {name: iter(rows) for name, rows in numbers.halves.items()}
+
+    def row(words: tuple[str, str, str], value: float, name: str) -> None:
+        table.add_row(*words, *number_and_uncertainty(value, next(halves[name])))
+
+    row(("delta_radius", "M665 R", "M665 R"), numbers.radius, "radius")
+    for tower, rod in zip("abc", numbers.rods, strict=True):
+        row((f"arm_length {tower}", "M665 L", "M665 L"), rod, "rods")
+    for tower, letter, nominal, angle in zip("abc", "XYZ", (210.0, 330.0, 90.0), numbers.angles, strict=True):
+        row((f"angle {tower} - {nominal:g}", f"M665 {letter}", f"M665 {letter}"), angle, "angles")
+    for place, tower in enumerate("abc"):
+        letters = f"M666 {'XYZ'[place]} {marlin[place]:+.4f}", f"M666 {'XYZ'[place]} {reprap[place]:+.4f}"
+        row((f"position_endstop {tower}, change", *letters), numbers.raised[place], "raised")
+    table.add_row("", f"M665 H {height:+.4f}", f"M665 H {homed:+.4f}", "", "")
+    if any(numbers.halves["scale"]):
+        row(("rotation_distance, factor", "1 / M92", "1 / M92"), numbers.scale, "scale")
+    return table
+
+
+def _firmware_file(text: Callable[[FirmwareNumbers], str], answer: Identification) -> str | None:
+    numbers = firmware_numbers(answer)
+    return None if numbers is None else text(numbers)
+
+
 def _unknowns(answer: Identification) -> list[dict[str, Any]]:
     return [
         {
@@ -192,6 +233,7 @@ IDENTIFICATION = Description(
         Field("unknowns", _unknowns),
         Field("covariance", "fit.covariance"),
         Field("rank", "fit.rank"),
+        Field("freedom", "fit.freedom"),
         Field("scatter", "fit.scatter"),
         Field("sigma_known", "observed.data.known"),
         Field("before", lambda answer: answer.scatter(answer.fit.before)),
@@ -212,6 +254,9 @@ IDENTIFICATION = Description(
         "machine.toml": "exchange.leg_by_leg.fitted_text",
         "fit.json": _fit_file,
         "next-poses.csv": _next_file,
+        "klipper.cfg": partial(_firmware_file, klipper_text),
+        "marlin.gcode": partial(_firmware_file, marlin_text),
+        "reprapfirmware.g": partial(_firmware_file, reprap_text),
     },
 )
 
@@ -229,6 +274,7 @@ def _ask(
     fit: Sequence[str] = (),
     priors: Sequence[str] = (),
     bounds: Sequence[str] = (),
+    ties: Sequence[str] = (),
     no_outliers: bool = False,
     progress: Tell = lambda *_: None,
     **options: Any,
@@ -236,22 +282,25 @@ def _ask(
     return identify(
         machine,
         data,
-        fit or USUALLY_FITTED,
+        fit or (() if ties else USUALLY_FITTED),
         priors=_sizes(priors, "--prior"),
         bounds=_sizes(bounds, "--bound"),
+        ties=_sizes(ties, "--tie", "NAME=PATTERN", "rod_length=geometry.rod_length.*"),
         robust=not no_outliers,
         tell=progress,
         **options,
     )
 
 
-def _sizes(texts: Sequence[str], option: str) -> Mapping[str, str]:
-    """Sizes by group or path, from texts "what=size"."""
+def _sizes(
+    texts: Sequence[str], option: str, form: str = "what=size", example: str = "zeros=0.1 mm"
+) -> Mapping[str, str]:
+    """Texts by group or path, from texts "what=size"."""
     sizes = {}
     for text in texts:
         name, equals, size = (part.strip() for part in text.partition("="))
         if not (name and equals and size):
-            raise InputError(f'{option} {shorten(text)} must be what=size, e.g. {option} "zeros=0.1 mm".')
+            raise InputError(f'{option} {shorten(text)} must be {form}, e.g. {option} "{example}".')
         sizes[name] = size
     return sizes
 
@@ -296,6 +345,14 @@ IDENTIFY_QUESTION = Question(
             metavar="WHAT=SIZE",
             many=True,
             word="--bound",
+        ),
+        Option(
+            "ties",
+            "text",
+            "errors that are one unknown, by a name of your own: paths with *, or 0.5 * PATH + -0.5 * PATH; repeatable",
+            metavar="NAME=PATTERN",
+            many=True,
+            word="--tie",
         ),
         Option("no_outliers", "flag", "keep all values: outliers are not set aside"),
         Option("more", "count", "propose N poses to measure next", default=0, word="--next"),

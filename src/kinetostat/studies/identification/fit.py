@@ -36,6 +36,8 @@ FOLDS = 5
 FULL_PREFERENCE = 50.0
 """The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
 would go where the curvature of the equations explains some of the noise."""
+LEAST_FREEDOM = 0.5
+"""Freedom of residuals at least: measured values that explain themselves say nothing of their standard deviation."""
 MOST_FIT_STEPS = 500
 """Steps of a fit at most: along a curved valley they are short."""
 
@@ -73,6 +75,11 @@ class Wishes:
     known: bool = True
     resolution: float = 0.0
 
+    @property
+    def judged(self) -> bool:
+        """Whether priors need no standard deviation of the measurements, which is known, or has nothing to weigh."""
+        return self.known or not np.isfinite(self.priors).any()
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -91,6 +98,9 @@ class Fit:
             come first [unknowns].
         ways: these combinations as columns, in plausible sizes [unknowns x unknowns].
         rank: how many are seen.
+        interval: covariance of what is seen, widened to squares of halves of 95 % intervals, SI [unknowns x unknowns]:
+            by Student's factor for what measurements say whose standard deviation is estimated, not for priors.
+        freedom: of the kept residuals: their number, less what the measured values, not the priors, use up.
         predicted: residuals of poses that took no part, in standard deviations [rows].
     """
 
@@ -105,6 +115,8 @@ class Fit:
     seen: Array
     ways: Array
     rank: int
+    interval: Array
+    freedom: float
     predicted: Array
 
     def __repr__(self) -> str:
@@ -150,7 +162,8 @@ def best_fit(question: ResidualEquations, groups: Integers, wishes: Wishes, tell
             tell(turn, MOST_ROUNDS, f"{int((~kept).sum())} outliers")
             values = _least_squares(question, wishes, kept, values, seen, np.inf if squares else spread)
             after, rates = _rates_at(question, values, wishes)
-            last, spread, rank = spread, _spread(after, rates, wishes), seen.rank
+            last, rank = spread, seen.rank
+            spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after, rates, kept, wishes, last)
             settled = abs(spread - last) <= SAME_SPREAD * last
     return _fit_result(before, after, rates, kept, values, groups, wishes)
 
@@ -175,6 +188,34 @@ def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
         hides = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
         least = max(wishes.resolution, UNSEEN * float(strengths[0]) if hides else 0.0)
     return max(MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
+
+
+def _own_spread(residuals: Array, rates: Array, kept: Mask, wishes: Wishes, last: float) -> float:
+    """Standard deviation of measurements that only their residuals say, where priors weigh against them.
+
+    It is that of the kept residuals over their freedom, which depends on it: a few steps from the last one settle both.
+    """
+    squares, spread = float((residuals[kept] ** 2).sum()), last
+    for _ in range(MOST_ROUNDS):
+        seen = _combinations(rates[kept], wishes, spread)
+        spread = max(np.sqrt(squares / _freedom(rates[kept], seen)), wishes.resolution)
+    return float(spread)
+
+
+def _freedom(rates: Array, seen: "_Combinations") -> float:
+    """Number of residuals less the freedoms that measured values use up, theory (65).
+
+    Each combination takes as much of a freedom as the measurements say of what they and the priors say together.
+
+    Args:
+        rates: how the kept residuals fall per plausible size [rows x unknowns].
+        seen: the combinations, with the priors.
+    """
+    ways = seen.ways[:, : seen.rank]
+    measured, prior = rates @ ways, seen.prior @ ways
+    both = measured.T @ measured + prior.T @ prior
+    used = float(np.trace(np.linalg.solve(both, measured.T @ measured))) if seen.rank else 0.0
+    return max(len(rates) - used, LEAST_FREEDOM)
 
 
 @dataclass(frozen=True)
@@ -261,24 +302,44 @@ def _fit_result(
     wishes: Wishes,
 ) -> Fit:
     """Describe the fit at its values: covariance and intervals, theory (65), rank, and poses that took no part."""
-    seen = _combinations(rates[kept], wishes, _spread(after, rates, wishes))
+    spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after, rates, kept, wishes, 1.0)
+    seen = _combinations(rates[kept], wishes, spread)
     rank, ways = seen.rank, seen.ways
-    freedom = max(int(kept.sum()) - rank, 1)
+    freedom = _freedom(rates[kept], seen)
     scatter = float(np.sqrt((after[kept] ** 2).sum() / freedom))
     basis = ways[:, :rank] / seen.strengths[:rank]
     spread = 1.0 if wishes.known else max(scatter, wishes.resolution)
-    covariance = spread**2 * basis @ basis.T * np.outer(wishes.sizes, wishes.sizes)
+    units = spread**2 * np.outer(wishes.sizes, wishes.sizes)
+    covariance = basis @ basis.T * units
+    measured, before_all = rates[kept] @ basis, seen.prior @ basis
     factor = SURELY if wishes.known else _quantile(freedom)
+    widened = factor**2 * measured.T @ measured + SURELY**2 * before_all.T @ before_all
+    interval = basis @ widened @ basis.T * units
     hidden = ways[:, rank:]
     likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * wishes.preferred) ** 2) @ hidden)
     unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * wishes.sizes
-    sure = np.hypot(factor * np.sqrt(np.diag(covariance)), SURELY * unseen)
+    sure = np.hypot(np.sqrt(np.diag(interval)), SURELY * unseen)
     sure[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
     predicted = _left_out(after, rates, kept, groups, np.concatenate([seen.prior, seen.preference]))
-    return Fit(values, covariance, sure, kept, before, after, rates, scatter, seen.strengths, ways, rank, predicted)
+    return Fit(
+        values,
+        covariance,
+        sure,
+        kept,
+        before,
+        after,
+        rates,
+        scatter,
+        seen.strengths,
+        ways,
+        rank,
+        interval,
+        freedom,
+        predicted,
+    )
 
 
-def _quantile(freedom: int) -> float:
+def _quantile(freedom: float) -> float:
     """Half of the 95 % interval over the standard deviation, where that is estimated: Student's t."""
     from scipy.special import stdtrit  # a quarter of a second to import: only where nobody knows standard deviations
 

@@ -125,6 +125,7 @@ def identify(
     bounds: Mapping[str, str] | None = None,
     robust: bool = True,
     more: int = 0,
+    ties: Mapping[str, str] | None = None,
     tell: Tell = lambda *_: None,
 ) -> Identification:
     """Find the errors of a machine that explain what was measured of it.
@@ -140,6 +141,8 @@ def identify(
         bounds: largest sizes by group or path, text with a unit.
         robust: whether outliers are set aside.
         more: how many poses to propose for measuring next.
+        ties: further unknowns by names of your own, each of several errors that are one number: a pattern of their
+            paths, "geometry.rod_length.*", or a sum with shares, "0.5 * legs.a.b.x + -0.5 * legs.c.b.x".
         tell: receives how far the work is.
 
     Raises:
@@ -157,7 +160,7 @@ def identify(
         sigmas = Sigmas(sigmas.length, sigmas.length / length, sigmas.known)
     measured = read_measurements(machine, Path(data), sigmas)
     model = error_model(machine, measured.pose, len(measured), np.zeros(6))
-    return identification_of(model, measured, fit, frame, target, priors or {}, bounds or {}, robust, more, tell)
+    return identification_of(model, measured, fit, frame, target, priors or {}, bounds or {}, robust, more, tell, ties)
 
 
 def identification_of(
@@ -171,30 +174,36 @@ def identification_of(
     robust: bool = True,
     more: int = 0,
     tell: Tell = lambda *_: None,
+    ties: Mapping[str, str] | None = None,
 ) -> Identification:
     """Find errors from measurements that are there as numbers; arguments and errors as for `identify`.
 
     Args:
         model: of the machine at the commanded poses.
         data: what was measured there.
-        fit, frame, target, priors, bounds, robust, more, tell: see `identify`.
+        fit, frame, target, priors, bounds, robust, more, tell, ties: see `identify`.
 
     Raises:
         InputError: as for `identify`.
     """
-    unknowns = _unknowns_named(model, fit)
+    shares: dict[str, Mapping[str, float]] = {}
+    unknowns = _unknowns_named(model, fit) if several(fit) or not ties else []
+    for name, terms in (ties or {}).items():
+        tied, shares[name] = _tied_error(model, name, terms)
+        unknowns.append(tied)
     turned = any(name in (*TURNED, *EULER) for name in data.values)
     places = [
         *(FRAME_UNKNOWNS if frame else ()),
         *(TARGET_UNKNOWNS if target and turned else TARGET_UNKNOWNS[3:] if target else ()),
     ]
     unknowns += [place_unknown(path) for path in places]
-    seen = observation(model, data, unknowns)
+    seen = observation(model, data, unknowns, ties=shares)
     sizes = np.array([_plausible_size(unknown) for unknown in unknowns])
-    _enough(model.machine, seen, sizes)
+    known_before = _sizes_by_name(unknowns, priors or {}, "prior")
+    _enough(model.machine, seen, sizes, int(np.isfinite(known_before).sum()))
     wishes = Wishes(
         sizes,
-        _sizes_by_name(unknowns, priors or {}, "prior"),
+        known_before,
         _sizes_by_name(unknowns, bounds or {}, "bound"),
         np.array([PLACED_ANYWHERE if u.group in ("frame", "target") else PREFERENCE for u in unknowns]),
         robust,
@@ -228,6 +237,41 @@ def _unknowns_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineE
     return [error for error in model.errors if error.path in paths]
 
 
+def _tied_error(model: ErrorModel, name: str, terms: str) -> tuple[MachineError, dict[str, float]]:
+    """An unknown that is several errors at once, and how far each of them goes with it, by path.
+
+    Raises:
+        InputError: the name is not one, a term names nothing, or errors of several kinds.
+    """
+    if not name.isidentifier():
+        raise InputError(f"the tie {shorten(name)} needs a name of letters, digits and _, such as rod_length.")
+    shares: dict[str, float] = {}
+    named: list[MachineError] = []
+    for term in terms.split("+"):
+        factor, star, pattern = term.partition(" * ")
+        pattern = (pattern if star else term).strip()
+        try:
+            share = float(factor) if star else 1.0
+        except ValueError:
+            raise InputError(f'in the tie {name}, {shorten(factor)} is not a number; write "0.5 * PATH".') from None
+        found_errors = [error for error in model.errors if _matches(error, pattern)]
+        if not found_errors:
+            raise InputError(
+                f'the tie {name}: "{pattern}" names no error of {model.machine.name}; give paths with *, such as '
+                f'"{model.errors[0].path}".'
+            )
+        named += found_errors
+        shares |= {error.path: shares.get(error.path, 0.0) + share for error in found_errors}
+    kinds = {error.kind for error in named}
+    if len(kinds) > 1:
+        raise InputError(
+            f"the tie {name} has errors of several kinds, {' and '.join(sorted(kinds))}; tie those of one."
+        )
+    others = f" and {len(named) - 1} more as one" if len(named) > 1 else ""
+    words = f"{name.replace('_', ' ')}: {named[0].words}{others}"
+    return MachineError(name, named[0].kind, "tied", words, ""), shares
+
+
 def _plausible_size(unknown: MachineError) -> float:
     return PLAUSIBLE_COMPLIANCE_ERROR if unknown.group == "compliances" else PLAUSIBLE_SIZES[unknown.kind]
 
@@ -237,9 +281,9 @@ def _matches(error: MachineError, pattern: str) -> bool:
     return fnmatchcase(error.path, pattern) and (error.group != "clearances" or "clearance" in pattern)
 
 
-def _enough(machine: Machine, seen: Observation, sizes: Array) -> None:
-    """Refuse fewer values than unknowns, and say how many poses are needed, and which."""
-    data, unknowns = seen.data, len(seen.unknowns)
+def _enough(machine: Machine, seen: Observation, sizes: Array, priors: int) -> None:
+    """Refuse fewer values, with what is known before, than unknowns; say how many poses are needed, and which."""
+    data, unknowns = seen.data, len(seen.unknowns) - priors
     if data.count >= unknowns:
         return
     each = max(data.count / max(len(data), 1), 1.0)

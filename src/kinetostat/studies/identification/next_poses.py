@@ -10,6 +10,7 @@ Source: theory (67) and (68).
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -151,7 +152,8 @@ def _candidates(
     whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
     rows = np.flatnonzero(np.isin(whole.drawn.status, PLACED if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
-    return observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
+    there = observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
+    return replace(there, members=seen.members), within
 
 
 def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:

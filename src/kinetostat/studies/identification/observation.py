@@ -6,7 +6,7 @@ target on the platform. Residuals are in standard deviations.
 Source: theory (64); exact places and rates are those of theory (46) and (48).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -42,7 +42,8 @@ class Observation:
         model: the machine at the commanded poses.
         data: what was measured there.
         unknowns: what is to be found, in order.
-        chosen: the place of each in the errors of the model; -1 of the frame's and the target's.
+        chosen: the place of each in the errors of the model; -1 of tied errors, the frame's and the target's.
+        members: how far each error of the model goes with each unknown [errors x unknowns].
         frame: where the measuring frame is taken to be at first.
         names: of the measured value in each row of the residuals [rows].
         pose: to which pose each row belongs [rows].
@@ -54,6 +55,7 @@ class Observation:
     data: Measurements
     unknowns: tuple[MachineError, ...]
     chosen: Integers
+    members: Array
     frame: Motions
     names: tuple[str, ...]
     pose: Integers
@@ -89,10 +91,7 @@ class Observation:
 
     def errors(self, values: Array) -> Array:
         """The errors of the whole model [errors] that unknowns [unknowns] stand for."""
-        result = np.zeros(len(self.model.errors))
-        of_machine = self.chosen >= 0
-        result[self.chosen[of_machine]] = values[of_machine]
-        return result
+        return np.asarray(self.members @ values)
 
     def twists(self, whole: Array) -> Array:
         """Twists of the tool per unit of each unknown, base axes, from the rates of all errors; 0 by frame and target.
@@ -100,12 +99,13 @@ class Observation:
         Args:
             whole: rates of all errors of the model [n x 6 x errors].
         """
-        return np.where(self.chosen >= 0, whole[:, :, np.maximum(self.chosen, 0)], 0.0)
+        used = self.members.any(axis=1)
+        return np.asarray(whole[:, :, used] @ self.members[used])
 
     def _predict(self, values: Array, with_rates: bool) -> tuple[Array, Array]:
         model, errors = self.model, self.errors(values)
         moved, whole = (
-            model.linearisation(errors, set(self.chosen.tolist()))
+            model.linearisation(errors, set(np.flatnonzero(self.members.any(axis=1)).tolist()))
             if with_rates
             else (model.displacement(errors)[0], np.zeros(0))
         )
@@ -124,18 +124,15 @@ class Observation:
         predicted = self._values(seen, deflected)
         if not with_rates:
             return predicted, np.zeros((0, 0))
-        rates = self._place_rates(self.twists(whole), turned, tool + arm - origin, arm, axes, target, frame)
+        first = len(errors) - soft.shape[2]
+        twists = self.twists(np.concatenate([whole[:, :, :first], soft], axis=2))
+        rates = self._place_rates(twists, turned, tool + arm - origin, arm, axes, target, frame)
         return predicted, self._rates(seen, rates, soft)
 
     def _place_rates(
         self, twists: Array, turned: Array, at: Array, arm: Array, axes: Array, target: Array, frame: Array
     ) -> Array:
         """Twists of the target in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
-        soft = self.model.deflections(self.data.wrenches)
-        first = len(self.model.errors) - soft.shape[2]
-        for number, place in enumerate(self.chosen):
-            if place >= first:
-                twists[:, :, number] = soft[:, :, place - first]
         turning, moving = twists[:, :3], twists[:, 3:]
         moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), arm[:, None]), 1, 2)
         unit = np.eye(3)
@@ -181,10 +178,7 @@ class Observation:
             columns["distance"] = np.einsum("ni,niu->nu", way, rates[:, 3:])
         if any(name.startswith("deflection") for name in wanted):
             first = len(self.model.errors) - soft.shape[2]
-            by_spring = np.zeros((len(soft), 6, len(self.unknowns)))
-            for number, place in enumerate(self.chosen):
-                if place >= first:
-                    by_spring[:, :, number] = soft[:, :, place - first]
+            by_spring = soft @ self.members[first:]
             columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*TURNED, *POSITION))}
         return np.stack([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
 
@@ -213,7 +207,11 @@ def _angle_rates(rotation: Array) -> Array:
 
 
 def observation(
-    model: ErrorModel, data: Measurements, unknowns: Sequence[MachineError], frame: Motions | None = None
+    model: ErrorModel,
+    data: Measurements,
+    unknowns: Sequence[MachineError],
+    frame: Motions | None = None,
+    ties: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Observation:
     """Put measurements beside the model.
 
@@ -222,6 +220,7 @@ def observation(
         data: at the same poses.
         unknowns: to be found.
         frame: where the measuring frame is taken to be at first; found from the measurements if None.
+        ties: of each unknown that is several errors at once, their paths and how far they go with it.
 
     Raises:
         InputError: the drawn machine has no place at a commanded pose, or measured positions lie far from it although
@@ -234,6 +233,11 @@ def observation(
         raise data.refusal(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
     paths = [error.path for error in model.errors]
     chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
+    members = np.zeros((len(paths), len(unknowns)))
+    for number, unknown in enumerate(unknowns):
+        for path, share in (ties or {}).get(unknown.path, {unknown.path: 1.0}).items():
+            if path in paths:
+                members[paths.index(path), number] = share
     pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
     pairs.sort(key=lambda pair: pair[1])
     if frame is None:
@@ -246,6 +250,7 @@ def observation(
         data,
         tuple(unknowns),
         chosen,
+        members,
         frame,
         tuple(name for name, _ in pairs),
         np.array([row for _, row in pairs], dtype=np.int64),

@@ -49,7 +49,10 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     """
     legs = [anatomy(leg) for leg in configuration.legs]
     base, platform = plates(configuration, legs, sizes.leg)
-    solids = [*(base.solids() if base else []), *platform.solids()]
+    open_frame = all(spring.acts for leg in configuration.legs for spring in leg.springs if spring.actuated)
+    # Cables hang between the posts of a frame: a plate behind their anchors would hide the machine.
+    of_base = [solid for solid in base.solids() if not (open_frame and solid.name == "base/plate")] if base else []
+    solids = [*of_base, *platform.solids()]
     solids += tool_solids(machine, configuration, platform, sizes.leg)
     for leg in legs:
         solids += leg_solids(leg, base, platform, sizes)

@@ -1,0 +1,216 @@
+"""A delta printer calibrated by ten probed heights: truth within its intervals, and what each firmware then does.
+
+Kinematics of the printer and of the controllers are written in tests, from their points and documents.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinetostat import build, identify, load
+from kinetostat.accuracy.model import error_model
+from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.identification.firmware import firmware_numbers, klipper_text, marlin_text, reprap_text
+from kinetostat.studies.identification.fit import Wishes, best_fit
+from kinetostat.studies.identification.identification import PREFERENCE, _sizes_by_name, identification_of
+from kinetostat.studies.identification.measurements import Sigmas, read_measurements
+from synthetic_printer import ANGLES, HEIGHT, PLATFORM, PROBED, ROD, Truth, probed_heights, reached, write_probes
+
+NOISE = 20e-6
+TIES = {"radius": "geometry.tower_radius.*", "rod": "geometry.rod_length.*"}
+ENDSTOPS = np.array([0.24, 0.24, 0.24])
+"""Heights of the nozzle at which the controller believes its carriages to be at their endstops, m."""
+FITTED = ("zeros", "geometry.tower_angles.0", "geometry.tower_angles.1")
+PRIORS = {
+    "zeros": "0.3 mm", "geometry.tower_angles.*": "4 mrad", "radius": "0.3 mm", "rod": "0.3 mm",
+    "geometry.lean_*": "2 mrad", "scale": "0.001",
+}  # fmt: skip
+
+
+def somewhere(draw, wide=False):
+    """Errors as large as the priors say; with leans and a scale if `wide`."""
+    truth = Truth(draw.normal(0, 3e-4, 3), np.array([*draw.normal(0, 4e-3, 2), 0.0]), *draw.normal(0, 3e-4, 2))
+    if wide:
+        truth.lean_out, truth.lean_aside, truth.gain = (
+            draw.normal(0, 2e-3, 3),
+            draw.normal(0, 2e-3, 3),
+            draw.normal(0, 1e-3),
+        )
+    return truth
+
+
+def numbers_of(truth):
+    """By the paths of the unknowns."""
+    result = {f"legs.tower {t}.actuator.zero": z for t, z in zip("ABC", truth.zeros, strict=True)}
+    for name in ("lean_out", "lean_aside"):
+        result |= {f"geometry.{name}.{i}": value for i, value in enumerate(getattr(truth, name))}
+    result |= {f"geometry.tower_angles.{i}": value for i, value in enumerate(truth.angles)}
+    return result | {"radius": truth.radius, "rod": truth.rod, "scale": truth.gain}
+
+
+def firmware_truth(truth):
+    """The numbers of `FirmwareNumbers`, from the true printer, mm and deg."""
+    radius, rod = 0.1456 - PLATFORM, ROD
+    rises = np.sqrt(rod**2 - radius**2) - np.sqrt((rod + truth.rod) ** 2 - (radius + truth.radius) ** 2)
+    return {
+        "radius": [1e3 * (radius + truth.radius)],
+        "rods": [1e3 * (rod + truth.rod)] * 3,
+        "angles": np.degrees(truth.angles).tolist(),
+        "raised": (1e3 * (truth.zeros + rises)).tolist(),
+    }
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load("delta-linear")
+
+
+CASES = [("", True), ("", False), ("priors", True), ("priors", False), ("wide", True)]
+"""Whether seven numbers are fitted, with or without priors, or fifteen; and whether the probe's sigma is known."""
+
+
+WIDE, NARROW = PRIORS, {name: size for name, size in PRIORS.items() if name not in ("geometry.lean_*", "scale")}
+
+
+def fit_of(machine, path, truth, what, known, draw):
+    """Fit a printer to ten heights with noise."""
+    write_probes(path, probed_heights(truth))
+    data = read_measurements(machine, path, Sigmas(NOISE if known else 1e-5, 1e-4, known))
+    data = replace(data, values={"z": draw.normal(0.0, NOISE, len(PROBED))})
+    model = error_model(machine, data.pose, len(data), np.zeros(6))
+    ties = TIES | ({"scale": "legs.*.gain"} if what == "wide" else {})
+    fitted = (*FITTED, "geometry.lean_*") if what == "wide" else FITTED
+    priors = {"": {}, "priors": NARROW, "wide": WIDE}[what]
+    return identification_of(model, data, fitted, priors=priors, ties=ties, robust=False)
+
+
+def hits(answer, truth):
+    """Of each firmware number that is sure to some size, whether its interval holds the true one."""
+    found, result = firmware_numbers(answer), []
+    for name, true in firmware_truth(truth).items():
+        pairs = zip(np.atleast_1d(getattr(found, name)), true, found.halves[name], strict=True)
+        result += [abs(size - value) <= half for size, value, half in pairs if half > 0.0]
+    return result
+
+
+class Linear:
+    """Residuals of a printer with small errors, so that hundreds of printers take no time."""
+
+    def __init__(self, rates, truth, noise):
+        self.rates, self.truth, self.noise = rates, truth, noise
+
+    def residuals(self, values):
+        return self.noise + self.rates @ (self.truth - values)
+
+    def linearisation(self, values):
+        return self.residuals(values), self.rates
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("what", "known"), CASES)
+def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(machine, tmp_path, what, known):
+    """In 95 % of 200 repetitions with other errors and noise, and to a tenth, whatever priors say and use up."""
+    draw, sigma = np.random.default_rng(3), NOISE if known else 1e-5
+    base = fit_of(machine, tmp_path / "probes.csv", Truth(), what, known, draw)
+    rates = base.observed.linearisation(np.zeros(len(base.unknowns)))[1]
+    before = _sizes_by_name(base.unknowns, {"": {}, "priors": NARROW, "wide": WIDE}[what], "prior")
+    wishes = Wishes(base.sizes, before, np.full(len(before), np.inf), np.full(len(before), PREFERENCE), False, known)
+    inside, ratios, freedoms = [], [], []
+    for _ in range(200):
+        truth = somewhere(draw, what == "wide")
+        paths = numbers_of(truth)
+        true = np.array([paths[unknown.path] for unknown in base.unknowns])
+        noise = draw.normal(0.0, NOISE / sigma, len(PROBED))
+        fit = best_fit(Linear(rates, true, noise), base.observed.pose, wishes)
+        answer = replace(base, fit=fit)
+        ratios.append((fit.scatter * sigma / NOISE) ** 2)
+        freedoms.append(fit.freedom)
+        inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.sure, strict=True)]
+        linear = firmware_numbers(replace(answer, fit=replace(fit, values=true)))
+        numbers = firmware_numbers(answer)
+        for name in ("radius", "rods", "angles", "raised"):
+            parts = (np.atleast_1d(getattr(each, name)) for each in (numbers, linear))
+            inside += [abs(a - b) <= h for a, b, h in zip(*parts, numbers.halves[name], strict=True) if h > 0.0]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
+    assert np.sqrt(np.average(ratios, weights=freedoms)) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("what", ["", "priors", "wide"])
+def test_exact_printers_are_found_within_their_intervals(machine, tmp_path, what):
+    draw, inside = np.random.default_rng(5), []
+    for _ in range(4):
+        truth = somewhere(draw, what == "wide")
+        inside += hits(fit_of(machine, tmp_path / "probes.csv", truth, what, True, draw), truth)
+    assert np.mean(inside) > 0.85
+
+
+def test_a_printer_without_noise_gives_its_numbers_and_firmware_that_prints_flat(machine, tmp_path):
+    """Each controller is simulated with the numbers that it is given, over a printer that is as it was."""
+    truth = Truth(np.array([3e-4, -2e-4, 4e-4]), np.array([0.004, -0.003, 0.0]), 5e-4, 3e-4)
+    write_probes(tmp_path / "probes.csv", probed_heights(truth))
+    answer = identify(machine, tmp_path / "probes.csv", FITTED, ties=TIES, sigma="1 um")
+    numbers = firmware_numbers(answer)
+    for name, true in firmware_truth(truth).items():
+        assert np.atleast_1d(getattr(numbers, name)) == pytest.approx(true, abs=2e-3), name
+    nominal = np.sqrt(ROD**2 - (0.1456 - PLATFORM) ** 2)
+    triggers = ENDSTOPS + nominal + HEIGHT + truth.zeros  # true heights of the carriages at their endstops
+    radius, rods, angles = numbers.radius / 1e3, np.array(numbers.rods) / 1e3, ANGLES + np.radians(numbers.angles)
+    own = np.sqrt(rods**2 - radius**2)
+
+    def height(x, y, believed_at_home, true_at_home):
+        """Height of the true nozzle that is sent to the bed at a place."""
+        towers = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        wanted = np.sqrt(rods**2 - ((towers - [x, y]) ** 2).sum(axis=1))
+        carriages = true_at_home + wanted - believed_at_home - HEIGHT
+        return reached(carriages + HEIGHT, replace(truth, zeros=np.zeros(3)), [x, y, 0.0])[2]
+
+    marlin, marlin_height = numbers.marlin_endstops
+    reprap, reprap_height = numbers.reprap_endstops
+    homes = {
+        "klipper": (ENDSTOPS + np.array(numbers.raised) / 1e3 + own, triggers),
+        "marlin": (ENDSTOPS + marlin_height / 1e3 + own, triggers + np.array(marlin) / 1e3),
+        "reprapfirmware": (ENDSTOPS + reprap_height / 1e3 + own + np.array(reprap) / 1e3, triggers),
+    }
+    for firmware, (believed, true) in homes.items():
+        heights = [height(x, y, believed, true) for x, y in PROBED]
+        assert np.abs(heights).max() < 1e-6, firmware
+    assert max(marlin) == 0.0
+    assert sum(reprap) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_files_of_firmware_have_the_numbers(machine, tmp_path):
+    truth = Truth(np.array([3e-4, -2e-4, 4e-4]), np.array([0.004, -0.003, 0.0]), 5e-4, 3e-4)
+    write_probes(tmp_path / "probes.csv", probed_heights(truth))
+    numbers = firmware_numbers(identify(machine, tmp_path / "probes.csv", FITTED, ties=TIES, sigma="1 um"))
+    assert "delta_radius: 106.1000" in klipper_text(numbers)
+    assert "angle: 210.22" in klipper_text(numbers)
+    assert "R106.1000" in marlin_text(numbers)
+    assert "M665 L215.2" in reprap_text(numbers)
+
+
+def test_few_values_need_priors_and_ties_need_paths(machine, tmp_path):
+    path = tmp_path / "probes.csv"
+    write_probes(path, probed_heights(Truth()))
+    with pytest.raises(InputError, match="10 poses give 10 measured values for 63 unknowns"):
+        identify(machine, path)
+    priors = {"geometry": "0.1 mm", "zeros": "0.2 mm", "legs.*.r*": "1 mrad"}
+    assert identify(machine, path, priors=priors, sigma="20 um").fit.freedom > 2.0
+    with pytest.raises(InputError, match='the tie rod: "rods" names no error'):
+        identify(machine, path, (), ties={"rod": "rods"})
+    with pytest.raises(InputError, match="errors of several kinds"):
+        identify(machine, path, (), ties={"all": "geometry.*"})
+
+
+def test_legs_written_one_by_one_are_tied_as_families_are(tmp_path):
+    """A printer leg by leg, and the same of a family: one rod length and one way of all zeros are the same numbers."""
+    family = load("delta-linear")
+    own = build(document_of(family))
+    found = []
+    for machine in (family, own):
+        write_probes(tmp_path / "probes.csv", probed_heights(Truth(np.full(3, 2e-4), rod=3e-4)))
+        ties = {"rod": "legs.*.length", "zero": "legs.*.zero"}
+        answer = identify(machine, tmp_path / "probes.csv", (), ties=ties, sigma="1 um", robust=False)
+        found.append(answer.fit.values)
+    assert found[0] == pytest.approx(found[1], abs=1e-7)
