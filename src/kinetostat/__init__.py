@@ -26,6 +26,7 @@ _HOMES = {
     "drives": "kinetostat.studies.drives",
     "dynamics": "kinetostat.studies.dynamics",
     "servo": "kinetostat.studies.servo",
+    "motors": "kinetostat.studies.motors",
     "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
     "carrying_legs": "kinetostat.studies.carrying",
@@ -61,6 +62,7 @@ _SHOWN = {
     "Command": "kinetostat.studies.commanding",
     "CorrectionTable": "kinetostat.studies.corrections",
     "Carrying": "kinetostat.studies.carrying",
+    "MotorChoice": "kinetostat.studies.motors",
     "Servo": "kinetostat.studies.servo",
     "Capability": "kinetostat.studies.capability",
     "Budget": "kinetostat.studies.budget.budget",
@@ -71,8 +73,8 @@ _SHOWN = {
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
     "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "evaluate", "evaluate_grid",
-    "export", "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "optimize",
-    "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo", "state_of",
+    "export", "forward", "guidelines", "identify", "load", "load_problem", "machine_picture", "modes", "motors",
+    "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo", "state_of",
     "state_space", "tensions", "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 

@@ -32,6 +32,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute natural frequencies and modes, and the receptance of the tool",
         "views.vibration.MODES_QUESTION",
     ),
+    "motors": (
+        "compare the motors of a catalogue with what a motion asks of the drives",
+        "views.motors.MOTORS_QUESTION",
+    ),
     "servo": (
         "compute the stiffness and the damping of the tool with servo loops closed",
         "views.servo.SERVO_QUESTION",
@@ -72,6 +76,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.guidelines.Guidelines": "views.guidelines.GUIDELINES",
     "studies.commanding.Command": "views.command.COMMAND",
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
+    "studies.motors.MotorChoice": "views.motors.MOTORS",
     "studies.servo.Servo": "views.servo.SERVO",
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.budget.Budget": "views.budget.BUDGET",

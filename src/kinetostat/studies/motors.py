@@ -1,0 +1,281 @@
+"""Motors, gears and screws of a catalogue, and which motors fit a motion of a machine. Nothing is drawn here.
+
+A motor fits if its torque is within the peak limit at every point of the motion, the root of the mean square of its
+torque is within the continuous limit at the root of the mean square of its speed, and it never turns too fast. Its
+rotor is accelerated as well, so that the same motion asks something else of each motor.
+
+Source: theory (103).
+"""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec import document as documents
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.fields import Quantity, quantities, table
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.drives import DriveLoads, drives, root_mean_square
+from kinetostat.studies.motions import Motion, read_motion
+from kinetostat.units import UnitError
+
+CATALOGUE = Path(__file__).with_name("catalogue.toml")
+"""The catalogue that comes with kinetostat."""
+
+
+@table
+class MotorRating:
+    """A table [motors.NAME] of a catalogue: a motor that turns."""
+
+    torque: Annotated[float, Quantity("moment", "continuous torque, up to the rated speed", True)]
+    peak_torque: Annotated[float, Quantity("moment", "greatest torque for a short while, up to the rated speed", True)]
+    rated_speed: Annotated[float, Quantity("rate", "speed up to which these torques hold", True)]
+    greatest_speed: Annotated[float, Quantity("rate", "speed that the motor must not exceed", True)]
+    inertia: Annotated[float, Quantity("moment of inertia", "of its rotor")]
+
+    def limit(self, peak: bool, speeds: Array) -> Array:
+        """The torque limit at speeds: constant up to the rated one, then of constant power, and 0 beyond the greatest.
+
+        Args:
+            peak: whether that for a short while, otherwise the continuous one.
+            speeds: of the motor, rad/s [n].
+
+        Returns:
+            N·m [n].
+
+        Source: theory (103).
+        """
+        given = np.maximum(np.abs(speeds), self.rated_speed)
+        most = (self.peak_torque if peak else self.torque) * self.rated_speed / given
+        return np.asarray(np.where(given > self.greatest_speed, 0.0, most))
+
+
+@table
+class GearRating:
+    """A table [gears.NAME] of a catalogue."""
+
+    ratio: Annotated[float, Quantity("ratio", "turns of the motor per turn of the drive", True)]
+    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
+    inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it, at the motor")] = 0.0
+
+
+@table
+class ScrewRating:
+    """A table [screws.NAME] of a catalogue."""
+
+    lead: Annotated[float, Quantity("length", "travel per turn of the motor", True)]
+    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
+    inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it")] = 0.0
+
+
+SOURCE = "source"
+"""Field of an entry that says where its numbers are printed."""
+TABLES: Mapping[str, Any] = {"motors": MotorRating, "gears": GearRating, "screws": ScrewRating}
+"""Tables of a catalogue, and what each of their entries is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue(Immutable):
+    """Motors, gears and screws by name, and where their numbers are printed, by table and name."""
+
+    motors: Mapping[str, MotorRating]
+    gears: Mapping[str, GearRating]
+    screws: Mapping[str, ScrewRating]
+    sources: Mapping[tuple[str, str], str]
+
+
+def read_catalogue(path: Path | None = None) -> Catalogue:
+    """Read a catalogue.
+
+    Args:
+        path: of its TOML file; that of kinetostat if None.
+
+    Raises:
+        InputError: there is no such file, or an entry of it is not one: it names the entry and the field.
+    """
+    path = path or CATALOGUE
+    document = documents.read(path)
+    for name in document:
+        choice(name, TABLES, f'the table of "{path.name}"')
+    parts: dict[str, dict[str, Any]] = {name: {} for name in TABLES}
+    sources: dict[tuple[str, str], str] = {}
+    for kind, entries in document.items():
+        if not isinstance(entries, dict):
+            raise InputError(f'"{path.name}": {kind} is not a table; write [{kind}.NAME] with its numbers below.')
+        for name, given in entries.items():
+            parts[kind][name] = _entry(TABLES[kind], f'"{path.name}": {kind}.{documents.toml_key(name)}', given)
+            sources[kind, name] = str(given.get(SOURCE, ""))
+    return Catalogue(parts["motors"], parts["gears"], parts["screws"], sources)
+
+
+def _entry(kind: Any, where: str, given: Any) -> Any:
+    """One motor, gear or screw of what was written; `where` names it in messages."""
+    if not isinstance(given, dict):
+        raise InputError(f"{where} is not a table; write its fields below its name in brackets.")
+    known, values = quantities(kind), dict[str, float | tuple[float, ...]]()
+    for field, value in given.items():
+        choice(field, [*known, SOURCE], f"the field of {where}")
+        if field == SOURCE:
+            continue
+        try:
+            values[field] = known[field].read(value)
+        except UnitError as error:
+            raise InputError(f"{where}.{field} is {shorten(value)}: {error}.") from None
+    missing = [field for field in known if field not in values and not hasattr(kind, field)]
+    if missing:
+        raise InputError(f"{where} lacks {missing[0]}, {known[missing[0]].meaning}.")
+    return kind(**values)
+
+
+@dataclass(frozen=True)
+class MotorFit:
+    """A motor along a motion.
+
+    Attributes:
+        name: of the motor.
+        motor: its numbers.
+        loads: what the motion asks, with its rotor.
+        drive: name of the drive with the least reserve.
+        peak: share of the peak limit that is used, at the worst point of the worst drive; infinite if too fast.
+        continuous: share of the continuous limit that is used.
+        speed: share of the greatest speed that is used.
+        inertia_ratio: greatest inertia of the load over that of the motor; None where it is not known.
+        source: where the numbers of the motor are printed.
+    """
+
+    name: str
+    motor: MotorRating
+    loads: DriveLoads
+    drive: str
+    peak: float
+    continuous: float
+    speed: float
+    inertia_ratio: float | None
+    source: str = ""
+
+    @property
+    def greatest_share(self) -> float:
+        """The greatest of the shares: the motor fits up to 1."""
+        return max(self.peak, self.continuous, self.speed)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the motor does what the motion asks."""
+        return self.greatest_share <= 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class MotorChoice(Immutable):
+    """The motors of a catalogue along a motion.
+
+    Attributes:
+        machine: with lead or ratio of its drives.
+        status: of the first pose without an answer, else OK.
+        message: the answer in a sentence.
+        fits: of each motor, the smallest that fits first, then the others by what is missing; none without an answer.
+    """
+
+    machine: Machine
+    status: Status
+    message: str
+    fits: tuple[MotorFit, ...] = ()
+
+
+@checked
+def motors(
+    machine: Machine,
+    motion: Path | Motion,
+    catalogue: Path | None = None,
+    gear: str = "",
+    screw: str = "",
+    points: int = 400,
+) -> MotorChoice:
+    """Find which motors of a catalogue fit a motion of a machine.
+
+    Args:
+        machine: with masses, friction, and lead or ratio of its drives, unless a gear or a screw is chosen.
+        motion: a motion, or the path of its CSV file.
+        catalogue: path of the file; that of kinetostat if None.
+        gear, screw: names of a gear for rotary drives, or a screw for linear ones, of the catalogue; none if empty.
+        points: of the motion that are looked at, about.
+
+    Raises:
+        InputError: a mistake in a file, an unknown gear or screw, or motors of which nothing says how far they turn.
+    """
+    known = read_catalogue(catalogue)
+    if not known.motors:
+        raise InputError("the catalogue has no motors; write [motors.NAME] with torques, speeds and inertia.")
+    settings, beside = _transmission(known, gear, screw)
+    fitted = with_values(machine, settings)
+    moved = read_motion(fitted, motion, points) if isinstance(motion, Path) else motion
+    fits = []
+    for name, motor in known.motors.items():
+        loads = drives(with_values(fitted, {"drives.rotor_inertia": motor.inertia + beside}), moved, points)
+        if loads.curves is None or not loads.drives:
+            return MotorChoice(fitted, loads.status, loads.message)
+        if any(not drive.rotary for drive in loads.drives):
+            raise InputError(
+                f"nothing says how far the motors of {machine.name} turn; give drives.lead or drives.ratio, or choose "
+                "a screw or a gear of the catalogue."
+            )
+        fits.append(_fit(name, motor, loads, known.sources["motors", name]))
+    ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.greatest_share)))
+    return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
+
+
+def _transmission(known: Catalogue, gear: str, screw: str) -> tuple[dict[str, float], float]:
+    """The fields of [drives] that a gear or a screw gives, and the inertia that turns beside the rotor, kg·m²."""
+    settings: dict[str, float] = {}
+    beside = 0.0
+    for name, parts, field, what in ((gear, known.gears, "ratio", "gear"), (screw, known.screws, "lead", "screw")):
+        if name:
+            part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
+            settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
+            beside += part.inertia
+    return settings, beside
+
+
+def _fit(name: str, motor: MotorRating, loads: DriveLoads, source: str) -> MotorFit:
+    if loads.curves is None or loads.motion is None:
+        raise ValueError("a motion without an answer asks nothing of a motor")
+    torques, speeds = np.abs(loads.curves.motor_torque), np.abs(loads.curves.motor_speed)
+    worst: list[tuple[float, ...]] = []
+    for torque, speed, drive in zip(torques, speeds, loads.drives, strict=True):
+        mean = float(root_mean_square(loads.motion.times, speed))
+        lasting = _share(np.array([drive.rms_torque]), motor.limit(False, np.array([mean])))
+        worst.append((_share(torque, motor.limit(True, speed)), lasting, drive.motor_speed / motor.greatest_speed))
+    place = max(range(len(worst)), key=lambda k: max(worst[k]))
+    ratios = [drive.inertia_ratio for drive in loads.drives if drive.inertia_ratio is not None]
+    peak, continuous, speed = (max(column) for column in zip(*worst, strict=True))
+    return MotorFit(
+        name, motor, loads, loads.drives[place].name, peak, continuous, speed, max(ratios, default=None), source
+    )
+
+
+def _share(torque: Array, limit: Array) -> float:
+    """The greatest share of a limit that is used; infinite where there is a torque and no limit left."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(torque == 0.0, 0.0, torque / limit)
+    return float(shares.max())
+
+
+def _message(fits: tuple[MotorFit, ...]) -> str:
+    good = [fit for fit in fits if fit.fits]
+    if good:
+        best = good[0]
+        used, count = f"{100.0 * best.greatest_share:.0f} %", f"{len(good)} of {len(fits)}"
+        return f"{best.name} fits: the motion uses {used} of what it may give; {count} motors fit."
+    nearest = fits[0]
+    limits = {"peak torque": nearest.peak, "continuous torque": nearest.continuous, "speed": nearest.speed}
+    missing = max(limits, key=lambda name: limits[name])
+    share = f"{100.0 * limits[missing]:.0f} %" if math.isfinite(limits[missing]) else "more than all"
+    return f"No motor fits: of {nearest.name}, the nearest, the motion asks {share} of its {missing}."
