@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from kinetostat.engine.moving import Path
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.drives import drives
+from kinetostat.studies.motions import Motion
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
 MOVES = "feed [mm/s], acceleration [m/s**2], x [mm], roll [deg]\n300, 5, 0, 0\n300, 5, 15, 2\n300, 5, 0, 0\n"
@@ -83,6 +85,37 @@ def test_the_tool_deflects_as_under_the_same_wrench(tmp_path):
     wrench = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -12.0 * 9.81])
     assert answer.motion.path.pose["z"][middle] == pytest.approx(0.135)
     assert answer.deflection[middle] == pytest.approx(compliance @ wrench, abs=1e-12)
+
+
+def test_no_direction_asks_for_more_than_the_worst_ones():
+    """Of drives without speed, whose forces are linear in the acceleration, and with it, up to what bends the path."""
+    machine = load("hexapod", [*MASS, *MOTORS, "linear_density.legs=3 kg/m"])
+    rng = np.random.default_rng(2)
+    for speed, share in ((1e-9, 1.0), (0.5, 0.98)):
+        worst = drives(machine, speed=speed, acceleration="5 m/s**2")
+        names = ("x", "y", "z")
+        ways = rng.normal(size=(2, 3000, 3))
+        rates, gains = (row / np.linalg.norm(row, axis=1)[:, None] for row in ways)
+        pose = {
+            n: np.full(3000, v) for n, v in zip((*names, "roll", "pitch", "yaw"), (0, 0, 0.135, 0, 0, 0), strict=True)
+        }
+        parts = [
+            {n: part[:, names.index(n)] if n in names else np.zeros(3000) for n in pose}
+            for part in (rates * speed, gains * 5.0)
+        ]
+        random = drives(machine, Motion("random", np.zeros(3000), Path(pose, *parts), timeless=True))
+        for first, second in zip(worst.drives, random.drives, strict=True):
+            assert share * second.force <= first.force * (1.0 + 1e-9)
+            assert first.force < 1.03 * second.force
+            assert first.speed >= second.speed
+
+
+def test_without_a_motion_both_limits_are_needed():
+    machine = load("hexapod", [*MASS])
+    with pytest.raises(InputError, match="acceleration is not given"):
+        drives(machine, speed="0.5 m/s")
+    with pytest.raises(InputError, match="speed is"):
+        drives(machine, speed="0.5 kg", acceleration=1.0)
 
 
 def test_a_motion_out_of_reach_has_a_sentence(tmp_path):

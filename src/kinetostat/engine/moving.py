@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.arrays import Array, Codes
+from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.form import (
     Form,
     Specimen,
@@ -21,7 +21,7 @@ from kinetostat.engine.form import (
     traced_joints,
     traced_machine,
 )
-from kinetostat.engine.kernel import Recipe, program_columns, program_of
+from kinetostat.engine.kernel import Recipe, closes_inside, program_columns, program_of
 from kinetostat.equilibrium.state import MachineState, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import within_reach
@@ -56,6 +56,11 @@ class Path:
     def size(self) -> int:
         """Number of points."""
         return len(next(iter(self.pose.values())))
+
+    def at(self, rows: Integers) -> "Path":
+        """Some of its points, by number."""
+        parts = (self.pose, self.rates, self.accelerations)
+        return Path(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
 
 
 @dataclass(frozen=True)
@@ -188,11 +193,21 @@ def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
 
 
 def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
+    """By machine code, which closes the legs itself where they have closed forms; the rest is closed before it."""
+    closed = closes_inside(form.machine)
+    results, status = _run(form, path, joints, closed)
+    left = np.flatnonzero(status == Status.NOT_CONVERGED)
+    if closed and left.size:
+        results[:, left], status[left] = _run(form, path.at(left), joints, closed=False)
+    return results, status
+
+
+def _run(form: RigidForm, path: Path, joints: bool, closed: bool) -> tuple[Array, Codes]:
     machine, names = form.machine, list(path.pose)
     varying = {POSE + name: np.asarray(path.pose[name], dtype=float) for name in names}
     shape, fixed = form_of(machine, list(varying))
-    program = program_of(Recipe(motion_of, Specimen(machine), shape, (form.plan, len(form.masses), joints)))
-    given = program_columns(machine, shape, varying, path.size)
+    program = program_of(Recipe(motion_of, Specimen(machine), shape, (form.plan, len(form.masses), joints, closed)))
+    given = program_columns(machine, shape, varying, path.size, closed)
     given += [
         np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in names
     ]

@@ -81,6 +81,8 @@ WORDS = {
     "outputs": 'what moves as texts, e.g. ["x", "z"]',
     "motion": "a motion, or the path of its CSV file",
     "points": "a whole number from 2",
+    "speed": 'a speed, e.g. "0.5 m/s"',
+    "acceleration": 'an acceleration, e.g. "5 m/s**2"',
     "data": "the path of a CSV file of measured poses",
     "fit": 'groups or paths of parameters as texts, e.g. ["geometry", "zeros"]',
     "sigma": 'a standard deviation of lengths, e.g. "5 um"',

@@ -26,12 +26,14 @@ from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.dynamics import driven_springs, rigid_form_of, senses_of_drives
-from kinetostat.studies.motions import Motion, read_motion
+from kinetostat.studies.motions import Motion, every_direction, read_motion
 from kinetostat.studies.vibration import modes
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+from kinetostat.units import KINDS, UnitError
 
 SLOW = 1.0 / 3.0
 """Share of the lowest natural frequency up to which springs follow a motion as at rest, within an eighth."""
@@ -161,13 +163,21 @@ class DriveLoads(Immutable):
 
 
 @checked
-def drives(machine: Machine | MachineState, motion: Path | Motion, points: int = 400) -> DriveLoads:
+def drives(
+    machine: Machine | MachineState,
+    motion: Path | Motion | None = None,
+    points: int = 400,
+    speed: float | str | None = None,
+    acceleration: float | str | None = None,
+) -> DriveLoads:
     """Compute what a motion asks of the drives of a machine of rigid parts.
 
     Args:
         machine: with masses, friction, and lead or ratio of its drives.
-        motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines.
+        motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines. None
+            for a speed and an acceleration of the platform point at the pose of the machine, in the worst directions.
         points: of the motion that are looked at, about.
+        speed, acceleration: without a motion: of the platform point, m/s and m/s² or texts with a unit.
 
     Raises:
         InputError: the file is not a motion, or the drives do not hold the machine.
@@ -181,7 +191,12 @@ def drives(machine: Machine | MachineState, motion: Path | Motion, points: int =
         )
     if points < 2:
         raise InputError(f"points is {points}; a motion is looked at two points or more.")
-    moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
+    if motion is None:
+        moved = every_direction(form, _amount("speed", speed), _amount("acceleration", acceleration))
+    elif speed is not None or acceleration is not None:
+        raise InputError("a motion says its speed and acceleration itself; give either a motion or these.")
+    else:
+        moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
     forces = forces_on_path(form, moved.path, joints=True)
     lost = np.flatnonzero(forces.status != Status.OK)
     if lost.size:
@@ -215,6 +230,20 @@ def drives(machine: Machine | MachineState, motion: Path | Motion, points: int =
         frequency,
         excited,
     )
+
+
+def _amount(kind: str, given: float | str | None) -> float:
+    """A speed or an acceleration, SI."""
+    quantity = Quantity(kind, "", positive=kind == "acceleration")
+    if given is None:
+        raise InputError(
+            f"{kind} is not given: without a motion, drives needs the speed and the acceleration of the platform "
+            f'point, e.g. {kind} = "{KINDS[kind].example}".'
+        )
+    try:
+        return quantity.number(given)
+    except UnitError as error:
+        raise InputError(f"{kind} is {shorten(given)}: {error}.") from None
 
 
 def _moment(load: Array, turns: bool, length: float) -> float | None:
@@ -288,9 +317,10 @@ def _turns(state: MachineState) -> Array:
 
 
 def root_mean_square(times: Array, rows: Array) -> Array:
-    """Roots of the mean squares of curves over time [rows]."""
-    square = np.trapezoid(rows * rows, times, axis=-1)
-    return np.asarray(np.sqrt(square / max(times[-1] - times[0], 1e-300)))
+    """Roots of the mean squares of curves over time [rows]; NaN where no time passes."""
+    if times[-1] == times[0]:
+        return np.full(rows.shape[:-1], np.nan)
+    return np.asarray(np.sqrt(np.trapezoid(rows * rows, times, axis=-1) / (times[-1] - times[0])))
 
 
 def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: DriveCurves) -> list[DriveLoad]:
@@ -317,7 +347,7 @@ def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: 
                 _size(curves.motor_torque[k]),
                 float(rms_torque[k]),
                 (float(curves.power[k].max()), float(min(curves.power[k].min(), 0.0))),
-                (float(curves.energy[k, -1]), float(-braking.sum())),
+                (np.nan, np.nan) if motion.timeless else (float(curves.energy[k, -1]), float(-braking.sum())),
                 reflected,
                 reflected / rotor if reflected is not None and rotor else None,
             )
@@ -356,7 +386,7 @@ def _excitation(state: MachineState, motion: Motion) -> tuple[float | None, floa
         answer = modes(state)
     except InputError:  # nothing has a mass, or no spring deflects
         return None, 0.0
-    if answer.solution is None or not answer.solution.ringing or motion.duration <= 0.0:
+    if answer.solution is None or not answer.solution.ringing or motion.timeless:
         return None, 0.0
     lowest = float(answer.solution.frequencies[0])
     count = 4096
@@ -375,8 +405,9 @@ def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> st
     worst = max(summaries, key=lambda drive: drive.motor_torque)
     fast = max(summaries, key=lambda drive: drive.motor_speed)
     speed = f"{fast.motor_speed * 30.0 / np.pi:.4g} 1/min" if fast.rotary else show(fast.motor_speed, "m") + "/s"
+    mean = "" if motion.timeless else f"{show(worst.rms_torque, worst.motor_unit)} in the mean square, "
     return (
-        f"Along {motion.kind}, the motors give up to {show(worst.motor_torque, worst.motor_unit)} ({worst.name}), "
-        f"{show(worst.rms_torque, worst.motor_unit)} in the mean square, at up to {speed}, and up to "
+        f"{'In' if motion.timeless else 'Along'} {motion.kind}, the motors give up to "
+        f"{show(worst.motor_torque, worst.motor_unit)} ({worst.name}), {mean}at up to {speed}, and up to "
         f"{max(drive.power[0] for drive in summaries):.4g} W each."
     )

@@ -16,10 +16,13 @@ from scipy.interpolate import make_interp_spline
 
 from kinetostat.arrays import Array
 from kinetostat.engine.moving import Path as MovedPath
+from kinetostat.engine.moving import RigidForm, forces_on_path
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
 from kinetostat.machine.parameters import POSE, values
+from kinetostat.motion.numbers import OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
@@ -52,17 +55,83 @@ class Motion:
         times: of its points, s [n]; a point stands twice where the acceleration jumps.
         path: coordinates of the pose with their rates and accelerations.
         periodic: whether it closes and goes on for ever.
+        timeless: whether its points are no time apart, but speeds and accelerations in many directions at one pose.
     """
 
     kind: str
     times: Array
     path: MovedPath
     periodic: bool = False
+    timeless: bool = False
 
     @property
     def duration(self) -> float:
         """From its first point to its last, s."""
         return float(self.times[-1] - self.times[0])
+
+
+AROUND = 32
+"""Directions of the speed, beside those in which a drive is fastest."""
+
+
+def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motion:
+    """A speed and an acceleration of the platform point in the directions that are worst for each drive.
+
+    A drive is fastest where the speed is along its row of J, and its inertia is greatest where the acceleration is
+    along its row of J^-T M, either way; each of these accelerations is met by each of those speeds, by others spread
+    evenly over all directions, and by rest.
+
+    Args:
+        form: of the machine, at its pose.
+        speed, acceleration: of the platform point, m/s and m/s².
+
+    Raises:
+        InputError: no coordinate of the pose is x, y or z.
+    """
+    here = {path.removeprefix(POSE): float(v) for path, v in values(form.machine).items() if path.startswith(POSE)}
+    moving = [name for name in here if name in POINT]
+    if not moving:
+        raise InputError(f"no coordinate of the pose of {form.machine.name} is x, y or z; give a motion instead.")
+    ways, rest = np.eye(len(moving)), np.zeros((len(moving), len(moving)))
+    unit = forces_on_path(form, _at_pose(here, moving, np.concatenate([ways, rest]), np.concatenate([rest, ways])))
+    inertia = OF_DRIVE.index("inertia")
+    fastest, hardest = unit.drives[:, 0, : len(moving)], unit.drives[:, inertia, len(moving) :]
+    speeds = np.concatenate([np.zeros((1, len(moving))), *_both_ways(fastest), _spread(len(moving))]) * speed
+    gains = np.concatenate(_both_ways(hardest)) * acceleration
+    pairs = np.repeat(speeds, len(gains), axis=0), np.tile(gains, (len(speeds), 1))
+    return Motion(
+        f"every direction at {speed:.4g} m/s and {acceleration:.4g} m/s²",
+        np.zeros(len(pairs[0])),
+        _at_pose(here, moving, *pairs),
+        timeless=True,
+    )
+
+
+def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, gains: Array) -> MovedPath:
+    count = len(rates)
+    parts = [
+        {name: part[:, moving.index(name)] if name in moving else np.zeros(count) for name in here}
+        for part in (rates, gains)
+    ]
+    return MovedPath({name: np.full(count, value) for name, value in here.items()}, *parts)
+
+
+def _both_ways(rows: Array) -> list[Array]:
+    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
+    units = rows[sizes[:, 0] > 0.0] / sizes[sizes[:, 0] > 0.0]
+    return [units, -units]
+
+
+def _spread(size: int) -> Array:
+    """Directions spread evenly over a sphere, a circle or a line [n x size]."""
+    turns = np.arange(AROUND) + 0.5
+    if size == 1:
+        return np.array([[1.0], [-1.0]])
+    if size == 2:
+        return np.column_stack([np.cos(2.0 * np.pi * turns / AROUND), np.sin(2.0 * np.pi * turns / AROUND)])
+    height, angle = 1.0 - 2.0 * turns / AROUND, np.pi * (1.0 + np.sqrt(5.0)) * turns
+    across = np.sqrt(1.0 - height**2)
+    return np.column_stack([across * np.cos(angle), across * np.sin(angle), height])
 
 
 def read_motion(machine: Machine, path: Path, points: int = 400) -> Motion:

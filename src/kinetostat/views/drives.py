@@ -1,6 +1,6 @@
 """Drives along a motion: the question, and the description of its answer. Nothing is computed here."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 import matplotlib as mpl
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
+from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
@@ -37,6 +38,12 @@ def _lines(answer: DriveLoads) -> Lines:
     if answer.motion is None or answer.worst is None:
         return
     show, (point, name) = answer.machine.display.show, answer.worst
+    if answer.motion.timeless:
+        rates, gains = (
+            _direction(part, point) for part in (answer.motion.path.rates, answer.motion.path.accelerations)
+        )
+        yield "Worst way", f"{name} does most at the speed {rates} m/s with the acceleration {gains} m/s²."
+        return
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
     given, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
     whole = number(max(given + back, 0.0))
@@ -59,6 +66,10 @@ def _lines(answer: DriveLoads) -> Lines:
             "Motors",
             f'The file gives no lead, so that motors are taken for linear ones; write lead = "{example}" in [drives].',
         )
+
+
+def _direction(part: Mapping[str, Array], point: int) -> str:
+    return ", ".join(f"{name} {number(float(rows[point]))}" for name, rows in part.items() if name in POINT)
 
 
 def _pose(answer: DriveLoads, point: int) -> str:
@@ -94,8 +105,8 @@ def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
     for drive in answer.drives:
         inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
         ratio = DASH if drive.inertia_ratio is None else number(drive.inertia_ratio)
-        torques = (display.show(torque, drive.motor_unit) for torque in (drive.motor_torque, drive.rms_torque))
-        work = (f"{number(drive.power[0])} W", f"{number(drive.energy[0])} J")
+        torques = (_show(answer, torque, drive.motor_unit) for torque in (drive.motor_torque, drive.rms_torque))
+        work = (f"{number(drive.power[0])} W", DASH if np.isnan(drive.energy[0]) else f"{number(drive.energy[0])} J")
         table.add_row(drive.name, _motor_speed(drive), *torques, *work, inertia, ratio)
     yield table
     shown = [part for part in PARTS if any(drive.parts[part] > 0.0 for drive in answer.drives)]
@@ -109,6 +120,10 @@ def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
             moment = DASH if joint.moment is None else display.show(joint.moment, "N·m")
             table.add_row(joint.name, display.show(joint.force, "N"), moment)
         yield table
+
+
+def _show(answer: DriveLoads, value: float, unit: str) -> str:
+    return DASH if np.isnan(value) else answer.machine.display.show(value, unit)
 
 
 def _motor_speed(drive: DriveLoad) -> str:
@@ -171,12 +186,13 @@ def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors mu
             figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True
         ):
             scale = display.scale("N·m" if rotary else "N")
+            times = np.zeros(1) if answer.motion is None else answer.motion.times
             for k, drive in enumerate(answer.drives):
                 if drive.rotary is not rotary:
                     continue
                 colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
-                panel.plot(np.abs(curves.motor_speed[k]) * factor, torque, color=colour, linewidth=0.9, alpha=0.7)
-                times = np.zeros(1) if answer.motion is None else answer.motion.times
+                style = {"linestyle": "none", "marker": "."} if times[-1] == times[0] else {"linewidth": 0.9}
+                panel.plot(np.abs(curves.motor_speed[k]) * factor, torque, color=colour, alpha=0.7, **style)
                 mean = float(root_mean_square(times, curves.motor_speed[k])) * factor
                 panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=5, label=drive.name)
                 panel.plot(
@@ -224,8 +240,10 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
 
 
 def _figures(answer: DriveLoads) -> dict[str, Drawing]:
-    if not answer.drives:
+    if answer.motion is None:
         return {}
+    if answer.motion.timeless:
+        return {"speed_torque": Drawing("Torque and speed in all directions.", partial(speed_torque_figure, answer))}
     return {
         "drives": Drawing("Speed, force and power of the drives along the motion.", partial(over_time_figure, answer)),
         "speed_torque": Drawing("Torque and speed that the motors must give.", partial(speed_torque_figure, answer)),
@@ -235,7 +253,7 @@ def _figures(answer: DriveLoads) -> dict[str, Drawing]:
 
 def curves_csv(answer: DriveLoads) -> str | None:
     """Write all drives over time as CSV, SI: a row for each point of the motion."""
-    if answer.motion is None:
+    if answer.motion is None or answer.motion.timeless:
         return None
     curves, columns = _curves(answer), {"time [s]": answer.motion.times}
     columns |= answer.motion.path.pose
@@ -346,7 +364,18 @@ DRIVES_QUESTION = Question(
             "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md)",
             metavar="MOTION",
             first=True,
-            required=True,
+        ),
+        Option(
+            "speed",
+            "quantity",
+            'without a motion: speed of the platform point in the worst direction, e.g. "0.5 m/s"',
+            metavar="SPEED",
+        ),
+        Option(
+            "acceleration",
+            "quantity",
+            'without a motion: acceleration in the worst direction, e.g. "5 m/s**2"',
+            metavar="ACCELERATION",
         ),
         Option("points", "count", "number of points of the motion, about (default: 400)", default=400),
     ),
