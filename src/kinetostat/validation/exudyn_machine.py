@@ -40,6 +40,9 @@ MOTION_SHARES = (1e-3, 1e-4, 1e-5)
 VARIED_MOTION = "how far loads move the platform, rad or share of the machine's length"
 EPS = float(np.finfo(float).eps)
 ALL = (True,) * 6
+FACTORED_ONCE_FROM = 300
+"""Coordinates from which Newton's steps share the factors of a matrix: these take the cube of the number, and most of
+the time. A few more steps are then taken, which stop somewhat farther from balance."""
 PLANAR_JOINT = (True, True, False, False, False, True)
 """Constrained components of rx ry rz x y z where z is the normal."""
 
@@ -152,6 +155,7 @@ def settings_of(model: Multibody) -> Any:
     newton.relativeTolerance = NEWTON_STATICS
     newton.absoluteTolerance = 10.0 * EPS  # the greatest stiffness is 1: closer to balance, round-off decides
     newton.maxIterations = 30
+    newton.useModifiedNewton = model.system.systemData.ODE2Size() > FACTORED_ONCE_FROM
     return settings
 
 
