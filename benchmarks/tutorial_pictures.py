@@ -50,6 +50,14 @@ def keep_map(name: str, degrees: int, *quantities: str) -> None:
     write(name, Image.open(drawn).convert("RGB"))
 
 
+def keep_resonance(name: str) -> None:
+    """Write a small PNG of the first frequency of the delta printer over its bed."""
+    grid = evaluate_grid(load("delta-linear"), ["x=-8 cm:8 cm:17", "y=-8 cm:8 cm:17"], ["frequency_1"])
+    drawn = BytesIO()
+    plot(grid).savefig(drawn, dpi=130)
+    write(name, Image.open(drawn).convert("RGB"))
+
+
 def keep_fit(name: str) -> None:
     """Write a small PNG of the residuals of the fit that the tutorial on calibration makes."""
     page, space, drawn = ROOT / "docs" / "tutorials" / "calibrate.md", {}, BytesIO()
@@ -68,6 +76,8 @@ def write(name: str, image: Image.Image) -> None:
 
 
 if __name__ == "__main__":
+    keep("delta-printer", load("delta-linear"))
+    keep_resonance("delta-printer-resonance")
     keep("real-hexapod", load("hexapod-hardware"))
     keep("five-bar", five_bar())
     keep("paper-machine", load(PAPER))

@@ -10,6 +10,7 @@ TUTORIALS = (
     "optimise",
     "calibrate",
     "cable-robot",
+    "delta-printer",
     "jupyter",
 )
 PAGES = {

@@ -68,7 +68,7 @@ def machine():
 
 
 CASES = [("", True), ("", False), ("priors", True), ("priors", False), ("wide", True)]
-"""Whether seven numbers are fitted, with or without priors, or fifteen; and whether the probe's sigma is known."""
+"""Whether seven numbers are fitted, with or without priors, or fourteen; and whether the probe's sigma is known."""
 
 
 WIDE, NARROW = PRIORS, {name: size for name, size in PRIORS.items() if name not in ("geometry.lean_*", "scale")}
