@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from kinetostat import evaluate, evaluate_grid, load, tensions, under_load, workspace
+from kinetostat import analyze, evaluate, evaluate_grid, load, state_of, tensions, under_load, workspace
 from kinetostat.engine.batch import evaluate as evaluate_points
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cables import cables_of
 from kinetostat.equilibrium.catenary import leaving_points
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.report import REPORT_QUESTIONS, Answers
 from kinetostat.studies.sensitivity import sensitivity
+from kinetostat.views.analysis import LOADED
 
 PUBLISHED = [361.2, 361.6, 387.3, 355.2, 337.7, 386.7, 367.8, 367.5]
 """Least-norm tensions of CoGiRo without payload at (0, 0, 2) m, N."""
@@ -232,3 +234,13 @@ def test_the_answer_has_the_published_tensions_a_reserve_and_the_worst_of_furthe
 def test_what_cables_cannot_be_is_refused(settings, message):
     with pytest.raises(InputError, match=message):
         tensions(load("cogiro", settings))
+
+
+def test_reports_have_a_section_on_tensions_and_loaded_answers_say_what_they_leave_out():
+    sagging = load("cogiro", ["cables.linear_density=0.064"])
+    lines = dict(LOADED.sentences(under_load(sagging)))
+    assert lines["Cables"] == "Cables are straight here, without weight and pulleys; kinetostat tensions counts both."
+    asked = next(question for question in REPORT_QUESTIONS if question.name == "tensions")
+    assert asked.when(Answers(sagging, state_of(sagging), analyze(sagging)))
+    hexapod = load("hexapod")
+    assert not asked.when(Answers(hexapod, state_of(hexapod), analyze(hexapod)))

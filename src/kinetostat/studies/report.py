@@ -15,6 +15,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -41,6 +42,7 @@ from kinetostat.studies.optimisation.search import stored_problem
 from kinetostat.studies.requirements import requirements
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.study_folder import holds_study
+from kinetostat.studies.tensions import tensions
 from kinetostat.studies.under_load import under_load
 from kinetostat.studies.vibration import modes
 
@@ -180,6 +182,7 @@ REPORT_QUESTIONS = (
     ReportQuestion(
         "capability", lambda known: capability(known.state), lambda known: bool(limits_of_drives(known.state))
     ),
+    ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
     ReportQuestion(
         "maps",
@@ -197,8 +200,8 @@ REPORT_QUESTIONS = (
     ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
 )
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
-error budget where the file has tolerances, capability where it limits its drives, vibrations where it has masses, and
-frequencies over the poses of the maps where there are modes."""
+error budget where the file has tolerances, capability where it limits its drives, tensions where all legs are cables,
+vibrations where it has masses, and frequencies over the poses of the maps where there are modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
 

@@ -96,6 +96,9 @@ def _loaded_lines(state: "LoadedState") -> Lines:
     yield "Pose", f"{pose_of(state.machine)}. {state.message}"
     if state.displacement:
         yield "Stability", loaded.stability_of(state)
+    cables = state.machine.tables["cables"]
+    if cables.linear_density or cables.pulley_radius:
+        yield "Cables", "Cables are straight here, without weight and pulleys; kinetostat tensions counts both."
 
 
 def _loaded_parts(state: "LoadedState", _full: bool) -> Iterator[Table | str]:
