@@ -10,11 +10,12 @@ import pytest
 from kinetostat.engine.moving import Path, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import leg_names
+from kinetostat.kinetostatics.feasible import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.loads import gravity_of, located_members
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
-from kinetostat.studies.dynamics import driven_springs, dynamics
+from kinetostat.studies.dynamics import dynamics
 
 MASSES = ("tool.mass=3 kg", "tool.inertia=[0.02, 0.03, 0.04, 0.001, 0, 0.002]")
 ROTORS = ("drives.rotor_inertia=1e-4", "drives.lead=10 mm", "drives.ratio=5")

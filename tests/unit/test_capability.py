@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.cross.test_feasible import LINEAR, MACHINES, greatest_motion, greatest_wrench
 
-from kinetostat import InputError, capability, load, save
+from kinetostat import InputError, capability, dynamics, load, save
 from kinetostat.numerics.polytopes import outline, reach_along, vertices
 from kinetostat.views.capability import CAPABILITY
 from kinetostat.views.capability_figures import capability_figures
@@ -21,6 +21,8 @@ def test_sets_reach_as_far_as_a_linear_programme_says(name):
     answer = capability(MACHINES[name]())
     response, rng = answer.state.free, np.random.default_rng(3)
     for part in answer.sets:
+        if part.name not in COMPONENTS:  # accelerations have a test of their own
+            continue
         for _ in range(3):
             way = part.directions @ rng.normal(size=part.directions.shape[1]) if part.directions.size else None
             if way is None:
@@ -125,3 +127,36 @@ def test_files_hold_the_sets(tmp_path):
     save(answer, tmp_path / "capability.csv")
     assert "least" in (tmp_path / "capability.csv").read_text().splitlines()[0]
     assert capability_figures(answer)["capability"]().axes
+
+
+MASSES = ["tool.mass=12 kg", "tool.inertia=[0.1, 0.1, 0.15, 0, 0, 0]", "load.gravity=[0, 0, -9.81]"]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("hexapod", ["limits.actuator_force=500 N", "drives.lead=10 mm", "drives.rotor_inertia=2e-5 kg*m**2"]),
+        ("delta", ["limits.actuator_moment=50 N*m", "drives.ratio=20", "drives.rotor_inertia=2e-5 kg*m**2"]),
+        ("tripteron", ["limits.actuator_force=5 kN"]),
+    ],
+)
+def test_the_greatest_acceleration_brings_a_drive_to_its_limit_in_inverse_dynamics(name, settings):
+    machine = load(name, [*MASSES, *settings])
+    answer = capability(machine)
+    part = answer.set_of("acceleration")
+    equations = dynamics(machine)
+    rows = [equations.coordinates.index(axis) for axis in "xyz"]
+    bare = dynamics(load(name, [*MASSES[:2], *settings]))  # weights count by what the drives carry, as in the answer
+    carried = np.array([drive.carried for drive in answer.drives])
+    limits = np.array([drive.upper for drive in answer.drives])
+    for way in ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.3, -0.5, 0.8], part.weakest):
+        accelerations = np.zeros(len(equations.coordinates))
+        accelerations[rows] = np.array(way) / np.linalg.norm(way) * part.along(way)
+        forces = sum(bare.forces([0.0] * len(accelerations), accelerations.tolist()).values())
+        loads = carried - forces * equations.senses
+        assert (np.abs(loads) / limits).max() == pytest.approx(1.0, rel=1e-9)
+    assert part.along(part.weakest) == pytest.approx(part.least)
+
+
+def test_a_machine_without_masses_has_no_accelerations():
+    assert capability(load("hexapod", ["limits.actuator_force=500 N"])).set_of("acceleration") is None

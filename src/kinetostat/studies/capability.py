@@ -29,7 +29,9 @@ from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.polytopes import reach_along, vertices
 from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.dynamics import dynamics
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
@@ -62,7 +64,7 @@ class CapabilitySet:
     """All forces, moments, speeds or angular speeds that the drives allow: a convex polytope about zero.
 
     Attributes:
-        name: "force", "moment", "speed" or "rate".
+        name: "force", "moment", "speed", "rate", "acceleration" or "angular acceleration".
         unit: SI.
         least: radius of the largest ball in it: what the drives allow in whichever direction; negative where they do
             not hold the loads that count already.
@@ -99,7 +101,7 @@ class CapabilitySet:
         way = np.array(unit_direction(direction, "direction"))
         stopped = np.linalg.norm(way - self.directions @ (self.directions.T @ way)) > DEPENDENT
         if stopped:
-            return 0.0 if self.name in ("speed", "rate") else math.inf
+            return math.inf if self.name in ("force", "moment") else 0.0
         return reach_along(self.normals, self.bounds, way)
 
 
@@ -112,7 +114,8 @@ class Capability(Immutable):
         status: of the pose.
         message: the answer in a sentence or two.
         drives: with their limits and what they carry.
-        sets: of forces, moments, speeds and angular speeds, as far as the file limits drives and the machine has them.
+        sets: of forces, moments, speeds, angular speeds and accelerations, as far as the file limits drives and the
+            machine has them.
         direction: that was asked for, base axes; empty if none.
     """
 
@@ -134,7 +137,7 @@ class Capability(Immutable):
         return self.state.left_out
 
     def set_of(self, name: str) -> CapabilitySet | None:
-        """The set of a name, "force", "moment", "speed" or "rate"; None where there is none."""
+        """The set of a name, such as "force"; None where there is none."""
         return next((each for each in self.sets if each.name == name), None)
 
 
@@ -163,10 +166,12 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
     response = _with_loads(state)
     drives = _drives(response)
     sets = []
+    inertia = _inertia_at_drives(state) if "load" in kinds else None
     for block in ("translation", "rotation"):
         loads = _wrenches(response, drives, block) if "load" in kinds else None
         rates = _twists(response, drives, block) if "speed" in kinds else None
-        sets += [each for each in (loads, rates) if each is not None]
+        gains = None if inertia is None else _accelerations(response, drives, block, inertia)
+        sets += [each for each in (loads, rates, gains) if each is not None]
     return Capability(state, Status.OK, _message(state.machine, sets), drives, tuple(sets), direction)
 
 
@@ -240,6 +245,49 @@ def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> Ca
     return _set(name, unit, least, matrix, bounds, directions, names * 2)
 
 
+def _inertia_at_drives(state: MachineState) -> Array | None:
+    """M over the drives, along their joints [drives x drives]; None without masses, or if drives cannot move alone.
+
+    Source: theory (93).
+    """
+    try:
+        moving = dynamics(state)
+        mass = moving.mass_at_drives * np.outer(moving.senses, moving.senses)
+    except InputError:
+        return None
+    return mass if np.isfinite(mass).all() and np.diagonal(mass).any() else None
+
+
+def _accelerations(
+    response: Response, drives: Sequence[DriveAtPose], block: str, inertia: Array
+) -> CapabilitySet | None:
+    """The accelerations from rest that the drives allow, without turning or of turns alone; None if it has none.
+
+    A drive that accelerates carries tau_0 - (M q'')_a, with q'' = g_a . a. Friction does not count.
+
+    Source: theory (82) and (93).
+    """
+    given, part = response.transmission, BLOCKS[block]
+    if given.wrenches is None or len(given.wrenches) != len(inertia):
+        return None
+    stopped = np.array([wrench.components() for wrench in given.constraints], dtype=float).reshape(-1, 6)[:, part]
+    directions = _null_space(stopped, given, block)
+    if not directions.shape[1]:
+        return None
+    rates = np.array([wrench.components() for wrench in given.wrenches], dtype=float).reshape(-1, 6)[:, part]
+    rows = inertia @ rates @ directions @ directions.T
+    sizes = np.linalg.norm(rows, axis=1)
+    felt = sizes > DEPENDENT * sizes.max(initial=0.0)
+    carried, lower, upper = (np.array([getattr(d, name) for d in drives]) for name in ("carried", "lower", "upper"))
+    names = [(drive.name,) for drive, seen in zip(drives, felt, strict=True) if seen]
+    matrix = np.vstack([rows[felt], -rows[felt]])
+    bounds = np.concatenate([(carried - lower)[felt], (upper - carried)[felt]])
+    least = float((bounds / np.tile(sizes[felt], 2)).min(initial=math.inf))
+    unit = "m/s**2" if block == "translation" else "rad/s**2"
+    name = "acceleration" if block == "translation" else "angular acceleration"
+    return _set(name, unit, least, matrix, bounds, directions, names * 2)
+
+
 def _set(
     name: str,
     unit: str,
@@ -285,6 +333,7 @@ SENTENCES = {
     "moment": "hold {} about whichever axis a moment acts",
     "speed": "move the tool at {} in whichever direction",
     "rate": "turn the tool at {} about whichever axis",
+    "acceleration": "accelerate it by {} in whichever direction",
 }
 """Phrases about the least amount of a set, which stands in the braces."""
 
@@ -293,8 +342,9 @@ def _message(machine: Machine, sets: Sequence[CapabilitySet]) -> str:
     phrases = [
         SENTENCES[each.name].format(machine.display.show(each.least, each.unit))
         for each in sets
-        if each.name in ("force", "speed") and math.isfinite(each.least)
+        if each.name in ("force", "speed", "acceleration") and math.isfinite(each.least)
     ]
     if any(each.least < 0.0 for each in sets):
         return "The drives do not hold the loads that count already."
-    return f"The drives {' and '.join(phrases)}." if phrases else "No drive limits a force or a speed of the tool here."
+    listed = ", ".join(phrases[:-1]) + " and " + phrases[-1] if len(phrases) > 1 else "".join(phrases)
+    return f"The drives {listed}." if phrases else "No drive limits a force or a speed of the tool here."

@@ -19,6 +19,7 @@ from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.feasible import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
@@ -29,7 +30,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.dynamics import driven_springs, rigid_form_of, senses_of_drives
+from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
 from kinetostat.studies.motions import Motion, every_direction, read_motion
 from kinetostat.studies.vibration import modes
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY

@@ -16,9 +16,9 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS
+from kinetostat.kinetostatics.feasible import driven_springs
 from kinetostat.machine.actuators import joint_actuators, name_of, senses_of
-from kinetostat.machine.leg import Spring
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import PARTS, drive_forces
 from kinetostat.motion.operators import MachineAtPose, Operators, forces_along, operators
@@ -160,12 +160,6 @@ class Dynamics(Immutable):
         mass, coriolis, gravity = (np.array(part, dtype=float) for part in whole)
         both = np.outer(self.senses, self.senses)
         return mass * both, coriolis * both, gravity * self.senses
-
-
-def driven_springs(configuration: Configuration) -> list[Spring]:
-    """The springs of the drives, in the order of all answers: actuators that are free by form do not count."""
-    springs = [spring for leg in configuration.legs for spring in leg.springs if spring.actuated]
-    return [spring for spring in springs if not (type(spring.stiffness) is float and spring.stiffness == 0.0)]
 
 
 def senses_of_drives(state: MachineState) -> Array:

@@ -18,6 +18,8 @@ TITLES = {
     "moment": "moment at no force",
     "speed": "speed without turning",
     "rate": "turning about the tool point",
+    "acceleration": "acceleration without turning",
+    "angular acceleration": "acceleration of turning alone",
 }
 """Subject of each set."""
 NO_END = "no limit"
@@ -31,7 +33,7 @@ def _amount(answer: Capability, value: float, unit: str) -> str:
 def _weakest(answer: Capability) -> str:
     """Say in which direction the least force and the least speed are, and which drives are at their limits there."""
     sentences = []
-    for name in ("force", "speed"):
+    for name in ("force", "speed", "acceleration"):
         part = answer.set_of(name)
         if part and part.weakest and part.least > 0.0:
             sentences.append(
@@ -89,7 +91,7 @@ def _finite(value: float) -> float | None:
 
 
 SETS = (
-    Field("set", "name", long_name="force, moment, speed or rate"),
+    Field("set", "name", long_name="force, moment, speed, rate or acceleration"),
     Field("unit"),
     Field("least", lambda part: _finite(part.least), long_name="in whichever direction, SI"),
     Field("greatest", lambda part: _finite(part.greatest), long_name="in the best direction, SI"),

@@ -22,18 +22,27 @@ BEYOND = 3.0
 """Half the width of a panel in units of the greatest or least amount, where a set has no end."""
 ROOM = 1.12
 """Width of a panel over that of what it shows."""
+MOVING, TURNING = ("force", "speed", "acceleration"), ("moment", "rate", "angular acceleration")
+"""Sets of a figure each."""
+FIGURES = {"capability": MOVING, "capability_turning": TURNING}
 CAPTION = "Cuts of what the drives allow through zero, each with the largest circle in whichever direction."
 
 
 def capability_figures(answer: Capability) -> dict[str, Drawing]:
     """The drawing of the sets; none where the loads are not held or every set is a line."""
-    return {"capability": Drawing(CAPTION, partial(capability_figure, answer))} if _sets_with_planes(answer) else {}
+    drawings = {}
+    for name, sets in FIGURES.items():
+        if _sets_with_planes(answer, sets):
+            drawings[name] = Drawing(CAPTION, partial(capability_figure, answer, sets=sets), minor=name != "capability")
+    return drawings
 
 
-def _sets_with_planes(answer: Capability) -> list[tuple[CapabilitySet, list[tuple[int, int]]]]:
+def _sets_with_planes(answer: Capability, names: Sequence[str]) -> list[tuple[CapabilitySet, list[tuple[int, int]]]]:
     """The sets that can be drawn, each with the planes in which it is more than a line."""
     rows = []
     for part in answer.sets:
+        if part.name not in names:
+            continue
         planes = [pair for pair in combinations(range(3), 2) if _lies_in(part, pair)]
         if part.least > 0.0 and np.isfinite(part.least) and planes:
             rows.append((part, planes))
@@ -46,14 +55,17 @@ def _lies_in(part: CapabilitySet, plane: tuple[int, int]) -> bool:
     return all(abs(kept[axis, axis] - 1.0) < DEPENDENT for axis in plane)
 
 
-def capability_figure(answer: Capability, title: str = "{}: what the drives allow") -> Figure:
+def capability_figure(
+    answer: Capability, title: str = "{}: what the drives allow", sets: Sequence[str] = MOVING
+) -> Figure:
     """Draw the cuts of each set in the planes of the base axes.
 
     Args:
         answer: with its sets.
         title: over the figure, with braces for the name of the machine.
+        sets: names of those that are drawn.
     """
-    rows = _sets_with_planes(answer)
+    rows = _sets_with_planes(answer, sets)
     columns = max(len(planes) for _, planes in rows)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(0.5 + 2.3 * columns, 0.9 + 2.25 * len(rows)), layout="constrained")
