@@ -12,7 +12,7 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinetostatics.feasible import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators
-from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.loads import gravity_of, located_members
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.studies.dynamics import dynamics
@@ -200,6 +200,46 @@ def test_drives_hold_at_rest_what_the_loaded_machine_shows(name):
     assert np.abs(forces) == pytest.approx(np.abs(shown), rel=1e-6)
 
 
+STAGE = """
+schema = 1
+name   = "Stage on a flexure"
+family = "legs"
+[platform]
+point = [0, 0, 0]
+[pose]
+x = "2 mm"
+[tool]
+mass = "2 kg"
+[[legs]]
+name = "flexure"
+joints = [{ name = "slide", type = "prismatic", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], stiffness = ["left 2 N/um", "right 2 N/um"] }]
+[[legs]]
+name = "drive"
+joints = [{ name = "slide", type = "prismatic", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], stiffness = "3 N/um", actuated = true }]
+"""  # noqa: E501
+
+
+def test_a_drive_bends_flexure_hinges_as_by_hand():
+    """1 N/um times 2 mm, and 2 kg times 3 m/s²."""
+    parts = dynamics(build(STAGE)).forces([0.0], [3.0])
+    assert parts["springs"] == pytest.approx([2000.0])
+    assert parts["inertia"] == pytest.approx([6.0])
+
+
+def test_more_drives_than_motions_share_by_the_least_energy_of_their_springs():
+    """Any other forces with the same virtual work store more energy: their differences do no work with these / k."""
+    machine = load("cogiro")
+    equations = dynamics(machine)
+    rng = np.random.default_rng(8)
+    rates, gains = rng.normal(0.0, 0.1, (2, 6))
+    forces = sum(equations.forces(rates.tolist(), gains.tolist()).values())
+    work = equations.mass @ gains + equations.coriolis(rates.tolist()) @ rates + equations.gravity
+    assert equations.jacobian.T @ forces == pytest.approx(work, abs=1e-9 * np.abs(forces).max())
+    stiffness = np.array([float(spring.stiffness) for spring in driven_springs(equations.state.configuration)])
+    _, _, rows = np.linalg.svd(equations.jacobian.T)
+    assert rows[6:] @ (forces / stiffness) == pytest.approx(0.0, abs=1e-9 * np.abs(forces / stiffness).max())
+
+
 @pytest.mark.parametrize("name", ["hexapod", "zhang-gosselin-4dof", "tripteron"])
 def test_machine_code_does_as_columns_do(name):
     machine = massive(name, "drives.rotor_friction=0.05 N*m", "damping.hinge_friction=0.1 N*m")
@@ -215,4 +255,4 @@ def test_every_bundled_machine_moves():
         machine = massive(name)
         equations = dynamics(machine)
         assert np.linalg.eigvalsh(equations.mass).min() > 0.0
-        assert len(equations.drives) == len(equations.coordinates)
+        assert len(equations.drives) >= len(equations.coordinates)

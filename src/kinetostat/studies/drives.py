@@ -221,7 +221,7 @@ def drives(
     return DriveLoads(
         state.machine,
         Status.OK,
-        _message(state.machine, moved, summaries),
+        _message(state.machine, moved, summaries) + _wrong_signs(state, curves),
         moved,
         tuple(summaries),
         tuple(joints),
@@ -399,6 +399,17 @@ def _excitation(state: MachineState, motion: Motion) -> tuple[float | None, floa
     fast = np.fft.rfftfreq(count, motion.duration / count) > SLOW * lowest
     whole = float(spectrum.sum())
     return lowest, float(spectrum[fast].sum()) / whole if whole > 0.0 else 0.0
+
+
+def _wrong_signs(state: MachineState, curves: DriveCurves) -> str:
+    """A sentence on drives that only pull or only push and would have to do the other thing; empty without any."""
+    signs = {"pulls": 1.0, "pushes": -1.0}
+    rows = zip(driven_springs(state.configuration), curves.force * senses_of_drives(state)[:, None], strict=True)
+    wrong = [name_of(spring) for spring, row in rows if spring.acts and (row * signs[spring.acts]).max() > 0.0]
+    if not wrong:
+        return ""
+    shown = ", ".join(wrong[:3]) + (", ..." if len(wrong) > 3 else "")
+    return f" {shown} cannot do what would be asked of them: they carry loads of one sign only."
 
 
 def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> str:

@@ -278,7 +278,7 @@ def _moves(
             part.append(more)
         times.append(clock + time)
         clock += float(time[-1])
-    kind = f"{len(curves)} moves of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
+    kind = f"{_counted(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
     return Motion(kind, np.concatenate(times), _path(names, [np.concatenate(part) for part in rows]))
 
 
@@ -434,7 +434,11 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
         rates[name] = rates[name] + amplitude * turning * np.cos(angle)
         gains[name] = gains[name] - amplitude * turning**2 * np.sin(angle)
     closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
-    return Motion(f"{len(rows)} sines, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
+    return Motion(f"{_counted(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number > 1 else "")
 
 
 def _place(name: str, _row: int) -> str:

@@ -23,6 +23,8 @@ from kinetostat.views.tables import numeric_table
 
 PER_MINUTE = 30.0 / np.pi
 """Turns per minute of 1 rad/s."""
+LEAST_SHARE = 1e-5
+"""Share that is still written as a number."""
 MOST_LEGEND = 8
 """Drives that a legend names."""
 
@@ -57,7 +59,7 @@ def _lines(answer: DriveLoads) -> Lines:
         ending = "springs follow it as at rest." if slow else "the machine rings, and the tool deflects further."
         yield (
             "Vibration",
-            f"The lowest natural frequency is {number(answer.frequency)} Hz; {number(100.0 * answer.excited)} % of the "
+            f"The lowest natural frequency is {number(answer.frequency)} Hz; {_percent(answer.excited)} of the "
             f"motion's accelerations are faster than a third of it, so that {ending}",
         )
     if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
@@ -66,6 +68,10 @@ def _lines(answer: DriveLoads) -> Lines:
             "Motors",
             f'The file gives no lead, so that motors are taken for linear ones; write lead = "{example}" in [drives].',
         )
+
+
+def _percent(share: float) -> str:
+    return f"{number(100.0 * share)} %" if share > LEAST_SHARE else "hardly any"
 
 
 def _direction(part: Mapping[str, Array], point: int) -> str:
