@@ -5,9 +5,11 @@ import pytest
 from kinetostat.equilibrium import state as states
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics import closure
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import as_toml, load
+from kinetostat.studies import datasets
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.datasets import evaluate
 from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.requirements import requirements
 
@@ -49,3 +51,15 @@ def test_a_question_asked_of_a_state_places_and_solves_it_once(calls, question):
 def test_a_question_asked_of_a_machine_places_and_solves_it_once(calls, question):
     assert QUESTIONS[question](load("tripteron", SETTINGS))
     assert calls == {"solve_joints": 1, "respond": 1}
+
+
+def test_a_machine_that_is_evaluated_again_and_again_is_written_once(monkeypatch):
+    """What does not depend on the poses takes longer than one of them."""
+    machine, texts = load("tripteron", SETTINGS), []
+    monkeypatch.setattr(datasets, "as_toml", lambda given: texts.append(as_toml(given)) or texts[-1])
+    answers = [evaluate(machine, {"x": [x]}, ["compliance_z"]) for x in (0.01, 0.02, 0.03)]
+    assert len(texts) == 1
+    assert {answer.attrs["machine_file"] for answer in answers} == set(texts)
+    other = evaluate(load("tripteron", [*SETTINGS, "pose.y=1 mm"]), {"x": [0.01]}, ["compliance_z"])
+    assert other.attrs["machine_file"] == texts[1] != texts[0]
+    assert other.attrs["pose"] != answers[0].attrs["pose"]

@@ -4,6 +4,7 @@ Labels are attributes as the CF conventions have them: units, long names, and th
 """
 
 from collections.abc import Collection, Sequence
+from functools import cache, lru_cache
 from importlib.metadata import version
 from typing import Any
 
@@ -11,13 +12,14 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.kernel import Identical
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked
-from kinetostat.studies.evaluation import MATRICES, PoseAnswers, answers_at
+from kinetostat.studies.evaluation import MACHINES_KEPT, MATRICES, PoseAnswers, answers_at
 from kinetostat.studies.poses import given_poses
 from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
@@ -57,13 +59,31 @@ def origin_of(machine: Machine, varied: Collection[str] = (), uncounted: str = "
     """
     return {
         "machine": machine.name,
-        "machine_file": as_toml(machine),
+        "machine_file": _file_of(Identical(machine)),
         "display": machine.display.units,
-        "kinetostat": version("kinetostat"),
+        "kinetostat": _program_version(),
         "frame": frame_of(machine),
-        "pose": pose_of(machine, varied),
+        "pose": _pose_of(Identical(machine), tuple(varied)),
         **({LOADS_LEFT_OUT: uncounted} if uncounted else {}),
     }
+
+
+@lru_cache(MACHINES_KEPT)
+def _file_of(machine: Identical) -> str:
+    """The file of a machine, which one that is asked about many times needs once."""
+    return as_toml(machine.value)
+
+
+@lru_cache(MACHINES_KEPT)
+def _pose_of(machine: Identical, varied: tuple[str, ...]) -> str:
+    """The coordinates of its pose that do not vary, as `pose_of` writes them."""
+    return pose_of(machine.value, varied)
+
+
+@cache
+def _program_version() -> str:
+    """The version of kinetostat: reading it from the installation takes longer than evaluating a pose."""
+    return version("kinetostat")
 
 
 @checked

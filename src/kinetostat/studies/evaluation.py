@@ -4,6 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.kernel import Identical
 from kinetostat.engine.points import PointTable
-from kinetostat.equilibrium.state import state_of
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -23,6 +25,8 @@ from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_qu
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Whole matrices by name, and how the names of their entries begin."""
+MACHINES_KEPT = 8
+"""Machines about which facts that do not depend on the poses are kept, by identity."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +91,18 @@ def answers_at(
     wanted, parts = several(quantities), machine.family.component_names
     matrices = tuple(dict.fromkeys(name for name in wanted if name in MATRICES))
     names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts, cable_count(machine)))
-    state = state_of(machine)
+    state = _state_of(Identical(machine))
     refuse_absent(state, names, poses.fields)
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
     uncounted = uncounted_loads(state, computed.values, zip(poses.fields, poses.values, strict=True))
     return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status, uncounted)
+
+
+@lru_cache(MACHINES_KEPT)
+def _state_of(machine: Identical) -> MachineState:
+    """The state of a machine at its pose; where it is asked about again, what it has computed is still there."""
+    return state_of(machine.value)
 
 
 def as_csv(answers: PoseAnswers) -> str:

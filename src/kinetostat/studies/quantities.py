@@ -5,6 +5,7 @@ All that is decided here follows from the file and from where the legs are, so t
 
 import difflib
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -64,16 +65,22 @@ def resolve_quantities(
     Raises:
         InputError: an unknown name, or one of a component that the machine does not have.
     """
-    groups = {
-        group: [name for name in members if _exists(name, components) and name not in TENSIONS[cables:]]
-        for group, members in GROUPS.items()
-    }
+    groups = _groups(tuple(components), cables)
     resolved: list[str] = []
     for name in (current_name(given, "quantity") for given in several(names)):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             raise InputError(_no_quantity(name, groups, components))
         resolved += groups.get(name, [name])
     return list(dict.fromkeys(resolved))
+
+
+@cache
+def _groups(components: tuple[str, ...], cables: int) -> dict[str, list[str]]:
+    """The members of each group that a machine of these components and so many cables has."""
+    return {
+        group: [name for name in members if _exists(name, components) and name not in TENSIONS[cables:]]
+        for group, members in GROUPS.items()
+    }
 
 
 def cable_count(machine: Machine) -> int:
@@ -210,11 +217,10 @@ LIMITS_OF_DRIVES = {
 
 def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: Sequence[Parameter]) -> None:
     """Refuse quantities about what drives can do where the file of a machine limits none of them."""
-    given = values(state.machine)
-    for name in names:
+    driven = [name for name in names if QUANTITIES[name].driven]
+    given = values(state.machine) if driven else {}
+    for name in driven:
         what = QUANTITIES[name].driven
-        if not what:
-            continue
         if what == "reversal":
             _refuse_without_lost_motion(state, name, varied)
             continue
