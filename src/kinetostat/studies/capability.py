@@ -227,19 +227,14 @@ def _wrenches(response: Response, drives: Sequence[DriveAtPose], block: str) -> 
 
 def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
     """The velocities without turning, or the turns about the tool point, that the drives allow; None if it has none."""
-    given, part = response.transmission, BLOCKS[block]
-    if given.wrenches is None:
+    moving = _motions(response.transmission, block)
+    if moving is None:
         return None
-    stopped = np.array([wrench.components() for wrench in given.constraints], dtype=float).reshape(-1, 6)[:, part]
-    directions = _null_space(stopped, given, block)
-    if not directions.shape[1]:
-        return None
-    rates = np.array([wrench.components() for wrench in given.wrenches], dtype=float).reshape(-1, 6)[:, part]
-    rates = rates @ directions @ directions.T
+    directions, rates = moving
     felt = np.linalg.norm(rates, axis=1) > DEPENDENT * np.linalg.norm(rates, axis=1).max(initial=0.0)
     speeds = np.array([drive.speed for drive in drives])
     names = [(drive.name,) for drive, seen in zip(drives, felt, strict=True) if seen]
-    least = float(greatest_speed(given, [drive.speed for drive in response.drives], part))
+    least = float(greatest_speed(response.transmission, speeds.tolist(), BLOCKS[block]))
     name, unit = ("speed", "m/s") if block == "translation" else ("rate", "rad/s")
     matrix, bounds = np.vstack([rates[felt], -rates[felt]]), np.tile(speeds[felt], 2)
     return _set(name, unit, least, matrix, bounds, directions, names * 2)
@@ -267,15 +262,11 @@ def _accelerations(
 
     Source: theory (82) and (93).
     """
-    given, part = response.transmission, BLOCKS[block]
-    if given.wrenches is None or len(given.wrenches) != len(inertia):
+    moving = _motions(response.transmission, block)
+    if moving is None or len(moving[1]) != len(inertia):
         return None
-    stopped = np.array([wrench.components() for wrench in given.constraints], dtype=float).reshape(-1, 6)[:, part]
-    directions = _null_space(stopped, given, block)
-    if not directions.shape[1]:
-        return None
-    rates = np.array([wrench.components() for wrench in given.wrenches], dtype=float).reshape(-1, 6)[:, part]
-    rows = inertia @ rates @ directions @ directions.T
+    directions, rates = moving
+    rows = inertia @ rates
     sizes = np.linalg.norm(rows, axis=1)
     felt = sizes > DEPENDENT * sizes.max(initial=0.0)
     carried, lower, upper = (np.array([getattr(d, name) for d in drives]) for name in ("carried", "lower", "upper"))
@@ -317,6 +308,23 @@ def _row_space(matrix: Array) -> Array:
         return np.zeros((3, 0))
     _, values, rows = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(rows[values > DEPENDENT * values[0]].T)
+
+
+def _motions(given: Transmission, block: str) -> tuple[Array, Array] | None:
+    """The motions of the platform in a block that structure allows, and the rates of the drives.
+
+    Returns:
+        An orthonormal basis of the motions [3 x k], and the rates per unit of each component of the block, along these
+        motions [drives x 3]; None where there are none, or the rates of the drives do not follow from them.
+    """
+    if given.wrenches is None:
+        return None
+    stopped, driven = (
+        np.array([wrench.components() for wrench in some], dtype=float).reshape(-1, 6)[:, BLOCKS[block]]
+        for some in (given.constraints, given.wrenches)
+    )
+    directions = _null_space(stopped, given, block)
+    return (directions, driven @ directions @ directions.T) if directions.shape[1] else None
 
 
 def _null_space(stopped: Array, given: Transmission, block: str) -> Array:
