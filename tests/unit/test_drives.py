@@ -9,6 +9,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import Motion
+from kinetostat.views.data_forms import json_of
+from kinetostat.views.drives import DRIVES
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
 MOVES = "feed [mm/s], acceleration [m/s**2], x [mm], roll [deg]\n300, 5, 0, 0\n300, 5, 15, 2\n300, 5, 0, 0\n"
@@ -122,6 +124,13 @@ def test_a_motion_out_of_reach_has_a_sentence(tmp_path):
     answer = answer_of(tmp_path, UP.replace("3 mm", "3 m"), *MASS, name="hexapod-rus")
     assert not answer.drives
     assert "cannot be followed" in answer.message
+    assert json_of(DRIVES, answer)["drives"] == []
+
+
+def test_a_motion_beyond_a_limit_has_an_answer_that_says_so(tmp_path):
+    answer = answer_of(tmp_path, UP, *MASS, "limits.longest_leg=96 mm")
+    assert answer.drives
+    assert "a limit of the file" in answer.message
 
 
 def test_a_machine_without_a_mass_is_refused(tmp_path):

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinetostat.arrays import Array
-from kinetostat.engine.batch import NUMPY_SLAB
+from kinetostat.arrays import Array, Codes
+from kinetostat.engine.batch import NUMPY_SLAB, evaluate
 from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
+from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
@@ -38,6 +39,10 @@ from kinetostat.units import KINDS, UnitError
 
 SLOW = 1.0 / 3.0
 """Share of the lowest natural frequency up to which springs follow a motion as at rest, within an eighth."""
+
+
+PASSABLE = [int(Status.OK), int(Status.JOINT_LIMIT), int(Status.UNDECIDED)]
+"""Statuses of poses at which drives have forces: limits of the file are compared with, but stop no motion."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,7 @@ class DriveLoads(Immutable):
         machine: with its masses.
         status: of the first pose that has no answer, else OK.
         message: the answer in a sentence.
-        motion: the motion; None without an answer.
+        motion: the motion.
         drives: each drive; none without an answer.
         joints: the load of each joint.
         curves: all of it over time; None without an answer.
@@ -142,7 +147,7 @@ class DriveLoads(Immutable):
     machine: Machine
     status: Status
     message: str
-    motion: Motion | None = None
+    motion: Motion
     drives: tuple[DriveLoad, ...] = ()
     joints: tuple[JointLoad, ...] = ()
     curves: DriveCurves | None = None
@@ -198,16 +203,19 @@ def drives(
         raise InputError("a motion says its speed and acceleration itself; give either a motion or these.")
     else:
         moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
-    forces = forces_on_path(form, moved.path, joints=True)
-    lost = np.flatnonzero(forces.status != Status.OK)
+    columns = {POSE + name: np.asarray(rows, dtype=float) for name, rows in moved.path.pose.items()}
+    codes = evaluate(state.machine, PointTable(columns), ["singularity_margin"]).status
+    lost = np.flatnonzero(~np.isin(codes, PASSABLE))
     if lost.size:
-        status = Status(int(forces.status[lost[0]]))
+        status = Status(int(codes[lost[0]]))
         return DriveLoads(
             state.machine,
             status,
             f"The motion cannot be followed: at {moved.times[lost[0]]:.4g} s the pose is "
             f"{status.word.replace('_', ' ')}. {status.sentence}",
+            moved,
         )
+    forces = forces_on_path(form, moved.path, joints=True)
     curves = _curves(state, moved, forces)
     summaries = _summaries(state, moved, forces, curves)
     joints = [
@@ -221,7 +229,7 @@ def drives(
     return DriveLoads(
         state.machine,
         Status.OK,
-        _message(state.machine, moved, summaries) + _wrong_signs(state, curves),
+        _message(state.machine, moved, summaries) + _wrong_signs(state, curves) + _limits_passed(moved, codes),
         moved,
         tuple(summaries),
         tuple(joints),
@@ -410,6 +418,15 @@ def _wrong_signs(state: MachineState, curves: DriveCurves) -> str:
         return ""
     shown = ", ".join(wrong[:3]) + (", ..." if len(wrong) > 3 else "")
     return f" {shown} cannot do what would be asked of them: they carry loads of one sign only."
+
+
+def _limits_passed(motion: Motion, codes: Codes) -> str:
+    """A sentence on the first pose that passes a limit of the file; empty without one."""
+    passed = np.flatnonzero(codes == Status.JOINT_LIMIT)
+    if not passed.size:
+        return ""
+    where = "the pose passes" if motion.timeless else f"from {motion.times[passed[0]]:.4g} s on some poses pass"
+    return f" But {where} a limit of the file, see `kinetostat analyze` there."
 
 
 def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> str:

@@ -270,15 +270,17 @@ def _moves(
     times, rows, clock = [], [[], [], []], 0.0  # type: ignore[var-annotated]
     for curve, row in zip(curves, rows_of, strict=True):
         jerk = float(amounts[JERK][row]) if JERK in amounts else np.inf
-        phases = profile(curve.length, float(amounts[FEED][row]), float(amounts[ACCELERATION][row]), jerk)
-        time, run = along_profile(phases, each)
+        steps = profile(curve.length, float(amounts[FEED][row]), float(amounts[ACCELERATION][row]), jerk)
+        time, run = along_profile(steps, each)
         place, slope, bend = curve.at(run[0])
         parts = place, slope * run[1][:, None], bend * run[1][:, None] ** 2 + slope * run[2][:, None]
         for part, more in zip(rows, parts, strict=True):
             part.append(more)
         times.append(clock + time)
         clock += float(time[-1])
-    kind = f"{_counted(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
+    kind = (
+        f"{_number_of(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
+    )
     return Motion(kind, np.concatenate(times), _path(names, [np.concatenate(part) for part in rows]))
 
 
@@ -434,10 +436,10 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
         rates[name] = rates[name] + amplitude * turning * np.cos(angle)
         gains[name] = gains[name] - amplitude * turning**2 * np.sin(angle)
     closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
-    return Motion(f"{_counted(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
+    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
 
 
-def _counted(number: int, what: str) -> str:
+def _number_of(number: int, what: str) -> str:
     return f"{number} {what}" + ("s" if number > 1 else "")
 
 

@@ -37,7 +37,7 @@ def _curves(answer: DriveLoads) -> DriveCurves:
 
 def _lines(answer: DriveLoads) -> Lines:
     yield "Drives", answer.message
-    if answer.motion is None or answer.worst is None:
+    if answer.worst is None:
         return
     show, (point, name) = answer.machine.display.show, answer.worst
     if answer.motion.timeless:
@@ -79,8 +79,6 @@ def _direction(part: Mapping[str, Array], point: int) -> str:
 
 
 def _pose(answer: DriveLoads, point: int) -> str:
-    if answer.motion is None:
-        return ""
     show = answer.machine.display.show
     units = {p: "m" if p in ("x", "y", "z", "length") else "rad" for p in answer.motion.path.pose}
     return ", ".join(
@@ -164,14 +162,11 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
 
 
 def _note(figure: Figure, answer: DriveLoads) -> None:
-    if answer.motion is not None:
-        moving = [POSE + name for name in answer.motion.path.pose]
-        note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind)
+    moving = [POSE + name for name in answer.motion.path.pose]
+    note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind)
 
 
 def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
-    if answer.motion is None:
-        return
     panel.axhline(0.0, color="#b0b0b0", linewidth=0.8)
     for k, drive in enumerate(answer.drives):
         if chosen[k]:
@@ -192,7 +187,7 @@ def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors mu
             figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True
         ):
             scale = display.scale("N·m" if rotary else "N")
-            times = np.zeros(1) if answer.motion is None else answer.motion.times
+            times = answer.motion.times
             for k, drive in enumerate(answer.drives):
                 if drive.rotary is not rotary:
                     continue
@@ -231,7 +226,7 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.6, 3.2), layout="constrained")
         panel = figure.add_subplot()
-        times = () if answer.motion is None else answer.motion.times
+        times = answer.motion.times
         for i, part in enumerate(PARTS):
             if np.any(curves.parts[k, i]):
                 panel.plot(times, curves.parts[k, i] * scale.factor, color=COLOURS[i], linewidth=1.1, label=part)
@@ -246,7 +241,7 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
 
 
 def _figures(answer: DriveLoads) -> dict[str, Drawing]:
-    if answer.motion is None:
+    if not answer.drives:
         return {}
     if answer.motion.timeless:
         return {"speed_torque": Drawing("Torque and speed in all directions.", partial(speed_torque_figure, answer))}
@@ -259,7 +254,7 @@ def _figures(answer: DriveLoads) -> dict[str, Drawing]:
 
 def curves_csv(answer: DriveLoads) -> str | None:
     """Write all drives over time as CSV, SI: a row for each point of the motion."""
-    if answer.motion is None or answer.motion.timeless:
+    if answer.curves is None or answer.motion.timeless:
         return None
     curves, columns = _curves(answer), {"time [s]": answer.motion.times}
     columns |= answer.motion.path.pose
@@ -352,7 +347,7 @@ DRIVES = Description(
     tables=_tables,
     figures=_figures,
     axes=(
-        Axis("time", lambda a: np.zeros(0) if a.motion is None else a.motion.times, "s"),
+        Axis("time", lambda a: np.zeros(0) if a.curves is None else a.motion.times, "s"),
         Axis("component", lambda _a: np.array(["rx", "ry", "rz", "x", "y", "z"])),
     ),
     answered=lambda answer: bool(answer.drives),
