@@ -36,6 +36,7 @@ from kinetostat.studies.requirements import requirements as requirements
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.servo import servo as servo
 from kinetostat.studies.state_space import state_space as state_space
+from kinetostat.studies.tensions import tensions as tensions
 from kinetostat.studies.under_load import under_load as under_load
 from kinetostat.studies.vibration import modes as modes
 from kinetostat.studies.workspace import workspace as workspace
