@@ -27,6 +27,7 @@ from kinetostat.studies.dynamics import dynamics as dynamics
 from kinetostat.studies.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines import guidelines as guidelines
 from kinetostat.studies.identification.identification import identify as identify
+from kinetostat.studies.lobes import lobes as lobes
 from kinetostat.studies.measured.comparison import validate_measured as validate_measured
 from kinetostat.studies.motors import motors as motors
 from kinetostat.studies.optimisation.problem import load_problem as load_problem

@@ -36,6 +36,7 @@ from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
+from kinetostat.studies.lobes import lobes
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import stored_problem
@@ -184,6 +185,7 @@ REPORT_QUESTIONS = (
     ),
     ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
+    ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _cuts(known.machine)),
     ReportQuestion(
         "maps",
         lambda known: evaluate_grid(known.state, known.ranges, _compliances(known.machine)),
@@ -201,7 +203,8 @@ REPORT_QUESTIONS = (
 )
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
 error budget where the file has tolerances, capability where it limits its drives, tensions where all legs are cables,
-vibrations where it has masses, and frequencies over the poses of the maps where there are modes."""
+vibrations where it has masses, lobes where it says what the tool cuts, and frequencies over the poses of the maps where
+there are modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
 
@@ -246,6 +249,11 @@ def gather(
             known.given[question.name] = question.ask(known)
         progress(step, REPORT_STEPS)
     return known
+
+
+def _cuts(machine: Machine) -> bool:
+    cutting = machine.tables["cutting"]
+    return _has_mass(machine) and bool(cutting.pressure and any(cutting.direction))
 
 
 def _has_mass(machine: Machine) -> bool:

@@ -40,6 +40,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute the stiffness and the damping of the tool with servo loops closed",
         "views.servo.SERVO_QUESTION",
     ),
+    "lobes": (
+        "compute the width of cut that stays stable over the speed of the spindle",
+        "views.lobes.LOBES_QUESTION",
+    ),
     "capability": (
         "compute the forces, moments and speeds that the drives allow at a pose",
         "views.capability.CAPABILITY_QUESTION",
@@ -78,6 +82,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
     "studies.motors.MotorChoice": "views.motors.MOTORS",
     "studies.servo.Servo": "views.servo.SERVO",
+    "studies.lobes.Lobes": "views.lobes.LOBES",
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.budget.Budget": "views.budget.BUDGET",
     "studies.budget.budget.PossibleErrors": "views.budget.POSSIBLE_ERRORS",

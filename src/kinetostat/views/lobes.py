@@ -1,0 +1,162 @@
+"""Stability lobes: the question, the description of its answer, and its picture. Nothing is computed here."""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from kinetostat.display import number
+from kinetostat.machine.parameters import with_values
+from kinetostat.studies.lobes import Lobes, lobes
+from kinetostat.studies.setting import pose_of, setting_of
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
+from kinetostat.views.tables import numeric_table
+
+SHOWN = 12
+"""Speeds with a row of the table, at equal distances."""
+HEADROOM = 8.0
+"""Height of the picture in multiples of the least width."""
+
+
+def _speed(turns: float) -> str:
+    return f"{number(60.0 * turns)} 1/min"
+
+
+def _lines(answer: Lobes) -> Lines:
+    show = answer.machine.display.show
+    if not answer.poses:
+        return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
+    cutter = f"{answer.teeth} teeth" if answer.teeth > 1 else "one edge"
+    lines = [
+        ("Pose", f"{pose_of(answer.machine)}." if answer.poses == 1 else f"{answer.poses} poses; the least counts.")
+    ]
+    if math.isinf(answer.least):
+        lines.append(("Cut", f"With {cutter} every width of cut is stable at every speed."))
+        return lines
+    text = f"With {cutter} every speed is stable up to a width of {show(answer.least, 'm')}; "
+    lines.append(("Cut", f"{text}a wider cut chatters at {show(answer.frequency, 'Hz')} at some speeds."))
+    if answer.best:
+        speed, width = answer.best
+        reach = "any width" if math.isinf(width) else show(width, "m")
+        lines.append(("Speed", f"Of the speeds shown, {_speed(speed)} stays stable up to {reach}."))
+    if answer.worst:
+        lines.append(
+            ("Worst", f"The least width is that at {pose_of(with_values(answer.machine, dict(answer.worst)))}.")
+        )
+    if answer.assumed:
+        lines.append(("Damping", "Damping is assumed: 2 % of critical in every mode; give a table [damping]."))
+    return lines
+
+
+def _tables(answer: Lobes, full: bool) -> Iterator[FittedTable]:
+    if not answer.poses:
+        return
+    table = numeric_table("Width of cut that stays stable", "speed", ["width"])
+    step = 1 if full else max(1, (len(answer.speeds) - 1) // (SHOWN - 1))
+    for speed, width in zip(answer.speeds[::step], answer.widths[::step], strict=True):
+        shown = "any width" if math.isinf(width) else answer.machine.display.show(float(width), "m")
+        table.add_row(_speed(float(speed)), shown)
+    yield table
+
+
+def lobes_figures(answer: Lobes) -> dict[str, Drawing]:
+    """The drawing of the lobes; none without an answer, or where every cut is stable."""
+    if not answer.poses or math.isinf(answer.least):
+        return {}
+    caption = "Width of cut that stays stable over the speed of the spindle; above the curve the cut chatters."
+    return {"lobes": Drawing(caption, partial(lobes_figure, answer))}
+
+
+def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
+    """Draw the width of cut that stays stable over the speed of the spindle.
+
+    Args:
+        answer: with an answer.
+        title: over the figure, with braces for the name of the machine.
+    """
+    scale = answer.machine.display.scale("m")
+    top = HEADROOM * answer.least * scale.factor
+    widths = np.minimum(np.where(np.isfinite(answer.widths), answer.widths, np.inf) * scale.factor, 2.0 * top)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+        panel = figure.add_subplot()
+        speeds = 60.0 * answer.speeds
+        panel.fill_between(speeds, widths, 2.0 * top, color=COLOURS[1], alpha=0.18, linewidth=0.0)
+        panel.plot(speeds, widths, color=COLOURS[1])
+        panel.axhline(answer.least * scale.factor, color=COLOURS[0], linewidth=0.8, linestyle="--")
+        panel.text(0.99, answer.least * scale.factor, "stable at every speed below", color=COLOURS[0], fontsize="small",
+                   ha="right", va="top", transform=panel.get_yaxis_transform())  # fmt: skip
+        panel.text(0.02, 0.95, "chatters", color=COLOURS[1], transform=panel.transAxes, va="top")
+        panel.set_xlim(float(speeds[0]), float(speeds[-1]))
+        panel.set_ylim(0.0, top)
+        panel.set_xlabel("speed of the spindle (1/min)")
+        panel.set_ylabel(scale.label("width of cut"))
+        set_title(figure, title.format(answer.machine.name))
+        poses = f"least of {answer.poses} poses" if answer.poses > 1 else f"chatter at {answer.frequency:.4g} Hz"
+        note_setting(figure, setting_of(answer.machine), poses)
+        fix_layout(figure)
+    return figure
+
+
+def _worst(answer: Lobes) -> dict[str, float]:
+    return dict(answer.worst)
+
+
+def _widths(answer: Lobes) -> list[float | None]:
+    return [None if math.isinf(width) else width for width in answer.widths.tolist()]
+
+
+LOBES = Description(
+    title="Stability lobes",
+    fields=(
+        *FIRST_FIELDS,
+        Field("teeth"),
+        Field("pressure", unit="Pa"),
+        Field("least_width", lambda answer: None if math.isinf(answer.least) else answer.least, "m"),
+        Field("chatter_frequency", lambda answer: None if math.isnan(answer.frequency) else answer.frequency, "Hz"),
+        Field("poses"),
+        Field("worst_pose", _worst, forms=("json",)),
+        Field("damping_assumed", "assumed"),
+        Field("speed", lambda answer: answer.speeds.tolist(), "1/s", forms=("json",)),
+        Field("width", _widths, "m", "width of cut that stays stable; none where every width is", forms=("json",)),
+        Field("width", "widths", "m", "width of cut that stays stable", ("speed",), ("nc",)),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=lobes_figures,
+    axes=(Axis("speed", "speeds", "1/s"),),
+    answered=lambda answer: bool(answer.poses),
+    files={"lobes.json": "json", "lobes.nc": "nc"},
+)
+LOBES_QUESTION = Question(
+    example='kinetostat lobes hexapod --set tool.mass="12 kg" --cutting-pressure "2000 N/mm**2" --teeth 4 -o lobes',
+    answer=lobes,
+    options=(
+        Option("teeth", "count", "number of edges of a milling cutter (default: one edge that stays in the cut)"),
+        Option("entry", "quantity", "angle at which an edge enters the cut, from the normal to the feed", "ANGLE"),
+        Option("leaving", "quantity", "angle at which it leaves the cut (default: 180 deg)", "ANGLE"),
+        Option("feed", "direction", "direction of the feed (default: x)", default=()),
+        Option("spindle", "direction", "axis of the spindle, towards the machine (default: z)", default=()),
+        Option("radial", "number", "radial force as a share of the tangential one (default: 0.3)", default=0.3),
+        Option(
+            "cutting_pressure",
+            "quantity",
+            'tangential force per area of the chip, e.g. "2000 N/mm**2" (default: that of [cutting])',
+            "PRESSURE",
+        ),
+        Option("lowest", "quantity", 'slowest speed, e.g. "2000 1/min"', "SPEED"),
+        Option("highest", "quantity", 'fastest speed, e.g. "20000 1/min"', "SPEED"),
+        Option(
+            "over", "text", 'a range of poses, all of which must be stable: "x=-10 cm:10 cm:5"', "RANGE", (), many=True
+        ),
+    ),
+    loaded="vibrations about the state of rest under the loads, with tensions and weights",
+    output="lobes.json, lobes.nc and the figure",
+    slow="cutting",
+    reports_progress=True,
+)
