@@ -76,8 +76,8 @@ __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
     "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "evaluate", "evaluate_grid",
     "export", "forward", "guidelines", "identify", "load", "load_problem", "lobes", "machine_picture", "modes",
-    "motors", "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo", "state_of",
-    "state_space", "tensions", "under_load", "validate", "validate_measured", "workspace",
+    "motors", "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo",
+    "state_of", "state_space", "tensions", "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

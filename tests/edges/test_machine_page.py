@@ -61,7 +61,7 @@ def test_the_file_in_a_page_is_the_machine(pages):
 
 def test_the_papers_machine_fits_into_an_address(tmp_path):
     for name in ("zhang-gosselin-4dof", "hexapod", "tripteron"):
-        text = export(load(name), tmp_path / "link.txt", to="link")[0].read_text("ascii")
+        text = export(load(name), tmp_path / "machine.link")[0].read_text("ascii")
         assert re.fullmatch(r"viewer\.html#m=[\w-]+\n", text)
         assert len(text) <= LONGEST_ADDRESS, name
 
@@ -91,7 +91,7 @@ def test_an_address_gives_the_numbers_of_its_page(pages, viewer_page, tmp_path):
             rows = (np.array(home) + 0.05 * np.random.default_rng(2).uniform(-1, 1, (50, len(home)))).tolist()
             ready(watched, pages[name].as_uri())
             expected = watched.tab.evaluate(PROGRAMS, rows)
-            link = export(machine, tmp_path / "link.txt", to="link")[0].read_text("ascii").strip()
+            link = export(machine, tmp_path / "machine.link")[0].read_text("ascii").strip()
             first = next(key for key in values(machine) if key.startswith("pose.")).removeprefix("pose.")
             ready(watched, f"{viewer_page.as_uri()}#{link.partition('#')[2]}&{first}=0.0123")
             assert watched.tab.evaluate(PROGRAMS, rows) == expected
@@ -119,7 +119,7 @@ EVIL = "1);globalThis.evil=1;("
 
 @pytest.fixture(scope="module")
 def link_content(tmp_path_factory):
-    path = export(load("delta"), tmp_path_factory.mktemp("link") / "link.txt", to="link")[0]
+    path = export(load("delta"), tmp_path_factory.mktemp("link") / "machine.link")[0]
     return opened_content(path.read_text("ascii"))
 
 

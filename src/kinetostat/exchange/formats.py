@@ -108,7 +108,7 @@ KNOWN = (
     ),
     Format(
         "link",
-        ".txt",
+        ".link",
         "views.live_page.write_link",
         "the same as the end of an address, of at most 8 kB for most machines, for a viewer page",
         options=CHANNELS,

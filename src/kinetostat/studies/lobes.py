@@ -119,7 +119,7 @@ def lobes(
             angles to the spindle, or there are more than 2000 poses.
     """
     state = state_of(machine)
-    engagement = _engagement(state.machine, teeth, entry, leaving, feed, spindle, radial, cutting_pressure)
+    engagement = _cutter_of(state.machine, teeth, entry, leaving, feed, spindle, radial, cutting_pressure)
     ends = [None if end is None else positive(end, "frequency", name)
             for end, name in ((lowest, "lowest"), (highest, "highest"))]  # fmt: skip
     if ends[0] is not None and ends[1] is not None and ends[0] >= ends[1]:
@@ -139,7 +139,7 @@ def lobes(
     return _answer(state, vibrations, engagement, ends)
 
 
-def _engagement(
+def _cutter_of(
     machine: Machine,
     teeth: int | None,
     entry: float | str | None,
@@ -195,8 +195,8 @@ def _answer(
     engagement: Engagement,
     ends: Sequence[float | None],
 ) -> Lobes:
-    found = [(_borders_of(each, engagement), pose, each) for each, pose in vibrations]
-    known = [(border, pose, each) for border, pose, each in found if border is not None]
+    rows = [(_borders_of(each, engagement), pose, each) for each, pose in vibrations]
+    known = [(border, pose, each) for border, pose, each in rows if border is not None]
     nothing = np.zeros(0)
     if not known:
         first = vibrations[0][0]

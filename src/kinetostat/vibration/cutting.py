@@ -90,7 +90,7 @@ def tried_frequencies(frequencies: Array, ratios: Array) -> Array:
 
 @dataclass(frozen=True)
 class Borders:
-    """Where cuts begin to chatter.
+    """Widths of cut beyond which a tool chatters.
 
     Attributes:
         frequencies: of the chatter, Hz [n].

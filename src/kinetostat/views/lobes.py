@@ -23,7 +23,7 @@ HEADROOM = 8.0
 """Height of the picture in multiples of the least width."""
 
 
-def _speed(turns: float) -> str:
+def _speed_text(turns: float) -> str:
     return f"{number(60.0 * turns)} 1/min"
 
 
@@ -43,7 +43,7 @@ def _lines(answer: Lobes) -> Lines:
     if answer.best:
         speed, width = answer.best
         reach = "any width" if math.isinf(width) else show(width, "m")
-        lines.append(("Speed", f"Of the speeds shown, {_speed(speed)} stays stable up to {reach}."))
+        lines.append(("Speed", f"Of the speeds shown, {_speed_text(speed)} stays stable up to {reach}."))
     if answer.worst:
         lines.append(
             ("Worst", f"The least width is that at {pose_of(with_values(answer.machine, dict(answer.worst)))}.")
@@ -60,7 +60,7 @@ def _tables(answer: Lobes, full: bool) -> Iterator[FittedTable]:
     step = 1 if full else max(1, (len(answer.speeds) - 1) // (SHOWN - 1))
     for speed, width in zip(answer.speeds[::step], answer.widths[::step], strict=True):
         shown = "any width" if math.isinf(width) else answer.machine.display.show(float(width), "m")
-        table.add_row(_speed(float(speed)), shown)
+        table.add_row(_speed_text(float(speed)), shown)
     yield table
 
 
