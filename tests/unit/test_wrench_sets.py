@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from kinetostat.numerics.wrench_sets import capacity, closure, faces
+from kinetostat.numerics.wrench_sets import capacity, faces, wrench_closure
 
 LEAST, MOST = 0.1, 2.0
 SHAPES = [(3, 4), (3, 6), (6, 7), (6, 8), (6, 9)]
@@ -93,7 +93,7 @@ def test_forces_close_on_wrenches_exactly_where_linear_programmes_hold_every_dir
     draw = np.random.default_rng(5)
     wrenches = draw.normal(size=(40, size, forces))
     wrenches[::2, :, -1] = -np.einsum("ndm,nm->nd", wrenches[::2, :, :-1], draw.uniform(0.5, 1.0, (20, forces - 1)))
-    closed = closure(wrenches) > 1e-9
+    closed = wrench_closure(wrenches) > 1e-9
     directions = np.vstack([np.eye(size), -np.ones(size)])
     for row in range(40):
         held = [linprog(np.zeros(forces), A_eq=wrenches[row], b_eq=d).status == 0 for d in directions]

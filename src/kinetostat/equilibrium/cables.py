@@ -27,7 +27,7 @@ from kinetostat.machine.machine import Chains, Machine, Step
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
-from kinetostat.numerics.wrench_sets import capacity, closure
+from kinetostat.numerics.wrench_sets import capacity, wrench_closure
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import SAME_DIRECTION
 
@@ -232,7 +232,7 @@ def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple
     cables = cables_of(machine, cable_signs(machine), count)
     result, status = {}, np.full(count, Status.OK, dtype=np.int8)
     if "wrench_closure" in names:
-        result["wrench_closure"] = closure(cables.wrenches)
+        result["wrench_closure"] = wrench_closure(cables.wrenches)
     if "capacity" in names:
         result["capacity"] = cables.capacity()
     if any("tension" in name for name in names):

@@ -126,7 +126,7 @@ def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: A
     return result
 
 
-def closure(wrenches: Array) -> Array:
+def wrench_closure(wrenches: Array) -> Array:
     """The wrench that forces from 0 to 1 can hold in every direction [n]: positive where they hold any wrench.
 
     Args:

@@ -16,7 +16,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
-from kinetostat.numerics.wrench_sets import closure
+from kinetostat.numerics.wrench_sets import wrench_closure
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
@@ -109,7 +109,7 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
         cables = cables_of(given, signs, 1)
         required = None if wrenches is None else _required_loads(given, wrenches)
         capacity = float(cables.capacity(required)[0])
-        closed = float(closure(cables.wrenches)[0])
+        closed = float(wrench_closure(cables.wrenches)[0])
     exist = bool(cables.tensions[1][0])
     states = _states(given, cables)
     show = given.display.show
