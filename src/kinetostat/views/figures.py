@@ -156,8 +156,13 @@ def save(
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure to a file whose suffix is one of `FORMATS`; PNG has 200 dpi."""
+    suffix = path.suffix[1:].lower()
     with replacing(path) as temporary, mpl.rc_context(STYLE):
-        figure.savefig(temporary, metadata=FORMATS[path.suffix[1:].lower()])
+        if suffix == "png":  # `savefig` would go through all artists once more before it draws them
+            canvas: Any = FigureCanvasAgg(figure)
+            canvas.print_png(temporary, metadata=FORMATS[suffix])
+        else:
+            figure.savefig(temporary, metadata=FORMATS[suffix])
 
 
 def as_svg(figure: Figure) -> str:
