@@ -126,6 +126,9 @@ class Capability(Immutable):
     sets: tuple[CapabilitySet, ...] = ()
     direction: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Capability of {self.machine.name!r}: {self.message}>"
+
     @property
     def machine(self) -> Machine:
         """The machine with its pose."""

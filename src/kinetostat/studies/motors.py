@@ -189,6 +189,9 @@ class MotorChoice(Immutable):
     message: str
     fits: tuple[MotorFit, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Motors for {self.machine.name!r}: {self.message}>"
+
 
 @checked
 def motors(

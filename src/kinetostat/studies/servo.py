@@ -67,6 +67,9 @@ class Servo(Immutable):
     assumed: bool = False
     direction: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Servo loops of {self.machine.name!r}: {self.message}>"
+
     @property
     def machine(self) -> Machine:
         """The machine with its pose."""
