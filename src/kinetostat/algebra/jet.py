@@ -63,7 +63,7 @@ class Jet:
         return Jet(*(0.0 if type(part) is float and part == 0.0 else -part for part in self.parts))
 
     def __abs__(self) -> Scalar:
-        return where(self.value < 0.0, -self, self)
+        return where(self < 0.0, -self, self)
 
     def __lt__(self, other: Scalar) -> Scalar:
         return _condition(self.value < jet_of(other).value)
