@@ -55,8 +55,8 @@ def test_a_page_is_small_and_asks_for_nothing(pages):
 def test_the_file_in_a_page_is_the_machine(pages):
     text = pages["tripteron"].read_text("utf-8")
     data = json.loads(text.split('id="machine">')[1].split("</script>")[0])
-    assert "tripteron" in data["file"].lower()
-    assert data["fileName"] == "tripteron.toml"
+    assert "tripteron" in data["data"]["file"].lower()
+    assert data["data"]["fileName"] == "tripteron.toml"
 
 
 def test_the_papers_machine_fits_into_an_address(tmp_path):
@@ -320,9 +320,8 @@ def test_a_name_in_a_file_is_never_markup(tmp_path):
     evil = "<img src=x onerror=document.title=1>"
     machine = load("tripteron")
     page = export(machine, tmp_path / "page.html")[0]
-    actuator = json.loads(page.read_text("utf-8").split('id="machine">')[1].split("</script>")[0])["actuators"][0][
-        "name"
-    ]
+    content = json.loads(page.read_text("utf-8").split('id="machine">')[1].split("</script>")[0])
+    actuator = content["data"]["actuators"][0]["name"]
     page.write_text(
         page.read_text("utf-8").replace(json.dumps(actuator), json.dumps(evil).replace("<", "\\u003c"), 1), "utf-8"
     )

@@ -1,8 +1,8 @@
 """The machine as a page: one HTML file with its formulas, a picture, matrices and a map that follow sliders.
 
-The formulas are the traced graph of the machine, printed as JavaScript, so that the page needs no server and asks for
-nothing. When it opens it compares itself with numbers that Python has computed pose by pose. The same machine can be
-the end of an address: then its programs are data, which any such page makes functions of.
+The formulas are the traced graph of the machine as data, of which the page makes functions, so that it needs no server
+and asks for nothing. When it opens it compares itself with numbers that Python has computed pose by pose. The same
+machine can be the end of an address, which any such page opens.
 """
 
 import json
@@ -30,7 +30,7 @@ from kinetostat.engine.machine_functions import (
     functions_of,
     sample_points,
 )
-from kinetostat.engine.printed import JAVASCRIPT, NOTATION, pack_graph, print_graph
+from kinetostat.engine.printed import JAVASCRIPT, NOTATION, pack_graph
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -52,7 +52,7 @@ FORMAT, VIEWER = 1, "viewer.html"
 LONGEST_ADDRESS = 8000
 """Characters of a machine as part of an address; what it can do without is left out until it fits."""
 SPARE = (("shares", "parts"), ("slopes", "forward"), ("", "file"))
-"""What an address can do without, first the first: programs, and the data that go with them."""
+"""Programs that an address can do without, first the first, and the data that go with them."""
 
 
 def write(
@@ -94,31 +94,34 @@ def write_link(
 
 def page_of(functions: MachineFunctions, stem: str) -> str:
     """Return the page of a machine as a text; `stem` is the name of the machine file that it offers."""
-    data = _data(functions, stem)
-    programs = [_program(functions, name, body) for name, body in _bodies(functions).items()]
-    return _page(functions.machine.name, data, "\n".join(["const builtIn = {};", *programs]))
+    return _page(functions.machine.name, _content(functions, stem))
 
 
 def viewer() -> str:
     """Return the page that shows the machine of its address, as a text."""
-    return _page("kinetostat", None, "const builtIn = {};")
+    return _page("kinetostat", None)
 
 
 def address_of(functions: MachineFunctions, stem: str) -> str:
     """Return a machine as letters, digits, - and _: JSON, compressed, in base 64.
 
-    The programs are data there (`engine.printed.pack_graph`), which the page checks before it makes functions of them.
+    Programs are data there, which the page checks before it makes functions of them.
     """
-    data = _data(functions, stem)
-    data["samples"] = data["samples"][:1]
-    packed = {name: pack_graph(body.columns, [*body.results, body.code]) for name, body in _bodies(functions).items()}
+    content = _content(functions, stem)
+    content["data"]["samples"] = content["data"]["samples"][:1]
     for program, word in SPARE:
-        text = _compressed_text({"format": FORMAT, "data": data, "packed": packed})
+        text = _compressed_text(content)
         if len(text) <= LONGEST_ADDRESS:
-            break
-        packed.pop(program, None)
-        data[word] = None
-    return _compressed_text({"format": FORMAT, "data": data, "packed": packed})
+            return text
+        content["packed"].pop(program, None)
+        content["data"][word] = None
+    return _compressed_text(content)
+
+
+def _content(functions: MachineFunctions, stem: str) -> dict[str, Any]:
+    """Return the content of a page: data, and programs that are packed (`engine.printed.pack_graph`)."""
+    packed = {name: pack_graph(body.columns, [*body.results, body.code]) for name, body in _bodies(functions).items()}
+    return {"format": FORMAT, "data": _data(functions, stem), "packed": packed}
 
 
 def _compressed_text(content: object) -> str:
@@ -127,13 +130,12 @@ def _compressed_text(content: object) -> str:
     return urlsafe_b64encode(deflate.compress(text.encode("utf-8")) + deflate.flush()).decode("ascii").rstrip("=")
 
 
-def _page(name: str, data: object, programs: str) -> str:
+def _page(name: str, content: object) -> str:
     operations = [form.format("{0}", "{1}", "{2}", **JAVASCRIPT.functions) for form in NOTATION.values()]
     words = {
         "name": escape(name),
         "version": version("kinetostat"),
-        "data": json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"),
-        "programs": programs,
+        "machine": json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
         "script": (TEMPLATES / "page.js").read_text("utf-8"),
         "formulas": (TEMPLATES / "formulas.js")
         .read_text("utf-8")
@@ -165,15 +167,6 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         bodies["step"] = step_of(kind, form, closed).body
         bodies["loaded"] = objectives_of(kind, form, wanted, closed=closed).body
     return bodies
-
-
-def _program(functions: MachineFunctions, name: str, body: Body) -> str:
-    """A body as a function of JavaScript from inputs `p` and coordinates of a state `s` to results in `o`."""
-    given = len(functions.inputs)
-    names = [f"p[{k}]" if k < given else f"s[{k - given}]" for k in range(len(body.columns))]
-    printed = print_graph(body.columns, names, [*body.results, body.code], JAVASCRIPT)
-    lines = [*printed.lines, *(f"o[{k}] = {value};" for k, value in enumerate(printed.results[:-1]))]
-    return f"builtIn.{name} = (p, o, s) => {{\n{chr(10).join(lines)}\nreturn {printed.results[-1]};\n}};"
 
 
 def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-// Programs of a machine: made of a link, and the loops around them.
+// Programs of a machine: made of data, and the loops around them.
 "use strict";
 const FORMAT = 1;
 const OPERATIONS = $operations;
@@ -47,8 +47,8 @@ function compile({ code, references, numbers }, inputs, states) {
   return new Function("p", "o", "s", `"use strict";\n${lines.join("\n")}\n${results.join("\n")}\nreturn ${stack.at(-1)};`);
 }
 
-// The machine of an address: a compressed text of data and packed programs.
-async function machineOf(text) {
+// The content of an address: a compressed text.
+async function inflated(text) {
   const bytes = Uint8Array.from(atob(text.replace(/-/g, "+").replace(/_/g, "/")), (c) => c.charCodeAt(0));
   const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
   const parts = [];
@@ -59,7 +59,11 @@ async function machineOf(text) {
     if (size > MOST_BYTES) throw new Error("it is too large");
     parts.push(value);
   }
-  const { format, data, packed } = JSON.parse(await new Blob(parts).text());
+  return JSON.parse(await new Blob(parts).text());
+}
+
+// A machine with its programs as functions.
+function functionsOf({ format, data, packed }) {
   if (format !== FORMAT) throw new Error("it is of another version of kinetostat");
   const programs = {};
   for (const [name, program] of Object.entries(packed)) {

@@ -431,8 +431,7 @@ async function openAddress() {
     return;
   }
   try {
-    const { data, programs } = given ? await machineOf(given) : { data: own, programs: builtIn };
-    globalThis.opened = { data, programs };
+    const { data, programs } = globalThis.opened = functionsOf(given ? await inflated(given) : own);
     openMachine(data, programs);
     document.body.classList.remove("closed");
   } catch (error) {
