@@ -63,6 +63,11 @@ def test_what_is_cited_is_there():
     assert cited(every_docstring(), PAPER) <= PRINTED
 
 
+def test_equations_are_numbered_in_their_order():
+    numbers = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", THEORY)]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
 def test_every_equation_of_the_theory_is_where_it_is_computed():
     assert EQUATIONS - cited(every_docstring(), EQUATION) == set()
     assert sorted(EQUATIONS) == list(range(1, len(EQUATIONS) + 1))

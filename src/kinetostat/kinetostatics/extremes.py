@@ -125,7 +125,7 @@ def reversal_error(response: Response, row: int) -> Scalar:
         response: of a pose; at T, base axes.
         row: of rx ry rz x y z = 0 ... 5.
 
-    Source: theory (102).
+    Source: theory (105).
     """
     pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
     twists = [twist for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]

@@ -4,7 +4,7 @@ A set of wrenches is an intersection of slabs `lower <= n . w <= upper`, which i
 bounds of either sign (a cable pulls only) and beside any structure that carries loads without a drive. What a machine
 file says about its drives is in `machine`; vertices and pictures are made elsewhere.
 
-Source: theory (79)-(82). Screws are at the tool point, base axes.
+Source: theory (81)-(84). Screws are at the tool point, base axes.
 """
 
 import math
@@ -38,7 +38,7 @@ class DriveLimits:
         lower, upper: least and greatest load, N or N·m: positive in the sense in which the actuator's joint is pulled
             open; infinite if not limited.
         speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
-        lost_motion: what its joint misses between both senses of motion, m or rad, theory (102).
+        lost_motion: what its joint misses between both senses of motion, m or rad, theory (105).
     """
 
     spring: Spring
@@ -80,7 +80,7 @@ def lost_motion(machine: Machine, slides: bool) -> Scalar:
     Returns:
         m, or rad of a rotary drive.
 
-    Source: theory (102).
+    Source: theory (105).
     """
     drives, servo = machine.tables["drives"], machine.tables["servo"]
     play = (1.0 - servo.position_at_load) * (drives.backlash if slides else drives.angular_backlash)
@@ -107,7 +107,7 @@ class Transmission:
 
     Attributes:
         shares: for each drive, its load per unit of each wrench on the platform where nothing else loads the legs: a
-            twist xi, theory (79).
+            twist xi, theory (81).
         internal: for each drive, its load per unit of each independent internal load of the legs.
         doubtful: whether some internal loads may load no drive, as where structure is overconstrained.
         wrenches: for each drive, the wrench that a unit of its load exerts on the platform; its speed is the power of
@@ -134,7 +134,7 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
         legs: their screws at the tool point, base axes.
         guide: of a planar machine, the wrenches against twists that do not exist there.
 
-    Source: theory (79).
+    Source: theory (81).
     """
     rigid = [_without_flexures(leg.springs, screws) for leg, screws in zip(configuration.legs, legs, strict=True)]
     shrink = reciprocal(configuration.length)
@@ -245,7 +245,7 @@ def wrench_faces(
         bounds: least and greatest load of each drive, N or N·m.
         carried: what each drive carries already, e.g. by the weight; nothing if empty.
 
-    Source: theory (80).
+    Source: theory (82).
     """
     carried = list(carried) or [0.0] * len(bounds)
     faces = []
@@ -317,7 +317,7 @@ def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar
         block: of `BLOCKS`.
         length: characteristic length, m.
 
-    Source: theory (81).
+    Source: theory (83).
     """
     radius: Scalar = math.inf
     for face in faces:
@@ -358,7 +358,7 @@ def greatest_speed(given: Transmission, speeds: Sequence[Scalar], block: slice) 
         speeds: greatest speed of each drive, m/s or rad/s.
         block: of `BLOCKS`.
 
-    Source: theory (82).
+    Source: theory (84).
     """
     if given.wrenches is None:
         return math.nan

@@ -105,7 +105,7 @@ class Response:
 
     @cached_property
     def faces(self) -> list[Face]:
-        """The wrenches that the drives hold beside the loads that count already, theory (80)."""
+        """The wrenches that the drives hold beside the loads that count already, theory (82)."""
         return wrench_faces(self.transmission, [(drive.lower, drive.upper) for drive in self.drives], self.drive_loads)
 
     @property

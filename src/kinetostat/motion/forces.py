@@ -4,7 +4,7 @@ Every mass asks for a force, its mass times its acceleration less its weight; vi
 (d'Alembert's principle). Over scalars; nothing here iterates, and nothing knows how drives are built (`drives` in
 `studies`).
 
-Source: theory (88)-(91). Units are those of `rigid`: forces in N, moments in N times the machine's length.
+Source: theory (90)-(93). Units are those of `rigid`: forces in N, moments in N times the machine's length.
 """
 
 import math
@@ -52,7 +52,7 @@ def force_on(mass: Scalar, at: Vector, acceleration: Vector) -> Wrench:
 
 
 def _acceleration(at: Vector, body: Moving, moving: Twist) -> Vector:
-    """Acceleration of a point of a body, theory (86); `moving` is how the body really moves."""
+    """Acceleration of a point of a body, theory (88); `moving` is how the body really moves."""
     speed = moving.translational + moving.rotational.cross(at)
     return body.change.translational + body.change.rotational.cross(at) + body.twist.rotational.cross(speed)
 
@@ -64,7 +64,7 @@ def _inertial(
     moving: Sequence[Twist],
     length: Scalar,
 ) -> list[Wrench]:
-    """The wrench that accelerates each mass, theory (88); bodies are those that carry the masses."""
+    """The wrench that accelerates each mass, theory (90); bodies are those that carry the masses."""
     gained = [_acceleration(m.point, body, way) for m, body, way in zip(masses, bodies, moving, strict=True)]
     momenta = [acceleration * (mass.alone * length) for mass, acceleration in zip(masses, gained, strict=True)]
     for first, second in pairs:
@@ -110,7 +110,7 @@ def _demand(
 
 
 def inertia(machine: RigidMachine, motion: MachineMotion, along: MachineMotion | None = None) -> ForceDemand:
-    """The demand of masses and rotors along a motion, theory (88); `along` as in `rates.leg_motion`."""
+    """The demand of masses and rotors along a motion, theory (90); `along` as in `rates.leg_motion`."""
     along = along or motion
     platform = _inertial(
         machine.platform,
@@ -148,7 +148,7 @@ def hinges(machine: RigidMachine) -> ForceDemand:
 
 
 def friction(machine: RigidMachine, motion: MachineMotion) -> ForceDemand:
-    """The demand of friction of joints and drives, theory (89): none of Coulomb's where nothing moves."""
+    """The demand of friction of joints and drives, theory (91): none of Coulomb's where nothing moves."""
     rows = [_leg_friction(machine, leg, moving) for leg, moving in zip(machine.legs, motion.legs, strict=True)]
     return _demand(machine, [], [() for _ in machine.legs], rows)
 
@@ -199,7 +199,7 @@ def demands(machine: RigidMachine, motion: MachineMotion) -> dict[str, ForceDema
 
 @dataclass(frozen=True)
 class DriveStatics:
-    """The drives of a machine as they meet a demand, theory (90).
+    """The drives of a machine as they meet a demand, theory (92).
 
     Attributes:
         ways: twists that the legs allow; those of the axes where they allow all.
@@ -242,7 +242,7 @@ def _weights(machine: RigidMachine) -> list[Scalar]:
 
 
 def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) -> Row:
-    """Generalised forces along some twists of the platform, with the legs following, theory (90)."""
+    """Generalised forces along some twists of the platform, with the legs following, theory (92)."""
     whole = list(demand.platform.components())
     for leg, row in zip(machine.legs, demand.legs, strict=True):
         for solved, force in zip(leg.solved, row, strict=True):
@@ -258,7 +258,7 @@ def drive_forces(machine: RigidMachine, statics: DriveStatics, demand: ForceDema
 
 
 def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Scalar]) -> list[Wrench]:
-    """The wrench that the platform exerts on each leg, at the origin, theory (91).
+    """The wrench that the platform exerts on each leg, at the origin, theory (93).
 
     What legs carry among themselves, where they keep the platform from the same motion, is the least that balances it.
 

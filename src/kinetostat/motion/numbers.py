@@ -1,6 +1,6 @@
 """Numbers of a rigid machine along a motion, in one list for programs and columns: of drives, and of joints.
 
-Source: theory (89)-(93). SI.
+Source: theory (91)-(95). SI.
 """
 
 from collections.abc import Iterator, Mapping
@@ -67,7 +67,7 @@ def _joints_of_leg(number: int, chain: tuple[object, ...]) -> Iterator[LoadedJoi
 
 
 def joint_numbers(here: MachineAtPose, direction: PoseRates, joints: list[LoadedJoint]) -> list[Scalar]:
-    """The size of the force (N), and of the moment about its point (N·m), that each joint passes on, theory (91).
+    """The size of the force (N), and of the moment about its point (N·m), that each joint passes on, theory (93).
 
     The moment of a slide, which has no point, is 0.0.
     """

@@ -2,7 +2,7 @@
 
 Everything that follows from a pose and a motion over scalars starts here: `pose_of` places a machine, `along` moves it.
 
-Source: theory (92) and (93).
+Source: theory (94) and (95).
 """
 
 from collections.abc import Mapping, Sequence
@@ -122,7 +122,7 @@ def forces_along(here: MachineAtPose, direction: PoseRates) -> tuple[MachineMoti
 
 @dataclass(frozen=True)
 class Operators:
-    """M, C and g of the equations of motion M x'' + C x' + g = J^T f over the coordinates of the pose, theory (92).
+    """M, C and g of the equations of motion M x'' + C x' + g = J^T f over the coordinates of the pose, theory (94).
 
     Attributes:
         mass: M; kg of lengths, kg·m² of angles, kg·m between them.
@@ -139,7 +139,7 @@ class Operators:
     drive_changes: list[Row]
 
     def at_drives(self) -> tuple[list[Row], list[Row], Row]:
-        """M, C and g over the coordinates of the drives, as many as of the pose, theory (93)."""
+        """M, C and g over the coordinates of the drives, as many as of the pose, theory (95)."""
         size = range(len(self.gravity))
         back, _ = dual_basis(self.drive_rates)  # rows of J; its dual vectors are the columns of J^-1
         # Rows of J^-T are the dual vectors.
@@ -190,7 +190,7 @@ def operators(here: MachineAtPose, rates: Mapping[str, Scalar]) -> Operators:
 
 
 def mass_at_drives(here: MachineAtPose) -> list[Row]:
-    """M over the coordinates of the drives, as many as of the pose, SI, theory (93)."""
+    """M over the coordinates of the drives, as many as of the pose, SI, theory (95)."""
     nothing, length = dict.fromkeys(here.names, 0.0), here.rigid.length
     columns = [here.along(PoseRates(nothing | {name: 1.0}, nothing)) for name in here.names]
     gains = [inertia(here.rigid, _from_rest(column)) for column in columns]

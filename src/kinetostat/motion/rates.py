@@ -4,7 +4,7 @@ A *motion* is a direction of the pose's coordinates, with its change while the m
 and their accelerations, what comes out are velocities and accelerations. With one coordinate's unit rate it is a column
 of a Jacobian and how this changes along the machine's motion. Over scalars; nothing here has a mass.
 
-Source: theory (83)-(87). Units are those of `rigid`.
+Source: theory (85)-(89). Units are those of `rigid`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ class MachineMotion:
 
 
 def bracket(carrying: Twist, screw: Twist) -> Twist:
-    """The rate of a screw that a twist carries along, theory (84)."""
+    """The rate of a screw that a twist carries along, theory (86)."""
     return Twist(
         carrying.rotational.cross(screw.rotational),
         carrying.rotational.cross(screw.translational) + carrying.translational.cross(screw.rotational),
@@ -107,7 +107,7 @@ def placed_platform(machine: Machine, direction: PoseRates, moving: PoseRates) -
 
 
 def platform_motion(machine: RigidMachine, placement: Displacement) -> Moving:
-    """The twist of the platform from its placement with rates, theory (83), and how it changes.
+    """The twist of the platform from its placement with rates, theory (85), and how it changes.
 
     With the columns c of the rotation, the angular velocity is half the sum of c x c'.
     """
@@ -132,7 +132,7 @@ def _parts(vector: Vector) -> list[Vector]:
 
 
 def leg_motion(leg: RigidLeg, platform: Moving, along: "LegMotion | None" = None) -> LegMotion:
-    """The motion of a leg that ends at the platform, theory (85) and (86).
+    """The motion of a leg that ends at the platform, theory (87) and (88).
 
     Args:
         leg: the leg.
@@ -174,7 +174,7 @@ class Coordinates:
     Attributes:
         names: x, y, z and angles that are given.
         arm: from the tool point to P, in units of the machine's length.
-        axes: about which roll, pitch and yaw turn, theory (87).
+        axes: about which roll, pitch and yaw turn, theory (89).
         rates_of_turns: rows that take an angular velocity to the rates of roll, pitch and yaw.
         solved: of each coordinate, the platform's twist along it alone [coordinates][6].
     """
@@ -189,7 +189,7 @@ class Coordinates:
 def coordinates_of(
     machine: RigidMachine, names: Sequence[str], placement: Displacement, angles: "Angles"
 ) -> Coordinates:
-    """The coordinates of a pose of less than six, theory (87).
+    """The coordinates of a pose of less than six, theory (89).
 
     Args:
         machine: whose legs leave it as many ways.
@@ -273,7 +273,7 @@ def motion_along(
 
 
 def _turning_axes(coordinates: Coordinates, twist: Twist, moving: Twist) -> Vector:
-    """The part of an angular acceleration by which the axes of roll and pitch turn, theory (87)."""
+    """The part of an angular acceleration by which the axes of roll and pitch turn, theory (89)."""
     roll, pitch, _ = (row.dot(twist.rotational) for row in coordinates.rates_of_turns)
     _, pitching, yawing = (row.dot(moving.rotational) for row in coordinates.rates_of_turns)
     first, second, third = coordinates.axes

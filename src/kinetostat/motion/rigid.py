@@ -5,7 +5,7 @@ still, joints and drives move. Units are those of the mechanism: turns in rad, l
 forces in N, so that generalised forces of slides are in N, and moments in N times that length. The origin is the tool
 point where it is now, axes are those of the base. Nothing moves here (`rates`) and nothing is balanced (`forces`).
 
-Source: theory section 20, (83).
+Source: theory section 20, (85).
 """
 
 from collections.abc import Sequence

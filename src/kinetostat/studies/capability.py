@@ -3,7 +3,7 @@
 Sets of wrenches and twists as such are in `kinetostatics.feasible`; here they are cut to forces at no moment, moments
 at no force, and motions without turning or moving, and put into sentences.
 
-Source: theory (79)-(82). At the tool point, base axes.
+Source: theory (81)-(84). At the tool point, base axes.
 """
 
 import math
@@ -246,7 +246,7 @@ def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> Ca
 def _inertia_at_drives(state: MachineState) -> Array | None:
     """M over the drives, along their joints [drives x drives]; None without masses, or if drives cannot move alone.
 
-    Source: theory (93).
+    Source: theory (95).
     """
     try:
         moving = dynamics(state)
@@ -263,7 +263,7 @@ def _accelerations(
 
     A drive that accelerates carries tau_0 - (M q'')_a, with q'' = g_a . a. Friction does not count.
 
-    Source: theory (82) and (93).
+    Source: theory (84) and (95).
     """
     moving = _motions(response.transmission, block)
     if moving is None or len(moving[1]) != len(inertia):

@@ -3,7 +3,7 @@
 Parts are rigid (theory section 20); what the tool deflects is what springs do under the same forces, one pose after the
 other. Formulas are in `motion`, motions in `motions`. Nothing is drawn here.
 
-Source: theory (97).
+Source: theory (99).
 """
 
 from collections.abc import Mapping
@@ -291,7 +291,7 @@ def _coordinates(state: MachineState, motion: Motion) -> Array:
 
 
 def _curves(state: MachineState, motion: Motion, forces: PathForces) -> DriveCurves:
-    """Drives and, theory (97), their motors at all points."""
+    """Drives and, theory (99), their motors at all points."""
     senses = senses_of_drives(state)[:, None]
     speed, acceleration = forces.drives[:, 0] * senses, forces.drives[:, 1] * senses
     parts = forces.drives[:, 2:] * senses[:, :, None]
@@ -434,7 +434,8 @@ def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> st
     worst = max(summaries, key=lambda drive: drive.motor_torque)
     fast = max(summaries, key=lambda drive: drive.motor_speed)
     speed = f"{fast.motor_speed * 30.0 / np.pi:.4g} 1/min" if fast.rotary else show(fast.motor_speed, "m") + "/s"
-    mean = "" if motion.timeless else f"{show(worst.rms_torque, worst.motor_unit)} in the mean square, "
+    hot = max(summaries, key=lambda drive: drive.rms_torque)
+    mean = "" if motion.timeless else f"{show(hot.rms_torque, hot.motor_unit)} RMS at most ({hot.name}), "
     return (
         f"{'In' if motion.timeless else 'Along'} {motion.kind}, the motors give up to "
         f"{show(worst.motor_torque, worst.motor_unit)} ({worst.name}), {mean}at up to {speed}, and up to "

@@ -3,7 +3,7 @@
 The receptance of the tool is the machine's own, at its pose or at the worst of several; what the edges do is in
 `vibration.cutting`.
 
-Source: theory (103) and (104).
+Source: theory (106) and (107).
 """
 
 import math

@@ -3,7 +3,7 @@
 The head of the file says which kind it is: poses at times; moves with a feed rate, which begin and end at rest; or
 sines about the pose of the machine. Nothing is computed about the machine here.
 
-Source: theory (94)-(96).
+Source: theory (96)-(98).
 """
 
 from collections.abc import Mapping, Sequence
@@ -206,7 +206,7 @@ def _coordinates(machine: Machine, columns: Sequence[GivenColumn], where: Where)
 
 
 def _through_poses(coordinates: Mapping[str, Array], times: Array, points: int) -> Motion:
-    """The spline through poses at times, theory (94); periodic where it ends at its first pose."""
+    """The spline through poses at times, theory (96); periodic where it ends at its first pose."""
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(times) < 2 or late.size:
         after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
@@ -250,7 +250,7 @@ def _shapes(column: GivenColumn | None, count: int) -> list[str]:
 def _moves(
     machine: Machine, coordinates: Mapping[str, Array], amounts: Mapping[str, Array], shapes: Sequence[str], points: int
 ) -> Motion:
-    """Moves one after the other, each from rest to rest, theory (95) and (96)."""
+    """Moves one after the other, each from rest to rest, theory (97) and (98)."""
     names = list(coordinates)
     table = np.stack([coordinates[name] for name in names], axis=1)
     places = [number for number, name in enumerate(names) if name in ("x", "y", "z")]
@@ -355,7 +355,7 @@ def _arc(start: Array, middle: Array, end: Array) -> tuple[Array, Array, Array, 
 
 
 def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> list[tuple[float, float, float]]:
-    """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (96).
+    """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (98).
 
     Args:
         length: of the path, m.
@@ -398,7 +398,7 @@ def along_profile(
 
 
 def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
-    """Sines about the pose of the machine: of shakers and flight simulators, theory (94)."""
+    """Sines about the pose of the machine: of shakers and flight simulators, theory (96)."""
     for name in given:
         if name not in (FIELD, "amplitude", "frequency", "phase"):
             raise InputError(

@@ -4,7 +4,7 @@ A motor fits if its torque is within the peak limit at every point of the motion
 torque is within the continuous limit at the root of the mean square of its speed, and it never turns too fast. Its
 rotor is accelerated as well, so that the same motion asks something else of each motor.
 
-Source: theory (103).
+Source: theory (100).
 """
 
 import math
@@ -52,7 +52,7 @@ class MotorRating:
         Returns:
             N·m [n].
 
-        Source: theory (103).
+        Source: theory (100).
         """
         given = np.maximum(np.abs(speeds), self.rated_speed)
         most = (self.peak_torque if peak else self.torque) * self.rated_speed / given

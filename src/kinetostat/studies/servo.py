@@ -3,7 +3,7 @@
 The stiffness of an actuator is then that of its transmission, between motor and joint, and [servo] says how the motor
 is held. Loops as such are in `vibration.servo`.
 
-Source: theory (98)-(101). At the tool point, base axes.
+Source: theory (101)-(104). At the tool point, base axes.
 """
 
 import math

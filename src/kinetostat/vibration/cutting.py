@@ -3,7 +3,7 @@
 An edge cuts what the edge before it has left, so that the chip is as thick as both paths differ, and the force follows
 it. In milling, edges turn through the cut; the force per difference is then replaced by its mean over a turn.
 
-Source: theory (103) and (104); J. Tlusty and M. Polacek (1963) for one edge that stays in the cut; Y. Altintas and
+Source: theory (106) and (107); J. Tlusty and M. Polacek (1963) for one edge that stays in the cut; Y. Altintas and
 E. Budak, "Analytical prediction of stability lobes in milling", CIRP Annals 44 (1995), for milling. SI.
 """
 

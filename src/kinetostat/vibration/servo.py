@@ -3,7 +3,7 @@
 The modes are those of the machine with motors that stand still and rotors without inertia, so that the spring of an
 actuator is its transmission; each loop takes the place of that standing still.
 
-Source: theory (98)-(101). SI; at the tool point, base axes.
+Source: theory (101)-(104). SI; at the tool point, base axes.
 """
 
 import math
@@ -49,7 +49,7 @@ class ServoLoop:
         Args:
             frequencies: Hz.
 
-        Source: theory (98).
+        Source: theory (101).
         """
         s = 2.0j * math.pi * np.asarray(frequencies, dtype=float)
         free = s * s * self.inertia + s * self.friction
@@ -71,7 +71,7 @@ class ServoLoop:
 
         Infinite with an integral part and all of the position measured behind the transmission.
 
-        Source: theory (99).
+        Source: theory (102).
         """
         return float(self.stiffness(np.zeros(1))[0].real)
 
@@ -99,7 +99,7 @@ class ClosedLoops:
         Args:
             frequencies: Hz.
 
-        Source: theory (100).
+        Source: theory (103).
         """
         given = np.asarray(frequencies, dtype=float)
         motions = np.vstack([self.modes.tool, *(drive.motion[None] for drive in self.modes.drives)])
@@ -116,7 +116,7 @@ class ClosedLoops:
     def poles(self) -> Complex:
         """Eigenvalues of the closed loops, rad/s [states]: a positive real part says that something grows.
 
-        Source: theory (101).
+        Source: theory (104).
         """
         ports = np.array([drive.motion for drive in self.modes.drives])
         machine = state_space(self.modes, self.damping, ports, ports)

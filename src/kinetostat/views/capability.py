@@ -1,6 +1,6 @@
 """Forces and speeds that the drives allow at a pose: the question, and the description of its answer.
 
-Source: theory (79)-(82).
+Source: theory (81)-(84).
 """
 
 import math

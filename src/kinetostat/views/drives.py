@@ -90,7 +90,7 @@ def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
     if not answer.drives:
         return
     display = answer.machine.display
-    heads = ["from", "to", "speed", "acceleration", "force", "mean square"]
+    heads = ["from", "to", "speed", "acceleration", "force", "RMS"]
     table = numeric_table("Drives: greatest values", "drive", heads)
     for drive in answer.drives:
         length = "m" if drive.slides else "rad"
@@ -103,9 +103,7 @@ def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
             drive.name, *places, *rates, *(display.show(f, drive.unit) for f in (drive.force, drive.rms_force))
         )
     yield table
-    table = numeric_table(
-        "Motors", "motor", ["speed", "torque", "mean square", "power", "energy", "load inertia", "ratio"]
-    )
+    table = numeric_table("Motors", "motor", ["speed", "torque", "RMS", "power", "energy", "load inertia", "ratio"])
     for drive in answer.drives:
         inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
         ratio = DASH if drive.inertia_ratio is None else number(drive.inertia_ratio)
@@ -206,7 +204,7 @@ def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors mu
             panel.legend(
                 frameon=False,
                 fontsize="small",
-                title=f"mean squares;\n+ greatest {what}\nand speed",
+                title=f"points: RMS;\n+ greatest {what}\nand speed",
                 title_fontsize="small",
                 loc="upper left",
                 bbox_to_anchor=(1.0, 1.0),

@@ -36,7 +36,7 @@ def _lines(answer: MotorChoice) -> Lines:
 def _tables(answer: MotorChoice, _full: bool) -> Iterator[FittedTable]:
     if not answer.fits:
         return
-    columns = ["fits", "peak torque", "mean square", "speed", "inertia ratio", "most at"]
+    columns = ["fits", "peak torque", "RMS", "speed", "inertia ratio", "most at"]
     table = numeric_table("Share of its limits that the motion uses", "motor", columns)
     for fit in answer.fits:
         ratio = DASH if fit.inertia_ratio is None else number(fit.inertia_ratio, digits=3)
@@ -48,7 +48,7 @@ def _tables(answer: MotorChoice, _full: bool) -> Iterator[FittedTable]:
 def _figures(answer: MotorChoice) -> dict[str, Drawing]:
     if not answer.fits:
         return {}
-    caption = "Torque and speed of all drives in the diagrams of the motors; circles: roots of the mean squares."
+    caption = "Torque and speed of all drives in the diagrams of the motors; circles: RMS."
     return {"motors": Drawing(caption, partial(motors_figure, answer))}
 
 
@@ -70,7 +70,7 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
         for panel in figure.axes[len(shown) :]:
             panel.set_visible(False)
         set_title(figure, title.format(answer.machine.name))
-        note = "dark: for ever; light: for a short while; lines: the drives; circles: roots of the mean squares"
+        note = "dark: for ever; light: for a short while; lines: the drives; circles: RMS"
         note_setting(figure, setting_of(answer.machine), note)
         fix_layout(figure)
     return figure
