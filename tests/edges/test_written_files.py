@@ -19,6 +19,7 @@ from studies import SMALL
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limits, links and devices of this kind")
 MACHINE = "delta"
+HEAVY = ["--set", "tool.mass=2 kg", "--set", "tool.inertia=[0.01, 0.01, 0.02, 0, 0, 0]"]
 
 
 @contextlib.contextmanager
@@ -46,11 +47,10 @@ def tree(folder):
 @pytest.mark.parametrize("suffix", [form.suffix for form in KNOWN if form.name != "step"])
 def test_an_export_to_a_full_disk_is_one_sentence_and_leaves_nothing(suffix, tmp_path):
     with files_of_at_most(500), refused("cannot be written: it would exceed"):
-        export(load(MACHINE), tmp_path / "new" / f"file{suffix}")
+        export(load(MACHINE, [*HEAVY[1::2], "load.gravity=[0, 0, -9.81]"]), tmp_path / "new" / f"file{suffix}")
     assert tree(tmp_path) == []
 
 
-HEAVY = ["--set", "tool.mass=2 kg", "--set", "tool.inertia=[0.01, 0.01, 0.02, 0, 0, 0]"]
 WRITING = {
     "sweep": [MACHINE, "--vary", "x=-1 cm:1 cm:5"],
     "map": [MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2"],
