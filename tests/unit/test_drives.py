@@ -9,8 +9,10 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import Motion
+from kinetostat.studies.report import REPORT_PARTS, gather
 from kinetostat.views.data_forms import json_of
 from kinetostat.views.drives import DRIVES
+from kinetostat.views.report.writing import ReportOptions
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
 MOVES = "feed [mm/s], acceleration [m/s**2], x [mm], roll [deg]\n300, 5, 0, 0\n300, 5, 15, 2\n300, 5, 0, 0\n"
@@ -136,3 +138,12 @@ def test_a_motion_beyond_a_limit_has_an_answer_that_says_so(tmp_path):
 def test_a_machine_without_a_mass_is_refused(tmp_path):
     with pytest.raises(InputError, match="mass, friction or a load"):
         answer_of(tmp_path, UP)
+
+
+def test_a_report_asks_for_the_motion_that_it_is_given(tmp_path):
+    (tmp_path / "motion.csv").write_text(MOVES, "utf-8")
+    machine = load("hexapod", MASS)
+    asked = gather(machine, without=REPORT_PARTS, motion=tmp_path / "motion.csv").of("drives")
+    assert json_of(DRIVES, asked) == json_of(DRIVES, drives(machine, tmp_path / "motion.csv"))
+    assert gather(machine, without=REPORT_PARTS).of("drives") is None
+    assert ReportOptions(motion="motion.csv").words() == ["--motion", "motion.csv"]

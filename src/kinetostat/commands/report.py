@@ -107,6 +107,10 @@ def _add_report_command(commands: "Commands") -> None:
         "--fit", metavar="FOLDER", type=Path,
         help="also show an identification of the machine: the folder of `identify -o`, or its fit.json",
     )  # fmt: skip
+    command.add_argument(
+        "--motion", metavar="FILE", type=Path,
+        help="also show what a motion asks of the drives: a CSV file as `kinetostat drives` takes it",
+    )  # fmt: skip
     command.add_argument("--author", help="author in the title block")
     command.add_argument(
         "--date", help="date in the title block (default: none, so that equal input gives equal files)"
@@ -128,7 +132,14 @@ def _report(options: argparse.Namespace) -> int:
 
     path = report_path(options.output)
     wanted = ReportOptions(
-        options.ranges, options.without, options.engine, options.author, options.date, options.loaded, options.fit
+        options.ranges,
+        options.without,
+        options.engine,
+        options.author,
+        options.date,
+        options.loaded,
+        options.fit,
+        options.motion,
     )
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
@@ -137,7 +148,7 @@ def _report(options: argparse.Namespace) -> int:
     result = result.in_units(options.units) if result and options.units else result
     machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:
-        answers = gather(machine, wanted.ranges, wanted.without, result, progress, wanted.fit)
+        answers = gather(machine, wanted.ranges, wanted.without, result, progress, wanted.fit, wanted.motion)
         if answers.analysis.status is Status.OK:
             named = [options.subject, *(word for text in options.settings for word in ("--set", text))]
             write_report(answers, wanted, named, subject.inputs, path, progress)

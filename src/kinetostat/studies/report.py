@@ -33,6 +33,7 @@ from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.budget.budget import budget
 from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
+from kinetostat.studies.drives import drives
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
@@ -143,6 +144,7 @@ class Answers:
         ranges: of the maps.
         fit: what measurements have said of the machine as built, if a record of that is given.
         result: of the study that the machine is the best design of.
+        motion: path of the motion that its drives make; None for none.
         given: the answer to each question of `REPORT_QUESTIONS` that was asked, by its name.
     """
 
@@ -152,6 +154,7 @@ class Answers:
     ranges: tuple[str, ...] = ()
     fit: FitRecord | None = None
     result: Result | None = None
+    motion: Path | None = None
     given: dict[str, Any] = field(default_factory=dict)
 
     def of(self, name: str) -> Any:
@@ -185,6 +188,7 @@ REPORT_QUESTIONS = (
     ),
     ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
+    ReportQuestion("drives", lambda known: drives(known.state, known.motion), lambda known: known.motion is not None),
     ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _cuts(known.machine)),
     ReportQuestion(
         "maps",
@@ -203,8 +207,8 @@ REPORT_QUESTIONS = (
 )
 """The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
 error budget where the file has tolerances, capability where it limits its drives, tensions where all legs are cables,
-vibrations where it has masses, lobes where it says what the tool cuts, and frequencies over the poses of the maps where
-there are modes."""
+vibrations where it has masses, drives where a motion is given, lobes where the file says what the tool cuts, and
+frequencies over the poses of the maps where there are modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
 
@@ -216,6 +220,7 @@ def gather(
     result: Result | None = None,
     progress: Progress = silent,
     fit: str | Path | None = None,
+    motion: str | Path | None = None,
 ) -> Answers:
     """Answer every question of a report on a machine.
 
@@ -226,10 +231,11 @@ def gather(
         result: of a study whose best design the machine is.
         progress: receives how far the work on a report is: all but the last two of `REPORT_STEPS`.
         fit: record of an identification of the machine, or the folder in which it lies.
+        motion: path of the CSV file of a motion, as `drives` takes it; None for none.
 
     Raises:
         InputError: a bad range, too many, an unknown part, loads that `under_load` or tolerances that `budget` refuses,
-            or a record that is not one of this machine.
+            a record that is not one of this machine, or a motion that `drives` refuses.
     """
     for part in without:
         choice(part, REPORT_PARTS, "the part of a report to leave out")
@@ -243,7 +249,7 @@ def gather(
     if analysis.status is not Status.OK:
         return Answers(machine, state, analysis, result=result)
     over = list(ranges) or usual_ranges(machine, MAP_POINTS)
-    known = Answers(machine, state, analysis, tuple(over), record, result)
+    known = Answers(machine, state, analysis, tuple(over), record, result, None if motion is None else Path(motion))
     for step, question in enumerate(REPORT_QUESTIONS, 1):
         if question.part not in without and question.when(known):
             known.given[question.name] = question.ask(known)

@@ -57,6 +57,7 @@ class ReportOptions:
         author, date: for the title block; None for none.
         loaded: whether the machine is to be shown under its loads, whatever its file says.
         fit: record of an identification of the machine, or its folder.
+        motion: path of the CSV file of a motion of its drives.
     """
 
     ranges: Sequence[str] = ()
@@ -66,12 +67,19 @@ class ReportOptions:
     date: str | None = None
     loaded: bool = False
     fit: str | Path | None = None
+    motion: str | Path | None = None
 
     def words(self) -> list[str]:
         """Words of the command line that give the same options."""
-        single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date), ("--fit", self.fit))
+        single = {
+            "engine": self.engine,
+            "author": self.author,
+            "date": self.date,
+            "fit": self.fit,
+            "motion": self.motion,
+        }
         pairs = [("--over", self.ranges), ("--without", self.without)]
-        pairs += [(name, [str(value)]) for name, value in single if value]
+        pairs += [(f"--{name}", [str(value)]) for name, value in single.items() if value]
         words = [word for name, values in pairs for value in values for word in (name, value)]
         return ["--loaded", *words] if self.loaded else words
 
@@ -87,6 +95,7 @@ def report(
     author: str | None = None,
     date: str | None = None,
     fit: str | Path | None = None,
+    motion: str | Path | None = None,
     progress: Progress = silent,
 ) -> Path:
     """Write a report for a design review into one file: on a machine, or on a study and its best design.
@@ -99,6 +108,7 @@ def report(
         engine: for the validation, exudyn or pynite; None for the first that is installed.
         author, date: for the title block. Without a date, the same input gives the same bytes.
         fit: record of an identification of the machine (fit.json), or the folder in which it lies.
+        motion: path of the CSV file of a motion, as `drives` takes it: what it asks of the drives.
         progress: called with the number of steps done and of all steps.
 
     Returns:
@@ -108,12 +118,12 @@ def report(
         InputError: the pose has no answer, no design meets the constraints, a range or part is not valid, the file is
             neither .html nor .pdf or cannot be written, or a library is missing.
     """
-    place, options = report_path(path), ReportOptions(ranges, without, engine, author, date, fit=fit)
+    place, options = report_path(path), ReportOptions(ranges, without, engine, author, date, fit=fit, motion=motion)
     result = about if isinstance(about, Result) else None
     if result is not None and not result.solved:
         raise InputError(result.message)
     machine = about.machine if isinstance(about, Result) else about
-    answers = gather(machine, ranges, without, result, progress, fit)
+    answers = gather(machine, ranges, without, result, progress, fit, motion)
     if answers.analysis.status is not Status.OK:
         raise InputError(answers.analysis.message)
     inputs = texts_of(result.problem) if result else (("machine.toml", as_file(machine)),)
