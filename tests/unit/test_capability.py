@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.cross.test_feasible import LINEAR, MACHINES, greatest_motion, greatest_wrench
 
+from driven_sets import LINEAR, MACHINES, greatest_motion, greatest_wrench
 from kinetostat import InputError, capability, dynamics, load, save
 from kinetostat.numerics.polytopes import outline, reach_along, vertices
 from kinetostat.views.capability import CAPABILITY

@@ -226,11 +226,14 @@ def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple
         count: number of poses, n.
 
     Returns:
-        By name their values, SI [n], NaN where there is none, and `Status` codes [n]: NO_REST where tensions are wanted
-        and none within their bounds hold the load.
+        By name their values, SI [n], NaN where there is none or legs are no cables, and `Status` codes [n]: NO_REST
+        where tensions are wanted and none within their bounds hold the load.
     """
-    cables = cables_of(machine, cable_signs(machine), count)
-    result, status = {}, np.full(count, Status.OK, dtype=np.int8)
+    signs, status = cable_signs(machine), np.full(count, Status.OK, dtype=np.int8)
+    if not signs:
+        return {name: np.full(count, np.nan) for name in names}, status
+    cables = cables_of(machine, signs, count)
+    result = {}
     if "wrench_closure" in names:
         result["wrench_closure"] = wrench_closure(cables.wrenches)
     if "capacity" in names:
