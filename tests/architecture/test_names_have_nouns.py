@@ -34,7 +34,6 @@ PARTICIPLES_LEFT: dict[str, int] = {
     "accuracy": 1,
     "algebra": 4,
     "engine": 2,
-    "exchange": 4,
     "kinematics": 2,
     "kinetostatics": 3,
     "machine": 22,

@@ -20,7 +20,7 @@ from kinetostat.engine.machine_functions import MachineFunctions, functions_of
 from kinetostat.exchange.c_source import (
     STEPS_OF_COMMAND,
     ascii_units,
-    filled,
+    filled_template,
     in_comment,
     library_texts,
     listing,
@@ -89,7 +89,7 @@ def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
         "type": "KINEMATICS_BOTH" if functions.square else "KINEMATICS_INVERSE_ONLY",
         "steps": STEPS_OF_COMMAND,
     }
-    write_text(path, with_names(filled(functions, "linuxcnc.comp", words), path.stem))
+    write_text(path, with_names(filled_template(functions, "linuxcnc.comp", words), path.stem))
     return [path]
 
 
@@ -128,7 +128,7 @@ def write_mex(
         "quantities": len(functions.quantities),
     }
     texts = library_texts(functions, path)
-    texts[path.with_name(f"{path.stem}_mex.c")] = with_names(filled(functions, "mex.c", words), path.stem)
+    texts[path.with_name(f"{path.stem}_mex.c")] = with_names(filled_template(functions, "mex.c", words), path.stem)
     for place, text in texts.items():
         write_text(place, text)
     return list(texts)
@@ -193,7 +193,7 @@ def _variables(functions: MachineFunctions) -> list[ModelVariable]:
     known, driven = values(functions.machine), stand(functions.machine)
     si = {"length": "m", "angle": "rad"}
 
-    def computed(name: str, unit: str, group: str, *shape: int) -> ModelVariable:
+    def output(name: str, unit: str, group: str, *shape: int) -> ModelVariable:
         return ModelVariable(name, unit, (0.0,) * math.prod(shape), False, shape, group)
 
     rows = [ModelVariable("time", "s", (0.0,), False, (), "time")]
@@ -207,12 +207,12 @@ def _variables(functions: MachineFunctions) -> list[ModelVariable]:
             ModelVariable(f"reached.{path.removeprefix(POSE)}", si[kind], (float(known[path]),), False, (), "reached")
             for path, kind in functions.arguments[: functions.coordinates]
         ]
-    rows += [computed("K", "", "stiffness", 6, 6), computed("C", "", "compliance", 6, 6)]
-    rows += [computed(f"coordinate.{a.name}", a.unit, "coordinates") for a in functions.actuators]
+    rows += [output("K", "", "stiffness", 6, 6), output("C", "", "compliance", 6, 6)]
+    rows += [output(f"coordinate.{a.name}", a.unit, "coordinates") for a in functions.actuators]
     if functions.rests:
-        rows.append(computed("displacement", "", "displacement", 6))
-        rows += [computed(f"command.{a.name}", a.unit, "command") for a in functions.actuators]
-    rows += [computed(name, "", "quantity") for name in functions.quantities]
+        rows.append(output("displacement", "", "displacement", 6))
+        rows += [output(f"command.{a.name}", a.unit, "command") for a in functions.actuators]
+    rows += [output(name, "", "quantity") for name in functions.quantities]
     return rows
 
 
@@ -236,7 +236,7 @@ def _fmi_source(functions: MachineFunctions, variables: Sequence[ModelVariable],
         "start": ", ".join(map(repr, start)),
         **places,
     }
-    return filled(functions, "fmi3.c", words)
+    return filled_template(functions, "fmi3.c", words)
 
 
 def _model_description(

@@ -169,7 +169,7 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
     return PrintedProgram(name, f"{head}{{\n{text}}}\n", printed.operations)
 
 
-def filled(functions: MachineFunctions, template: str, words: Mapping[str, object]) -> str:
+def filled_template(functions: MachineFunctions, template: str, words: Mapping[str, object]) -> str:
     """Return a file from its template: the sections that a machine needs, with words filled in."""
     needed = {
         "always": True,
@@ -213,7 +213,7 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         "rest_first": "double state[STATES];\n    rest_of(at, state);" if functions.needs_state else "",
         "state": "state, " if functions.needs_state else "",
     }
-    return filled(functions, "source.c", words).replace("\n    \n", "\n")
+    return filled_template(functions, "source.c", words).replace("\n    \n", "\n")
 
 
 def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
@@ -238,7 +238,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         "driven": listing(driven),
         "listed": listing(listed),
     }
-    return filled(functions, "header.h", words | work)
+    return filled_template(functions, "header.h", words | work)
 
 
 def in_comment(text: str) -> str:
@@ -287,7 +287,7 @@ def _test(functions: MachineFunctions) -> str:
         "agreed": AGREED,
         "rows": count,
     }
-    return filled(functions, "test.c", words)
+    return filled_template(functions, "test.c", words)
 
 
 def _command_coordinates(functions: MachineFunctions, columns: dict[str, Array], count: int) -> Array:

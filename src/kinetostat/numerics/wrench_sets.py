@@ -25,7 +25,7 @@ LARGEST = 1e300
 UNBOUNDED = 1e200
 """Distance beyond which a face is there only because of `LARGEST`."""
 MOST_NUMBERS = 120_000
-"""Of the largest array of a slab: it stays in the second cache level."""
+"""Numbers in the largest array of a slab, so that it stays in the second level of the cache."""
 
 
 @dataclass(frozen=True)

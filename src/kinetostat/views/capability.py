@@ -26,7 +26,7 @@ NO_END = "no limit"
 """Words for a load that no drive feels."""
 
 
-def _amount(answer: Capability, value: float, unit: str) -> str:
+def _amount_text(answer: Capability, value: float, unit: str) -> str:
     return NO_END if math.isinf(value) else answer.machine.display.show(value, unit)
 
 
@@ -54,7 +54,7 @@ def _along(answer: Capability) -> str:
     phrases = []
     for part in answer.sets:
         ways = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
-        shown = list(dict.fromkeys(_amount(answer, way, part.unit) for way in ways))
+        shown = list(dict.fromkeys(_amount_text(answer, way, part.unit) for way in ways))
         phrases.append(f"{part.name} {' and, the other way, '.join(shown)}")
     return f"Along or about {direction_words(answer.direction)}: {'; '.join(phrases)}." if phrases else ""
 
@@ -73,15 +73,15 @@ def _tables(answer: Capability, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("The drives allow at the tool point, beside the loads that count", "", columns)
     for part in answer.sets:
         weakest = direction_words(part.weakest) if part.weakest else ""
-        greatest = _amount(answer, part.greatest, part.unit)
-        table.add_row(TITLES[part.name], _amount(answer, part.least, part.unit), weakest, greatest)
+        greatest = _amount_text(answer, part.greatest, part.unit)
+        table.add_row(TITLES[part.name], _amount_text(answer, part.least, part.unit), weakest, greatest)
     yield table
     drives = numeric_table("Drives", "", ["carries", "least", "greatest", "speed"])
     for drive in answer.drives:
         load, speed = ("N", "m/s") if drive.slides else ("N·m", "rad/s")
         carried = answer.machine.display.show(drive.carried, load)
-        limits = [_amount(answer, drive.lower, load), _amount(answer, drive.upper, load)]
-        drives.add_row(drive.name, carried, *limits, _amount(answer, drive.speed, speed))
+        limits = [_amount_text(answer, drive.lower, load), _amount_text(answer, drive.upper, load)]
+        drives.add_row(drive.name, carried, *limits, _amount_text(answer, drive.speed, speed))
     yield drives
 
 

@@ -53,13 +53,17 @@ def _lines(answer: DriveLoads) -> Lines:
     if answer.greatest_deflection is not None:
         size, where = answer.greatest_deflection
         shown = answer.machine.display.show_deflection(size, "m")
-        yield "Deflection", f"The tool deflects by up to {shown}, at {answer.motion.times[where]:.4g} s, as if at rest."
+        moment = f"{answer.motion.times[where]:.4g} s"
+        yield (
+            "Deflection",
+            f"The tool deflects by up to {shown}, at {moment}, as it would at rest under the same forces.",
+        )
     if answer.frequency is not None:
         slow = answer.excited < 1e-3
         ending = "springs follow it as at rest." if slow else "the machine rings, and the tool deflects further."
         yield (
             "Vibration",
-            f"The lowest natural frequency is {number(answer.frequency)} Hz; {_percent(answer.excited)} of the "
+            f"The lowest natural frequency is {number(answer.frequency)} Hz; {_percent_text(answer.excited)} of the "
             f"motion's accelerations are faster than a third of it, so that {ending}",
         )
     if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
@@ -70,7 +74,7 @@ def _lines(answer: DriveLoads) -> Lines:
         )
 
 
-def _percent(share: float) -> str:
+def _percent_text(share: float) -> str:
     return f"{number(100.0 * share)} %" if share > LEAST_SHARE else "hardly any"
 
 

@@ -94,7 +94,7 @@ def write_link(
 
 def page_of(functions: MachineFunctions, stem: str) -> str:
     """Return the page of a machine as a text; `stem` is the name of the machine file that it offers."""
-    return _page(functions.machine.name, _content(functions, stem))
+    return _page(functions.machine.name, _page_content(functions, stem))
 
 
 def viewer() -> str:
@@ -107,7 +107,7 @@ def address_of(functions: MachineFunctions, stem: str) -> str:
 
     Programs are data there, which the page checks before it makes functions of them.
     """
-    content = _content(functions, stem)
+    content = _page_content(functions, stem)
     content["data"]["samples"] = content["data"]["samples"][:1]
     for program, word in SPARE:
         text = _compressed_text(content)
@@ -118,7 +118,7 @@ def address_of(functions: MachineFunctions, stem: str) -> str:
     return _compressed_text(content)
 
 
-def _content(functions: MachineFunctions, stem: str) -> dict[str, Any]:
+def _page_content(functions: MachineFunctions, stem: str) -> dict[str, Any]:
     """Return the content of a page: data, and programs that are packed (`engine.printed.pack_graph`)."""
     packed = {name: pack_graph(body.columns, [*body.results, body.code]) for name, body in _bodies(functions).items()}
     return {"format": FORMAT, "data": _data(functions, stem), "packed": packed}

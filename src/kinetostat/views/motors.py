@@ -23,7 +23,7 @@ MOST_DRAWN = 4
 """Motors that have a diagram, the best first."""
 
 
-def _percent(share: float) -> str:
+def _percent_text(share: float) -> str:
     return f"{100.0 * share:.0f} %" if math.isfinite(share) else "too fast"
 
 
@@ -40,7 +40,7 @@ def _tables(answer: MotorChoice, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Share of its limits that the motion uses", "motor", columns)
     for fit in answer.fits:
         ratio = DASH if fit.inertia_ratio is None else number(fit.inertia_ratio, digits=3)
-        shares = [_percent(share) for share in (fit.peak, fit.continuous, fit.speed)]
+        shares = [_percent_text(share) for share in (fit.peak, fit.continuous, fit.speed)]
         table.add_row(fit.name, "yes" if fit.fits else "no", *shares, ratio, fit.drive)
     yield table
 

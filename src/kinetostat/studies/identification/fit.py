@@ -191,7 +191,7 @@ def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
 
 
 def _own_spread(residuals: Array, rates: Array, kept: Mask, wishes: Wishes, last: float) -> float:
-    """Standard deviation of measurements that only their residuals say, where priors weigh against them.
+    """Estimate the standard deviation of measurements from their residuals, where priors weigh against these.
 
     It is that of the kept residuals over their freedom, which depends on it: a few steps from the last one settle both.
     """
