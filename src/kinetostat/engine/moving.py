@@ -29,7 +29,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
-from kinetostat.motion.numbers import OF_DRIVE, drive_numbers, joints_of, motion_details
+from kinetostat.motion.numbers import NUMBERS_OF_DRIVE, drive_numbers, joints_of, motion_details
 from kinetostat.motion.operators import MachineAtPose, at_pose
 from kinetostat.motion.rates import PoseRates
 from kinetostat.motion.rigid import MotionPlan, masses_of_links, mechanism_over_scalars, plan_of
@@ -68,7 +68,7 @@ class PathForces:
     """Drives and joints along a motion; NaN where the machine has no place.
 
     Attributes:
-        drives: numbers of each drive, see `motion.numbers.OF_DRIVE` [drives x numbers x n], SI.
+        drives: numbers of each drive, see `motion.numbers.NUMBERS_OF_DRIVE` [drives x numbers x n], SI.
         wrench: at the tool point, see `motion.numbers.tool_wrench` [6 x n], N·m and N; none if nobody asked.
         joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
         inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
@@ -161,10 +161,10 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
         results, status = _by_program(form, path, joints)
     else:
         results, status = _by_columns(form, path, joints)
-    end = size * len(OF_DRIVE)
+    end = size * len(NUMBERS_OF_DRIVE)
     pairs = end + 2 * len(loaded)
     return PathForces(
-        results[:end].reshape(size, len(OF_DRIVE), path.size),
+        results[:end].reshape(size, len(NUMBERS_OF_DRIVE), path.size),
         results[end:pairs].reshape(len(loaded), 2, path.size),
         results[pairs : pairs + 6],
         results[pairs + 6 :],

@@ -1,4 +1,4 @@
-"""Loaded states at many poses: the numbers of `quantities` that are about them. No formula lives here.
+"""States of rest at many poses, and the numbers of `quantities` that belong to them. No formula lives here.
 
 Source: theory section 12.
 """
@@ -21,8 +21,8 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 
-Further = Callable[[Balance], Array]
-"""Another number of states of rest, or several of each [n] or [n x m]."""
+RestNumber = Callable[[Balance], Array]
+"""Computes another number of n states of rest [n], or several of each [n x m]."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,20 @@ class States:
     Attributes:
         status: `Status` codes [n].
         rows: numbers of the points at which the machine is at rest and stable.
-        equations: the equations at all states of rest, stable or not; None if no point has a place.
-        judged: their stability; `rows` are those that are stable, in their order.
-        loads: what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
+        equations: the equations at all states of rest, stable or not; None if the legs can be placed at no point.
+        stability: stability of these states; `rows` lists the stable ones, in the same order.
+        loads: force or moment of each actuator, N or N·m [n]; NaN where the machine is not at rest.
     """
 
     status: Integers
     rows: Integers
     equations: Balance | None = None
-    judged: Stabilities | None = None
+    stability: Stabilities | None = None
     loads: tuple[tuple[Spring, Array], ...] = ()
 
 
 def states_of_rest(state: MachineState) -> States:
-    """Find the states of rest at n poses; errors as for `loaded_numbers`."""
+    """Find the states of rest at n poses. It raises what `loaded_numbers` raises."""
     count, free = state.count, state.free
     status = np.broadcast_to(free.status, (count,)).astype(np.int64)
     rows = np.flatnonzero(np.isin(status, HELD_BY_LOADS))
@@ -55,40 +55,44 @@ def states_of_rest(state: MachineState) -> States:
     solution = at_rest(placed.mechanism)
     settled = np.flatnonzero(solution.settled & placed.balanced)
     equations = solution.at(settled)
-    judged = stabilities(equations)
-    status[rows], rested = Status.NO_REST, rows[settled[judged.stable]]
-    status[rested] = Status.OK
+    stability = stabilities(equations)
+    status[rows], stable = Status.NO_REST, rows[settled[stability.stable]]
+    status[stable] = Status.OK
     loads = [(spring, np.full(count, np.nan)) for spring in placed.mechanism.driven]
     for (_, whole), (_, carried) in zip(loads, actuator_loads_at_rest(equations), strict=True):
-        whole[rested] = carried[judged.stable]
-    status[rested] = borne(state.machine, free, loads, status)[rested]
-    return States(status, rested, equations, judged, tuple(loads))
+        whole[stable] = carried[stability.stable]
+    status[stable] = status_with_load_limits(state.machine, free, loads, status)[stable]
+    return States(status, stable, equations, stability, tuple(loads))
 
 
-def borne(machine: Machine, response: Response, loads: Sequence[tuple[Spring, Scalar]], status: Scalar) -> Scalar:
-    """Return the status of a machine at rest; where it is meant so, limits bound what its actuators carry there.
+def status_with_load_limits(
+    machine: Machine, response: Response, loads: Sequence[tuple[Spring, Scalar]], status: Scalar
+) -> Scalar:
+    """Return the status of a machine at rest, JOINT_LIMIT where an actuator carries more than its limit allows.
+
+    A machine that its file does not mean under its loads keeps its status: its limits are compared in the free state.
 
     Args:
         machine: the machine with its limits.
         response: its response without loads.
-        loads: what each actuator carries at rest, N or N·m.
-        status: `Status` code of the state without these limits.
+        loads: force or moment of each actuator at rest, N or N·m.
+        status: `Status` code of the state before these limits are compared.
     """
     if not machine.loaded:
         return status
     sizes = [(spring, abs(load)) for spring, load in loads]
-    kept = within(load_checks(machine, response.configuration, sizes))
-    return where(kept, status, where(abs(status - float(Status.OK)) < 0.5, int(Status.JOINT_LIMIT), status))
+    in_limits = within(load_checks(machine, response.configuration, sizes))
+    return where(in_limits, status, where(abs(status - float(Status.OK)) < 0.5, int(Status.JOINT_LIMIT), status))
 
 
 def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
-    """Return the greatest force of an actuated slide and moment of an actuated revolute, by quantity, over any scalars.
+    """Return the greatest force of all actuated slides, and the greatest moment of all actuated revolutes.
 
     Args:
-        loads: what each actuator carries, N or N·m.
+        loads: force or moment of each actuator, N or N·m, over any scalars.
 
     Returns:
-        By quantity; one is left out where the machine has no such actuator.
+        The sizes by quantity; one is left out where the machine has no such actuator.
     """
     result: dict[str, Scalar] = {}
     for spring, load in loads:
@@ -98,20 +102,21 @@ def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
 
 
 def loaded_numbers(
-    state: MachineState, further: Mapping[str, Further] | None = None
+    state: MachineState, further: Mapping[str, RestNumber] | None = None
 ) -> tuple[dict[str, Array], Integers]:
     """Find the numbers of the loaded states at n poses.
 
     Args:
         state: the state of a machine with its loads.
-        further: what else to compute of the states of rest, by name.
+        further: functions of the states of rest whose numbers are wanted as well, by name.
 
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
-        vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
-        springs), "factor", "actuator_force" and "actuator_moment" (the greatest), "drive_loads" (what each actuator
-        carries) [n x actuators]; NaN where there is no state of rest that is stable. Those of `further`, and the last
-        three, are left out if no pose has a place. And `Status` codes [n].
+        vector and displacement of the tool), "compliance" and "stiffness" (their diagonals), "slack" (number of slack
+        springs), "factor" (by which the loads may grow), "actuator_force" and "actuator_moment" (the greatest), and
+        "drive_loads" (force or moment of each actuator) [n x actuators]. They are NaN where no state of rest is
+        stable. The numbers of `further` and the last three are left out if the legs can be placed at no pose. And
+        `Status` codes [n].
 
     Raises:
         InputError: as for `MachineState.mechanism`.
@@ -122,26 +127,25 @@ def loaded_numbers(
         **{name: np.full(count, np.nan) for name in ("slack", "factor")},
     }
     states = states_of_rest(state)
-    equations, judged = states.equations, states.judged
-    if equations is None or judged is None:
+    equations, stability = states.equations, states.stability
+    if equations is None or stability is None:
         return result, states.status
-    moved = equations.state.platform.amounts() * equations.mechanism.twist_units
-    soft = compliance(equations) * equations.mechanism.compliance_units
+    compliances = compliance(equations) * equations.mechanism.compliance_units
     parts = np.array(state.machine.family.components)
     stiffness = np.full((len(equations.left), 6), np.nan)
-    stiffness[:, parts] = np.diagonal(inverse(soft[:, parts[:, None], parts]), axis1=1, axis2=2)
+    stiffness[:, parts] = np.diagonal(inverse(compliances[:, parts[:, None], parts]), axis1=1, axis2=2)
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
     slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)
     numbers = {
-        "displacement": moved,
-        "compliance": np.diagonal(soft, axis1=1, axis2=2),
+        "displacement": equations.state.platform.amounts() * equations.mechanism.twist_units,
+        "compliance": np.diagonal(compliances, axis1=1, axis2=2),
         "stiffness": stiffness,
         "slack": slack,
-        "factor": judged.factor,
+        "factor": stability.factor,
     }
     numbers |= {name: compute(equations) for name, compute in (further or {}).items()}
     for name, values in numbers.items():
         whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
-        whole[states.rows] = values[judged.stable]
+        whole[states.rows] = values[stability.stable]
     carried = np.array([load for _, load in states.loads]).reshape(-1, count).T
     return result | greatest_loads(states.loads) | {"drive_loads": carried}, states.status

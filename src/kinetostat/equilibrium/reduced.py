@@ -20,7 +20,7 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
 from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.numbers import borne, greatest_loads
+from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.equilibrium.state import HELD_BY_LOADS
 from kinetostat.frozen import dataclass
@@ -247,7 +247,7 @@ class Reduced:
             by_name = {spring.name: load for spring, load in loads}
             result |= greatest_loads(loads)
             result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
-            at_rest = borne(self.machine, response, loads, at_rest)
+            at_rest = status_with_load_limits(self.machine, response, loads, at_rest)
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
         for kept in sorted(set(Status) - set(HELD_BY_LOADS)):
             code = where(abs(response.place_status - float(kept)) < 0.5, int(kept), code)

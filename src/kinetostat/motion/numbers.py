@@ -1,9 +1,12 @@
-"""Numbers of a rigid machine along a motion, in one list for programs and columns: of drives, and of joints.
+"""The numbers of a rigid machine at a point of a motion: of its drives, of its joints, and the wrench at its tool.
+
+Each function returns a flat list of scalars, the same for compiled programs and for columns of NumPy; `engine.moving`
+takes it apart again.
 
 Source: theory (91)-(95). SI.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import Wrench
@@ -15,19 +18,20 @@ from kinetostat.motion.forces import NOTHING, PARTS, ForceDemand, drive_forces, 
 from kinetostat.motion.operators import MachineAtPose, forces_along, mass_at_drives
 from kinetostat.motion.rates import PoseRates
 
-OF_DRIVE = ("speed", "acceleration", *PARTS)
-"""Numbers of each drive: how its coordinate moves, and the parts of its force or torque, positive along its motion."""
+NUMBERS_OF_DRIVE = ("speed", "acceleration", *PARTS)
+"""Numbers of each drive: speed and acceleration of its coordinate, and the parts of its force or torque, which are
+positive along its motion."""
 
 
 @dataclass(frozen=True)
 class LoadedJoint:
-    """A joint whose load is looked at.
+    """A joint whose load is computed.
 
     Attributes:
-        name: of the joint.
-        leg: number of its leg.
+        name: name of the joint.
+        leg: number of its leg, from 0.
         element: number of its first element in the leg's chain, from 0.
-        turns: whether it has a point, about which its moment is counted.
+        turns: whether it has a point, about which its moment is taken; a slide has none.
     """
 
     name: str
@@ -37,21 +41,24 @@ class LoadedJoint:
 
 
 def drive_numbers(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
-    """Numbers of all drives along a motion, see `OF_DRIVE`, one drive after the other, SI."""
+    """The numbers `NUMBERS_OF_DRIVE` of all drives along a motion, one drive after the other, SI."""
     motion, demand_by_part = forces_along(here, direction)
-    length = here.rigid.length
-    units = [length if drive.slides else 1.0 for drive in here.rigid.drives]
-    rows = [here.drive_rates(motion), here.drive_rates(motion, change=True)]
-    results = [[value * unit for value, unit in zip(row, units, strict=True)] for row in rows]
-    levers = [1.0 if drive.slides else length for drive in here.rigid.drives]
-    for part in PARTS:
-        forces = drive_forces(here.rigid, here.statics, demand_by_part[part])
-        results.append([force * lever for force, lever in zip(forces, levers, strict=True)])
-    return [row[number] for number in range(len(units)) for row in results]
+    drives, length = here.rigid.drives, here.rigid.length
+    # Lengths are counted in units of the machine's length, so that sliding speeds and turning moments are scaled by it.
+    rate_units = [length if drive.slides else 1.0 for drive in drives]
+    force_units = [1.0 if drive.slides else length for drive in drives]
+    rows = [_products(here.drive_rates(motion, change=change), rate_units) for change in (False, True)]
+    forces_by_part = [drive_forces(here.rigid, here.statics, demand_by_part[part]) for part in PARTS]
+    rows += [_products(forces, force_units) for forces in forces_by_part]
+    return [row[number] for number in range(len(drives)) for row in rows]
+
+
+def _products(values: Sequence[Scalar], units: Sequence[Scalar]) -> list[Scalar]:
+    return [value * unit for value, unit in zip(values, units, strict=True)]
 
 
 def joints_of(configuration: Configuration) -> list[LoadedJoint]:
-    """The joints of all legs whose loads are looked at: passive ones and drives, each once."""
+    """The joints of all legs whose loads are computed: passive joints and drives, each once."""
     return [joint for number, leg in enumerate(configuration.legs) for joint in _joints_of_leg(number, leg.chain)]
 
 
@@ -73,16 +80,15 @@ def joint_numbers(here: MachineAtPose, direction: PoseRates, joints: list[Loaded
     """
     whole = _sum_of(forces_along(here, direction)[1])
     wrenches = leg_wrenches(here.rigid, whole, drive_forces(here.rigid, here.statics, whole))
-    shrink, results = 1.0 / here.rigid.length, []
+    length, results = here.rigid.length, []
     for joint in joints:
         element = here.configuration.legs[joint.leg].chain[joint.element]
         motion = here.rigid.legs[joint.leg].ends[joint.element]
         passed = whole.carried[joint.leg][motion] - wrenches[joint.leg]
         results.append(passed.translational.norm())
         point = element.mover.point if joint.turns else None  # type: ignore[attr-defined]
-        results.append(
-            0.0 if point is None else _moment(passed, (point - here.rigid.origin) * shrink, here.rigid.length)
-        )
+        arm = None if point is None else (point - here.rigid.origin) * (1.0 / length)
+        results.append(0.0 if arm is None else _moment_size(passed, arm, length))
     return results
 
 
@@ -93,14 +99,15 @@ def _sum_of(demand_by_part: Mapping[str, ForceDemand]) -> ForceDemand:
     return first
 
 
-def _moment(wrench: Wrench, at: Vector, length: Scalar) -> Scalar:
-    return (wrench.rotational - at.cross(wrench.translational)).norm() * length
+def _moment_size(wrench: Wrench, arm: Vector, length: Scalar) -> Scalar:
+    """Size of a wrench's moment (N·m) about a point at `arm` (in units of the machine's length, m) from the origin."""
+    return (wrench.rotational - arm.cross(wrench.translational)).norm() * length
 
 
 def reflected_inertia(here: MachineAtPose) -> list[Scalar]:
-    """Inertia that each drive accelerates while the others stand still, with its rotor: kg, or kg·m² of turns.
+    """Inertia that each drive accelerates while the others stand still, its rotor included: kg, or kg·m² if it turns.
 
-    Nothing of a machine with more drives than coordinates, whose drives cannot move one by one.
+    The list is empty for a machine with more drives than coordinates, whose drives cannot move one by one.
     """
     if len(here.rigid.drives) != len(here.names):
         return []
@@ -110,8 +117,8 @@ def reflected_inertia(here: MachineAtPose) -> list[Scalar]:
 def tool_wrench(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
     """The wrench at the tool point that would deflect springs as the motion does: moment (N·m), force (N) [6].
 
-    It is less what masses, process and joints ask for, taken to the platform by virtual work; rotors and their friction
-    act behind the springs of their drives, and are left out.
+    It is opposite to the forces that masses, process and joints ask for, taken to the platform by virtual work. Rotors
+    and their friction act behind the springs of their drives, and are left out.
     """
     motion, demand_by_part = forces_along(here, direction)
     demand = _sum_of(demand_by_part)

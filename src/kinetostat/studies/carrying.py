@@ -101,8 +101,8 @@ def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, 
     count = len(next(iter(columns.values())))
     carries = np.zeros((count, legs), dtype=bool)
     states = states_of_rest(states_at(machine, columns, count))
-    if states.equations is not None and states.judged is not None:
+    if states.equations is not None and states.stability is not None:
         pairs = zip(states.equations.mechanism.legs, states.equations.legs, strict=True)
         slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1) for leg, terms in pairs]
-        carries[states.rows] = ~np.stack(slack, axis=1)[states.judged.stable]
+        carries[states.rows] = ~np.stack(slack, axis=1)[states.stability.stable]
     return carries, states.status.astype(np.int8)

@@ -1,6 +1,7 @@
-"""Commands: coordinates of the actuators that bring the tool of a loaded machine to its pose, at one pose or at many.
+"""Coordinates of the actuators that bring the tool of a loaded machine to its pose, at one pose or at many.
 
-Poses are solved in slabs, each as one array. The equations are in `equilibrium.actuation`; the command is `command`.
+`actuator_targets` solves many poses in slabs, each as one array; `command` asks it, and adds names, units and a
+sentence for people. The equations are in `equilibrium.actuation`.
 """
 
 import math
@@ -34,8 +35,8 @@ from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
-COMMANDED_AT_ONCE = Way.ANY_MACHINE.slab
-"""Poses that are solved together."""
+POSES_IN_SLAB = Way.ANY_MACHINE.slab
+"""Number of poses that are solved together."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class ActuatorTargets:
     """Coordinates at which actuators of a loaded machine must stand at n poses; NaN where there is no state of rest.
 
     Attributes:
-        actuators: that can be actuator_targets.
-        coordinates: that bring the tool to its pose, or as near as they can, m or rad [n x actuators].
-        unloaded: where they stand without loads [n x actuators].
-        before: how far the tool point is off without a correction, m [n].
-        left: how far it is off with it, m [n].
-        turned: how far the platform stays turned, rad [n].
+        actuators: the actuators that can be commanded.
+        coordinates: coordinates that bring the tool to its pose, or as near as they can, m or rad [n x actuators].
+        unloaded: coordinates of the actuators at the pose without loads, m or rad [n x actuators].
+        before: distance of the tool point from its pose without a correction, m [n].
+        left: distance of the tool point from its pose with the correction, m [n].
+        turned: angle by which the platform is still turned with the correction, rad [n].
         rates: motion of the tool point per unit of each coordinate [n x 3 x actuators].
     """
 
@@ -62,28 +63,28 @@ class ActuatorTargets:
 
     @property
     def settled(self) -> Mask:
-        """Whether the machine comes to rest [n]."""
+        """Whether the machine comes to rest at each pose [n]."""
         return np.asarray(np.isfinite(self.coordinates).all(axis=1))
 
     @property
     def corrections(self) -> Array:
-        """By how much the coordinates differ from those without loads [n x actuators]."""
+        """Differences of the coordinates from those without loads, m or rad [n x actuators]."""
         return self.coordinates - self.unloaded
 
     def split(self, count: int) -> tuple["ActuatorTargets", "ActuatorTargets"]:
-        """The first so many poses, and the others."""
-        return self._with_each(lambda values: values[:count]), self._with_each(lambda values: values[count:])
+        """The answer at the first `count` poses, and that at the others."""
+        return self._with_arrays(lambda values: values[:count]), self._with_arrays(lambda values: values[count:])
 
     def where(self, settled: Mask) -> "ActuatorTargets":
         """The answer with NaN at all other poses [n]."""
-        return self._with_each(lambda values: np.where(settled.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan))
+        return self._with_arrays(lambda values: np.where(settled.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan))
 
-    def _with_each(self, change: Callable[[Array], Array]) -> "ActuatorTargets":
+    def _with_arrays(self, change: Callable[[Array], Array]) -> "ActuatorTargets":
         return ActuatorTargets(self.actuators, *(change(getattr(self, name)) for name in TARGET_ARRAYS))
 
 
 TARGET_ARRAYS = [field.name for field in fields(ActuatorTargets)][1:]
-"""Its arrays, with the poses first."""
+"""Names of the arrays of `ActuatorTargets`, whose first axis are the poses."""
 
 
 def actuator_targets(
@@ -93,16 +94,16 @@ def actuator_targets(
 
     Args:
         machine: gives all parameters that do not vary.
-        columns: values of those that vary by leaf path, SI [n].
-        count: n.
-        progress: receives how far the work is.
+        columns: values of the parameters that vary, by leaf path, SI [n].
+        count: number of poses, n.
+        progress: receives the number of poses that are solved, and that of all.
 
     Raises:
         InputError: as for `MachineState.mechanism`; or no pose is reached, or the machine has no actuator.
     """
     slabs = []
-    for start in range(0, count, COMMANDED_AT_ONCE):
-        rows = slice(start, min(start + COMMANDED_AT_ONCE, count))
+    for start in range(0, count, POSES_IN_SLAB):
+        rows = slice(start, min(start + POSES_IN_SLAB, count))
         with np.errstate(all="ignore"):  # poses without a place
             slabs.append(
                 _targets_of_slab(machine, {path: column[rows] for path, column in columns.items()}, rows.stop - start)
@@ -114,7 +115,7 @@ def actuator_targets(
             f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or "
             "no actuator could be commanded; change the pose."
         )
-    sizes = [min(COMMANDED_AT_ONCE, count - start) for start in range(0, count, COMMANDED_AT_ONCE)]
+    sizes = [min(POSES_IN_SLAB, count - start) for start in range(0, count, POSES_IN_SLAB)]
     return _concatenation([slab or _empty_targets(names, size) for slab, size in zip(slabs, sizes, strict=True)])
 
 
@@ -131,7 +132,7 @@ def _empty_targets(actuators: tuple[Actuator, ...], count: int) -> ActuatorTarge
 
 
 def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int) -> ActuatorTargets | None:
-    """Some poses at once; None where the machine has no state of rest to look for at any of them."""
+    """Solve one slab of poses; None where the machine can have no state of rest at any of them."""
     state = states_at(machine, columns, count)
     status = np.broadcast_to(state.free.status, (count,))
     rows = np.flatnonzero(~np.isin(status, SOUGHT_NO_REST))
@@ -148,7 +149,7 @@ def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int)
 
 
 def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> ActuatorTargets:
-    """The states of a machine at poses all of which it reaches."""
+    """Solve poses all of which the machine reaches; NaN where the state of rest is not stable."""
     mechanism, count = state.mechanism, state.count
     actuators, stands, senses = _actuators(machine, columns, state.free, state.joints, count)
     known = [actuator.name for actuator in actuators]
@@ -174,19 +175,22 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
 def _actuators(
     machine: Machine, columns: Mapping[str, Array], response: Response, joints: Joints | None, count: int
 ) -> tuple[list[Actuator], Array, Array]:
-    """All actuators, where they stand, and whether their coordinates grow as they move forward [n x actuators]."""
+    """All actuators, their coordinates, and 1 or -1 where these grow or fall as they move forward [n x actuators]."""
     if joints is None:
         actuators = actuators_of(response.configuration)
         senses = stacked_columns(senses_of(response.configuration), count)
         return actuators, stacked_columns([actuator.coordinate for actuator in actuators], count), senses
-    # What counts from the home pose depends on the geometry there, which seldom varies.
-    built = {path: column for path, column in columns.items() if path.split(".")[0] in machine.family.tables}
-    built = {path: column for path, column in built.items() if not path.startswith("pose.")}
-    homes = [{path: float(column[i]) for path, column in built.items()} for i in range(count if built else 1)]
-    of_rows = [joint_actuators(with_values(machine, home).chains(), leg_names(machine)) for home in homes]
-    placed = [actuator.at(joints.coordinates) for actuator in of_rows[0]]
-    senses = np.broadcast_to(np.array([[each.sign for each in row] for row in of_rows]), (count, len(placed)))
-    offsets = np.array([[each.offset - of_rows[0][k].offset for k, each in enumerate(row)] for row in of_rows])
+    # A coordinate that counts from the home pose depends on the geometry there, which seldom varies: one home for all.
+    tables = {path: column for path, column in columns.items() if path.split(".")[0] in machine.family.tables}
+    geometry = {path: column for path, column in tables.items() if not path.startswith("pose.")}
+    homes = [{path: float(column[i]) for path, column in geometry.items()} for i in range(count if geometry else 1)]
+    actuators_at_homes = [joint_actuators(with_values(machine, home).chains(), leg_names(machine)) for home in homes]
+    first = actuators_at_homes[0]
+    placed = [actuator.at(joints.coordinates) for actuator in first]
+    signs = np.array([[actuator.sign for actuator in row] for row in actuators_at_homes])
+    senses = np.broadcast_to(signs, (count, len(placed)))
+    offsets = np.array([[actuator.offset for actuator in row] for row in actuators_at_homes])
+    offsets = offsets - [actuator.offset for actuator in first]
     return placed, stacked_columns([actuator.coordinate for actuator in placed], count) + offsets, senses
 
 
@@ -196,16 +200,12 @@ class Command(Immutable):
 
     Attributes:
         machine: with its loads.
-        poses: at which they hold; None for the pose of the machine alone.
-        actuators: their names.
-        units: of each coordinate, "m" or "rad".
-        coordinates: what to command [poses x actuators], SI; NaN where there is no state of rest.
-        unloaded: where the actuators stand without loads [poses x actuators], SI.
-        before: how far the tool point is off without a correction [poses], m.
-        left: how far it is off with it, m: what no actuator of the machine can change [poses].
-        turned: how far the platform stays turned, rad [poses].
-        settled: whether the machine comes to rest [poses].
-        message: what is the case, in a sentence.
+        poses: the poses that are wanted; None for the pose of the machine alone.
+        actuators: names of the actuators.
+        units: unit of each coordinate, "m" or "rad".
+        coordinates: coordinates to command, m or rad [poses x actuators]; NaN where there is no state of rest.
+        unloaded, before, left, turned, settled: as of `ActuatorTargets`; what is left no actuator can change.
+        message: the answer in a sentence.
     """
 
     machine: Machine
@@ -222,7 +222,7 @@ class Command(Immutable):
 
     @property
     def corrections(self) -> Array:
-        """By how much the coordinates differ from those without loads, m or rad [poses x actuators]."""
+        """Differences of the coordinates from those without loads, m or rad [poses x actuators]."""
         return self.coordinates - self.unloaded
 
     def __repr__(self) -> str:
@@ -233,20 +233,20 @@ class Command(Immutable):
 def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) -> Command:
     """Find where the actuators of a loaded machine must stand so that its tool is where it should be.
 
-    A machine bends under its loads, so that actuators that stand where an ideal machine would have them leave the tool
-    beside its pose. These coordinates bring it back. A machine with fewer than six freedoms is brought as near as its
-    actuators can.
+    A machine deflects under its loads, so that its tool misses the pose if the actuators stand where they would without
+    loads. These coordinates bring it back. A machine with fewer than six freedoms is brought as near as its actuators
+    can.
 
     Args:
-        machine: with its loads; its pose is the one that is wanted, if no poses are given.
-        poses: that are wanted: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV file, as
-            for `evaluate`.
-        fit: folder or fit.json of `identify`, where the machine is the one as built that the fit has written: zeros
-            and gains of its actuators are not in its file, and coordinates are then those that its controller counts.
+        machine: with its loads; its own pose is wanted if no poses are given.
+        poses: the poses that are wanted: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV
+            file, as for `evaluate`.
+        fit: folder or fit.json of `identify`, if the machine is the one as built that `identify` has written. Its file
+            does not hold zeros and gains of actuators; with the fit, coordinates are those that the controller counts.
 
     Raises:
-        InputError: there is gravity but no mass, no actuator, tensions are to be chosen, the poses cannot be read, or
-            the fit is that of another machine.
+        InputError: there is gravity but no mass; the machine has no actuator, or its tensions are to be chosen; the
+            poses cannot be read; or the fit is that of another machine.
     """
     refuse_tensions(machine)
     record = None if fit is None else read_fit(fit)
@@ -268,14 +268,14 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
 
 
 def home_coordinates(machine: Machine) -> dict[str, float]:
-    """Coordinates of the actuators of a machine leg by leg at its home pose, by name, m or rad."""
+    """Coordinates of the actuators of a machine written leg by leg at its home pose, by name, m or rad."""
     home = pose_of(machine.chains().home) if machine.family.chains else {}
-    there = changed(machine, {f"{POSE}{name}": float(home[name]) for name in machine.chains().pose} if home else {})
-    return {actuator.name: actuator.coordinate for actuator in analyze(there).actuators}
+    pose = {f"{POSE}{name}": float(home[name]) for name in machine.chains().pose} if home else {}
+    return {actuator.name: actuator.coordinate for actuator in analyze(changed(machine, pose)).actuators}
 
 
 def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
-    """Refuse a machine as drawn, whose geometry is not the one that was found."""
+    """Refuse a machine as drawn, whose geometry is not the one that the fit has found."""
     if record.family == machine.family.name and machine.family.chains is None:
         raise InputError(
             f'{machine.name} is the machine as drawn, and the fit "{record.path}" is about the one as built; give the '
@@ -284,7 +284,7 @@ def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
 
 
 def refuse_tensions(machine: Machine) -> None:
-    """Refuse a machine whose tensions are to be chosen: its actuators are actuator_targets by forces.
+    """Refuse a machine whose tensions are to be chosen: its actuators are commanded by forces, not by coordinates.
 
     Raises:
         InputError: it is such a machine.
@@ -292,18 +292,18 @@ def refuse_tensions(machine: Machine) -> None:
     if not all(math.isinf(bound) for bound in (machine.tables["load"].min_tension, machine.tables["load"].max_tension)):
         raise InputError(
             f"{machine.name}: commands are coordinates of actuators, but load.min_tension and load.max_tension choose "
-            "forces, which winches are actuator_targets by instead; leave the bounds out, or read the tensions from "
+            "forces, by which its winches are then commanded; leave the bounds out, or read the tensions from "
             "`analyze --loaded`."
         )
 
 
 def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTargets) -> Command:
-    """Make the answer for people of what is solved at some poses.
+    """Return the coordinates found at some poses, with names, units and a sentence.
 
     Args:
         machine: with its loads.
-        poses: that it is solved at; None for the pose of the machine alone.
-        answer: of them.
+        poses: the poses; None for the pose of the machine alone.
+        answer: the coordinates found at these poses.
     """
     return Command(
         machine,

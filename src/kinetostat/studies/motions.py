@@ -22,7 +22,7 @@ from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
 from kinetostat.machine.parameters import POSE, values
-from kinetostat.motion.numbers import OF_DRIVE
+from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
@@ -94,7 +94,7 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
         raise InputError(f"no coordinate of the pose of {form.machine.name} is x, y or z; give a motion instead.")
     ways, rest = np.eye(len(moving)), np.zeros((len(moving), len(moving)))
     unit = forces_on_path(form, _at_pose(here, moving, np.concatenate([ways, rest]), np.concatenate([rest, ways])))
-    inertia = OF_DRIVE.index("inertia")
+    inertia = NUMBERS_OF_DRIVE.index("inertia")
     fastest, hardest = unit.drives[:, 0, : len(moving)], unit.drives[:, inertia, len(moving) :]
     speeds = np.concatenate([np.zeros((1, len(moving))), *_both_ways(fastest), _spread(len(moving))]) * speed
     gains = np.concatenate(_both_ways(hardest)) * acceleration

@@ -1,7 +1,8 @@
 """Numbers and equations of the paper: what it prints, digit for digit, and what this program computes beside it.
 
-Tables III and IV, equations 33 to 38 and the designs of section 4.3 are judged by the digits that are  Equations
-1 to 32 are tested by a second route: the paper's own matrices A, B, J and J' in NumPy, against this program's (W, G).
+Tables III and IV, equations 33 to 38 and the designs of section 4.3 are judged by the digits that are printed.
+Equations 1 to 32 are tested by a second route: the paper's own matrices A, B, J and J' in NumPy, against this program's
+(W, G).
 Source: `CITATION`.
 """
 
