@@ -1,6 +1,7 @@
-"""The commands `sweep` and `map`, as far as they do more than any question: large grids in a folder, many processes.
+"""The commands `sweep` and `map`: asked as any question, but with many processes, and large grids into a folder.
 
-No formula lives here.
+A grid that does not fit in memory is answered chunk by chunk into the output folder (`studies.stored_grid`), where it
+can be stopped and resumed. No formula lives here.
 """
 
 import argparse
@@ -27,15 +28,17 @@ if TYPE_CHECKING:
     from kinetostat.views.question import Question
 
 MOST_WORKERS = 1024
+"""Greatest number of processes that may be asked for."""
 
 
 def add_grid_commands(commands: "Commands") -> None:
     """Add `sweep` and `map`."""
     for word in ("sweep", "map"):
-        add_question(commands, word, partial(_ask, word), _takes_workers)
+        add_question(commands, word, partial(_ask, word), _add_options)
 
 
-def _takes_workers(command: "Parser") -> None:
+def _add_options(command: "Parser") -> None:
+    """Add the options that say where a grid is computed, and whether it goes on."""
     command.add_argument(
         "--resume", action="store_true",
         help="for grids of over 5 million points: continue the one in the output folder, and refuse if there "
@@ -53,10 +56,9 @@ def _workers(text: str) -> int:
 
 
 def _ask(word: str, question: "Question", options: argparse.Namespace) -> int:
-    """Ask as any question is asked, but compute with a crew, and into the folder what is too large for memory."""
-    with_options = replace(question, answer=partial(_answer, word, question, options))
+    """Ask as any question is asked, but answer by `_answer`, which knows these options; return the exit code."""
     try:
-        return ask(with_options, options)
+        return ask(replace(question, answer=partial(_answer, word, question, options)), options)
     except KeyboardInterrupt:
         from kinetostat.studies.study_folder import holds_study
 
@@ -75,7 +77,7 @@ def _answer(
     quantities: "Sequence[str]" = (),
     carrying: bool = False,
 ) -> "xr.Dataset | Carrying | StoredGrid":
-    """Answer in memory, or into the folder where the grid is too large for that."""
+    """Compute a grid by the processes that are wanted: in memory, or into the folder if it is too large for that."""
     from kinetostat.engine.chunks import Crew, compute_with
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.grid import answer
@@ -96,7 +98,7 @@ def _answer(
 
 
 def _check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to write a small grid over a long study."""
+    """Refuse to write a grid that is kept in memory over a study in a folder, or to resume it."""
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.study_folder import holds_study
 
@@ -109,6 +111,7 @@ def _check_folder(folder: Path, resume: bool) -> None:
 def _answer_into_folder(
     options: argparse.Namespace, question: "GridQuestion", word: str, progress: "Progress", compute: "Compute"
 ) -> "StoredGrid":
+    """Compute a large grid into the folder, or go on with it, and say what was repaired and written there."""
     from kinetostat.studies.storage import differing
     from kinetostat.studies.stored_grid import answer_into
     from kinetostat.studies.study_folder import HISTORY, QUESTION

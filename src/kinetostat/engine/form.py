@@ -27,7 +27,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.vibration.reduced import free_frequencies, frequencies_at, in_order
+from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
 from kinetostat.vibration.slopes import vibrating
 
 ORDINARY_PARAMETER = (1e-25, 1e25)
@@ -204,7 +204,7 @@ def objectives_of(
         vibration = vibrating(given.machine, response, joints, modes)
         known = new_inputs(given.graph, vibration.columns)
         coordinates = (*coordinates, *known)
-        response = replace(response, frequencies=in_order(vibration.squares(known)))
+        response = replace(response, frequencies=lowest_frequencies(vibration.squares(known)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     accepted = response.status < Status.OK + 0.5

@@ -1,8 +1,8 @@
-"""Natural frequencies over scalars, a few sums and Jacobi's rotations: what machine code does for many poses.
+"""Natural frequencies over scalars, by sums and Jacobi's rotations without branches, for machine code at many poses.
 
-Where nothing is massive but the platform, its compliance is all that is needed, whatever the legs are. Where links or
-rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. Machines that allow
-neither are left to `modes`.
+Where the platform alone is massive, the compliance at the tool is all that is needed, whatever the legs are. Where
+links or rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. Machines
+that allow neither are left to `modes`.
 
 Source: theory (63); with the platform alone, (58) with C. Units are those of `equilibrium.mechanism`.
 """
@@ -32,14 +32,14 @@ from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 from kinetostat.vibration.modes import frequencies, hertz
 
-ALIKE = 1e-9
-"""Share of a frequency's square by which another may differ and still count as equal to it."""
-MAKES_MASSIVE = re.compile(r"linear_density\.|drives\.rotor_inertia|legs\..*\.mass|sections\..*\.density")
-"""Leaf paths that may make links or rotors massive."""
+EQUAL_SQUARES = 1e-9
+"""Relative difference of the squares of two frequencies up to which they count as equal."""
+PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.rotor_inertia|legs\..*\.mass|sections\..*\.density")
+"""Leaf paths of parameters that may give links or rotors a mass."""
 
 
 def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
-    """Whether `free_frequencies` takes a machine wherever its varying parameters (leaf paths) are."""
+    """Whether `free_frequencies` can compute a machine at all values of its varying parameters (leaf paths)."""
     state = state_of(machine)
     with np.errstate(all="ignore"):
         if platform_alone(state, varying):
@@ -49,18 +49,20 @@ def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
 
 
 def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
-    """Whether springs of a planar machine may deflect out of its plane, which these sums do not keep from moving."""
+    """Whether springs of a planar machine may deflect out of its plane, a motion that these sums do not exclude."""
     return machine.family.planar and any(spring is not None for spring in machine_cut.carrier.springs)
 
 
 def platform_alone(machine: Machine | MachineState, varying: Collection[str] = ()) -> bool:
-    """Whether no leg has a mass or a rotor wherever the varying parameters (leaf paths) are."""
+    """Whether no leg has a mass or a rotor at any value of the varying parameters (leaf paths)."""
     state = state_of(machine)
-    return light(state.machine, state.configuration) and not any(MAKES_MASSIVE.match(path) for path in varying)
+    if any(PATHS_OF_LEG_MASSES.match(path) for path in varying):
+        return False
+    return legs_without_mass(state.machine, state.configuration)
 
 
-def light(machine: Machine, configuration: Configuration) -> bool:
-    """Whether no leg has a mass or a rotor with inertia, by form."""
+def legs_without_mass(machine: Machine, configuration: Configuration) -> bool:
+    """Whether no leg has a mass or a rotor with inertia, as the form of the file says it."""
     links = [part for part in moving_masses(machine, configuration) if part.name != PLATFORM]
     return all(link.mass is None for link in links) and is_zero(machine.tables["drives"].rotor_inertia)
 
@@ -72,10 +74,10 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
         machine: with its masses; numbers of any kind.
         response: the response of the machine at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
-        sloped: whether derivatives will be taken.
+        sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
     """
-    if light(machine, response.configuration):
-        return in_order(eigenvalues(platform_matrix(machine, response), sloped))
+    if legs_without_mass(machine, response.configuration):
+        return lowest_frequencies(eigenvalues(platform_matrix(machine, response), sloped))
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None:
         raise ValueError("loops that rods do not cut have no frequencies over scalars")
@@ -83,9 +85,9 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
 
 
 def pose_frequencies(state: MachineState) -> Array:
-    """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it."""
+    """The natural frequencies of any machine at n poses, by NumPy, Hz [n x MODES]; NaN where springs do not hold it."""
     machine, response, count = state.machine, state.free, state.count
-    if not light(machine, response.configuration):
+    if not legs_without_mass(machine, response.configuration):
         return frequencies(state.free_equations)
     entries = [entry for row in platform_matrix(machine, response) for entry in row]
     size = len(machine.family.components)
@@ -98,10 +100,10 @@ def pose_frequencies(state: MachineState) -> Array:
 
 
 def platform_matrix(machine: Machine, response: Response) -> list[Row]:
-    """G^T M G with C = G G^T, whose eigenvalues are those of C M, s²; a rigid direction has a column of zeros.
+    """The matrix G^T M G with C = G G^T, whose eigenvalues are those of C M, s²; a rigid direction gives zeros.
 
     Args:
-        machine: in which the platform alone is massive.
+        machine: a machine in which the platform alone is massive.
         response: the response of the machine at its pose.
     """
     parts, length = machine.family.components, response.configuration.length
@@ -114,7 +116,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
 
 
 def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
-    """The mass matrix of platform and payload by a twist of the tool point, base axes, SI [6][6]."""
+    """The mass matrix of platform and payload for twists of the tool point, base axes, SI [6][6]."""
     result: list[Row] = [[0.0 for _ in range(6)] for _ in range(6)]
     for weight in platform_weights(machine, response.configuration.platform):
         x, y, z = (weight.point - response.reference).components()
@@ -155,9 +157,9 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     """The lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
 
     Args:
-        machine: whose loops are cut.
-        coordinates: at which it is at rest.
-        sloped: whether derivatives will be taken.
+        machine: the machine with its loops cut.
+        coordinates: coordinates of its carrier at rest.
+        sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
     """
     place, mechanism = place_of(machine, coordinates), machine.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
@@ -166,17 +168,17 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
     for rod in machine.rods:
         if not is_zero(rod.rotor):
-            inertia = inertia + _along(rod, place.platform.point(rod.far)) * (rod.rotor * length[0])
+            inertia = inertia + _stretch_dyad(rod, place.platform.point(rod.far)) * (rod.rotor * length[0])
     mass = twists.T @ inertia @ twists
     for _, matrix in energies(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
         mass = mass + matrix[0]
     mass = mass + np.diag(machine.carrier.rotors[0] * length[0])
     stiff = 0.5 * (place.rates + place.rates.T)
-    return in_order(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
+    return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
 
 
-def _along(rod: ElasticRod, far: Array) -> Array:
-    """The dyad of a rod's unit line: the square of its rate of stretching by a twist of the platform [6 x 6]."""
+def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
+    """The dyad of the unit line of a rod to the point `far`: its rate of stretching by a twist, squared [6 x 6]."""
     span = (far - rod.near)[0]
     size = sqrt(total([part * part for part in span]))
     unit = np.array([part * (1.0 / size) for part in span], dtype=object)
@@ -185,10 +187,14 @@ def _along(rod: ElasticRod, far: Array) -> Array:
     return np.asarray(np.outer(line, line))
 
 
-def in_order(modes: Sequence[Scalar]) -> list[Scalar]:
-    """The lowest frequencies of modes, Hz [MODES], from their 1 / omega², s²; equal ones share their mean."""
+def lowest_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
+    """The lowest natural frequencies in rising order, Hz [MODES]; equal ones share their mean.
+
+    Args:
+        modes: 1 / omega² of each mode, s², in any order.
+    """
     squares, size = [*modes], len(modes)
-    for first in range(size):  # exchange neighbours until the largest come first
+    for first in range(size):  # odd-even sort without branches: exchange neighbours until the largest come first
         for k in range(first % 2, size - 1, 2):
             swap = squares[k] < squares[k + 1]
             squares[k], squares[k + 1] = (
@@ -201,11 +207,12 @@ def in_order(modes: Sequence[Scalar]) -> list[Scalar]:
 
 
 def _mean_of_equals(squares: Sequence[Scalar], square: Scalar) -> Scalar:
-    near = [abs(other - square) <= ALIKE * abs(square) for other in squares]
-    sums = total([where(equal, other, 0.0) for equal, other in zip(near, squares, strict=True)])
-    return sums / total([where(equal, 1.0, 0.0) for equal in near])
+    equals = [abs(other - square) <= EQUAL_SQUARES * abs(square) for other in squares]
+    sums = total([where(equal, other, 0.0) for equal, other in zip(equals, squares, strict=True)])
+    return sums / total([where(equal, 1.0, 0.0) for equal in equals])
 
 
 def _frequency(square: Scalar, largest: Scalar) -> Scalar:
-    rings = square > UNRESISTED * largest
-    return where(rings, 0.5 / math.pi / sqrt(where(rings, square, 1.0)), math.inf)
+    """The frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
+    finite = square > UNRESISTED * largest
+    return where(finite, 0.5 / math.pi / sqrt(where(finite, square, 1.0)), math.inf)

@@ -1,7 +1,7 @@
-"""A machine with its servo loops closed: what stiffness a drive has over frequency, the tool's response, and the poles.
+"""A machine with its servo loops closed: dynamic stiffness of its drives, receptance at the tool, and poles.
 
 The modes are those of the machine with motors that stand still and rotors without inertia, so that the spring of an
-actuator is its transmission; each loop takes the place of that standing still.
+actuator is its transmission alone. Each servo loop then takes the place of a motor that stands still.
 
 Source: theory (101)-(104). SI; at the tool point, base axes.
 """
@@ -17,21 +17,21 @@ from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import Damper, receptance
 from kinetostat.vibration.state_space import state_space
 
-INTEGRAL_STATES = 3
-"""States of a drive: where its motor stands, how fast it moves, and the integral of the position error."""
+STATES_OF_DRIVE = 3
+"""States of a drive: position of its motor, speed of its motor, and the integral of the position error."""
 
 
 @dataclass(frozen=True)
 class ServoLoop:
-    """The loop of a drive, all of it at the coordinate of its actuator.
+    """The servo loop of a drive; all its numbers are referred to the coordinate of its actuator.
 
     Attributes:
         transmission: stiffness between motor and joint, N/m or N·m/rad.
-        inertia: of the rotor, kg or kg·m².
-        friction: viscous, of the rotor, N·s/m or N·m·s/rad.
-        velocity_gain: of the velocity loop, N·s/m or N·m·s/rad.
-        position_gain: of the position loop, 1/s.
-        integral_time: of the velocity loop, s; 0 if it has no integral part.
+        inertia: inertia of the rotor, kg or kg·m².
+        friction: viscous friction of the rotor, N·s/m or N·m·s/rad.
+        velocity_gain: gain of the velocity loop, N·s/m or N·m·s/rad.
+        position_gain: gain of the position loop, 1/s.
+        integral_time: integral time of the velocity loop, s; 0 if it has no integral part.
         at_load: share of the position that is measured behind the transmission.
     """
 
@@ -52,24 +52,24 @@ class ServoLoop:
         Source: theory (101).
         """
         s = 2.0j * math.pi * np.asarray(frequencies, dtype=float)
-        free = s * s * self.inertia + s * self.friction
-        behind = s + self.position_gain * (1.0 - self.at_load)
-        whole = s + self.position_gain
+        rotor = s * s * self.inertia + s * self.friction
+        feedback_of_motor = s + self.position_gain * (1.0 - self.at_load)
+        feedback = s + self.position_gain
         if self.integral_time:
-            # Both sides times s, so that the integral part is finite at 0 Hz.
-            free, kept = free * s, self.transmission * s
+            # Numerator and denominator times s, so that the integral part is finite at 0 Hz.
+            rotor, spring = rotor * s, self.transmission * s
             gain = self.velocity_gain * (s + 1.0 / self.integral_time)
         else:
-            kept, gain = self.transmission * np.ones_like(s), self.velocity_gain * np.ones_like(s)
-        above, below = free + gain * whole, free + kept + gain * behind
+            spring, gain = self.transmission * np.ones_like(s), self.velocity_gain * np.ones_like(s)
+        above, below = rotor + gain * feedback, rotor + spring + gain * feedback_of_motor
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(below == 0.0, np.inf, self.transmission * above / below))
 
     @property
     def static_stiffness(self) -> float:
-        """Stiffness at 0 Hz, N/m or N·m/rad: that of the transmission where the motor's loop has an integral part.
+        """Stiffness at 0 Hz, N/m or N·m/rad: that of the transmission if the velocity loop has an integral part.
 
-        Infinite with an integral part and all of the position measured behind the transmission.
+        It is infinite with an integral part if all of the position is measured behind the transmission.
 
         Source: theory (102).
         """
@@ -78,12 +78,12 @@ class ServoLoop:
 
 @dataclass(frozen=True)
 class ClosedLoops:
-    """A machine with its loops.
+    """A machine with its servo loops.
 
     Attributes:
-        modes: of the machine with motors that stand still.
-        damping: of these.
-        loops: one for each of `modes.drives`.
+        modes: modes of the machine with motors that stand still.
+        damping: damping of these modes.
+        loops: the loop of each of `modes.drives`.
     """
 
     modes: Modes
@@ -93,8 +93,8 @@ class ClosedLoops:
     def receptance(self, frequencies: Array) -> Complex:
         """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
 
-        Each loop changes the stiffness of its actuator from that of the transmission to its own, a change of as low a
-        rank as there are drives: H' = H - H_d (Delta^-1 + D)^-1 H_d^T (Woodbury).
+        Each loop changes the stiffness of its actuator from that of the transmission to its own. All together change
+        the stiffness by a matrix whose rank is the number of drives: H' = H - H_d (Delta^-1 + D)^-1 H_d^T (Woodbury).
 
         Args:
             frequencies: Hz.
@@ -107,14 +107,15 @@ class ClosedLoops:
         tool, across, drives = whole[:, :6, :6], whole[:, :6, 6:], whole[:, 6:, 6:]
         stiffness = np.array([loop.stiffness(given) for loop in self.loops]).T
         change = stiffness - np.array([loop.transmission for loop in self.loops])
-        endless = ~np.isfinite(change)
-        weight, share = np.where(endless, 1.0, change), np.where(endless, 0.0, 1.0)
-        system = share[:, :, None] * np.eye(len(self.loops)) + weight[:, :, None] * drives
+        # The row of a rigid loop, whose Delta is infinite, is divided by it: (1 + Delta D) x = Delta H_d^T.
+        rigid = ~np.isfinite(change)
+        weight, unit = np.where(rigid, 1.0, change), np.where(rigid, 0.0, 1.0)
+        system = unit[:, :, None] * np.eye(len(self.loops)) + weight[:, :, None] * drives
         solved = np.linalg.solve(system, weight[:, :, None] * np.swapaxes(across, 1, 2))
         return np.asarray(tool - across @ solved)
 
     def poles(self) -> Complex:
-        """Eigenvalues of the closed loops, rad/s [states]: a positive real part says that something grows.
+        """Eigenvalues of the closed loops, rad/s [states]; one with a positive real part is a motion that grows.
 
         Source: theory (104).
         """
@@ -127,19 +128,20 @@ class ClosedLoops:
         )
         rate = np.array([gain[i] / t if (t := loop.integral_time) else 0.0 for i, loop in enumerate(self.loops)])
         zero = np.zeros((count, count))
-        # The joint's place e by the states (machine, motor, speed, integral): the motor pulls it with k x_m.
+        # Rows by the states (machine, motors, speeds, integrals): a motor at x_m pulls its joint with k x_m.
         joint = np.hstack([machine.c, machine.d * k, zero, zero])
         motor, speed, integral = (
             np.hstack([np.zeros((count, size)), *(np.eye(count) if i == place else zero for i in range(3))])
-            for place in range(INTEGRAL_STATES)
+            for place in range(STATES_OF_DRIVE)
         )
-        seen = at_load[:, None] * joint + (1.0 - at_load)[:, None] * motor
+        measured = at_load[:, None] * joint + (1.0 - at_load)[:, None] * motor
         torque = k[:, None] * (joint - motor) - friction[:, None] * speed
-        torque = torque - gain[:, None] * (position[:, None] * seen + speed)
+        torque = torque - gain[:, None] * (position[:, None] * measured + speed)
         torque = torque - rate[:, None] * (position[:, None] * integral + motor)
         rows = [np.hstack([machine.a, machine.b * k, np.zeros((size, 2 * count))]), speed, torque / inertia[:, None]]
+        # A loop without an integral part has an integral state that decays at 1/s and that nothing reads.
         integrates = rate[:, None] > 0.0
-        return np.asarray(np.linalg.eigvals(np.vstack([*rows, np.where(integrates, seen, -integral)])))
+        return np.asarray(np.linalg.eigvals(np.vstack([*rows, np.where(integrates, measured, -integral)])))
 
 
 def _with_motions(modes: Modes, motions: Array) -> Modes:
@@ -148,17 +150,17 @@ def _with_motions(modes: Modes, motions: Array) -> Modes:
 
 
 def slowest_decay(poles: Complex, frequencies: Sequence[float]) -> tuple[float, float] | None:
-    """Frequency (Hz) and damping ratio of the pole that swings with the least damping; None where none swings.
+    """Frequency (Hz) and damping ratio of the oscillating pole with the least damping ratio; None if none oscillates.
 
     Args:
-        poles: rad/s.
-        frequencies: least and greatest, Hz, between which it is looked for.
+        poles: poles of the closed loops, rad/s.
+        frequencies: least and greatest frequency that is considered, Hz.
     """
-    swinging = poles[poles.imag > 0.0]
-    hertz = np.abs(swinging) / (2.0 * math.pi)
-    swinging = swinging[(hertz >= frequencies[0]) & (hertz <= frequencies[1])]
-    if not len(swinging):
+    oscillating = poles[poles.imag > 0.0]
+    hertz = np.abs(oscillating) / (2.0 * math.pi)
+    oscillating = oscillating[(hertz >= frequencies[0]) & (hertz <= frequencies[1])]
+    if not len(oscillating):
         return None
-    ratios = -swinging.real / np.abs(swinging)
+    ratios = -oscillating.real / np.abs(oscillating)
     worst = int(np.argmin(ratios))
-    return float(np.abs(swinging[worst]) / (2.0 * math.pi)), float(ratios[worst])
+    return float(np.abs(oscillating[worst]) / (2.0 * math.pi)), float(ratios[worst])

@@ -1,7 +1,7 @@
-"""Values of designs at all poses and with all manufacturing deviations, in one call of the engine.
+"""Assess designs: their objectives and constraints at all poses and with all deviations of manufacture, in one call.
 
-Designs that cannot be judged are not errors: their verdict says why, and their violation how far they are from it. Many
-machines made within the tolerances from one design tell how its objectives scatter, and their worst case.
+A design that cannot be judged is not an error: its verdict says why, and its violation how far it is from a feasible
+design. Its robustness is the scatter and the worst case of its objectives over machines made within the tolerances.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,11 +25,11 @@ LARGEST_MET_EXCESS = 1e-9
 """Relative excess up to which a constraint counts as met, so that a design at its bound is not refused by round-off."""
 
 MOST_CORNERS = 12
-"""Tolerances of which all combinations of ends are tried: 4096 machines."""
+"""Greatest number of tolerances of which all combinations of ends are tried: 4096 machines."""
 SIGMAS_IN_TOLERANCE = 3.0
-"""Standard deviations of a normal distribution within the tolerance; what lies beyond is drawn at its end."""
-ROBUSTNESS_STREAM = 1
-"""Of random numbers: not the machines of the search."""
+"""Standard deviations of a normal distribution within the tolerance; a deviation beyond it is moved to its end."""
+SEARCH_STREAM, ROBUSTNESS_STREAM = 0, 1
+"""Streams of random numbers: robustness is judged by other machines than those that the search has seen."""
 
 
 class DesignVerdict(IntEnum):
@@ -53,8 +53,8 @@ class DesignVerdict(IntEnum):
         )
 
 
-OF_STATUS = np.array([DesignVerdict.FEASIBLE, *(DesignVerdict[status.name] for status in Status if status)])
-"""The verdict on a design by the status of the poses that it lacks."""
+VERDICT_BY_STATUS = np.array([DesignVerdict.FEASIBLE, *(DesignVerdict[status.name] for status in Status if status)])
+"""Verdict on a design that lacks poses, by the status that most of these have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class Outcome(Immutable):
     verdict: Codes
 
     def selection(self, numbers: Integers) -> "Outcome":
-        """Of some designs."""
+        """The outcome of the designs with these numbers."""
         return Outcome(*(getattr(self, name)[numbers] for name in vars(self)))
 
 
@@ -85,7 +85,7 @@ class Assessor:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         robust = problem.robust is not None
-        self._deviations = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
+        self._deviations = deviations(problem, problem.study.robustness.search_samples, SEARCH_STREAM) if robust else {}
 
     def __call__(self, genes: Array) -> Outcome:
         """Judge designs [designs x variables], each as made by manufacture if the study says so."""
@@ -96,7 +96,7 @@ class Assessor:
         return self._in_blocks(genes, {})
 
     def judge_machines(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
-        """Judge every one that manufacture makes of one design [variables]: deviations, SI, by variable."""
+        """Judge machines made of one design [variables]; `added` has their deviations, SI, by variable [machines]."""
         count = len(next(iter(added.values())))
         step = max(1, POINTS_AT_ONCE // self.problem.poses.count)
         parts = []
@@ -107,37 +107,43 @@ class Assessor:
         return join_outcomes(parts)
 
     def _in_blocks(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
-        each = len(next(iter(added.values()), (0.0,)))
-        step = max(1, POINTS_AT_ONCE // (each * self.problem.poses.count))
+        """Judge designs block by block, each as machines with the deviations `added`, SI, by variable [machines]."""
+        machines = len(next(iter(added.values()), (0.0,)))
+        step = max(1, POINTS_AT_ONCE // (machines * self.problem.poses.count))
         return join_outcomes(
-            [self._block(genes[start : start + step], added, each) for start in range(0, len(genes), step)]
+            [self._block(genes[start : start + step], added, machines) for start in range(0, len(genes), step)]
         )
 
-    def _block(self, genes: Array, added: Mapping[str, Array], each: int) -> Outcome:
-        repeated = np.repeat(genes, each, axis=0)
+    def _block(self, genes: Array, added: Mapping[str, Array], machines: int) -> Outcome:
+        repeated = np.repeat(genes, machines, axis=0)
         tiled = {name: np.tile(values, len(genes)) for name, values in added.items()}
-        return self._judge(self.problem.space.columns(repeated, tiled), each)
+        return self._judge(self.problem.space.columns(repeated, tiled), machines)
 
-    def _judge(self, columns: Mapping[str, Array], each: int) -> Outcome:
-        """Designs, each of which is `each` machines in a row."""
+    def _judge(self, columns: Mapping[str, Array], machines: int) -> Outcome:
+        """Judge designs by columns in which so many machines of each design follow each other."""
         problem = self.problem
         answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), problem.names)
         there = answers.status == Status.OK
         pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
-        numbers = [self._over_machines(term.values(answers.values, there), each, sign > 0) for term, sign in pairs]
-        status = answers.status.reshape(-1, each * answers.status.shape[1])
+        numbers = [self._over_machines(term.values(answers.values, there), machines, sign > 0) for term, sign in pairs]
+        status = answers.status.reshape(-1, machines * answers.status.shape[1])
         numbers_of_designs, count = np.array(numbers).T.reshape(len(status), len(pairs)), len(problem.objectives)
-        return _verdicts(problem, numbers_of_designs[:, :count], numbers_of_designs[:, count:], status)
+        return _outcome(problem, numbers_of_designs[:, :count], numbers_of_designs[:, count:], status)
 
-    def _over_machines(self, values: Array, each: int, high_is_bad: bool) -> Array:
-        if each == 1 or self.problem.robust is None:
+    def _over_machines(self, values: Array, machines: int, high_is_bad: bool) -> Array:
+        """One number for each design, as the study sums up the numbers of its machines."""
+        if machines == 1 or self.problem.robust is None:
             return values
-        made = values.reshape(-1, each)
-        return self.problem.robust.over(made, np.ones(made.shape, dtype=bool), high_is_bad)
+        by_design = values.reshape(-1, machines)
+        return self.problem.robust.over(by_design, np.ones(by_design.shape, dtype=bool), high_is_bad)
 
 
-def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: Codes) -> Outcome:
-    """From numbers and the status of all poses [designs x poses] to outcomes."""
+def _outcome(problem: Problem, objectives: Array, constraints: Array, status: Codes) -> Outcome:
+    """The verdicts on designs by their numbers and the status of all their poses [designs x poses].
+
+    The violations order them: any that lacks poses is worse than any without finite objectives, and that is worse than
+    any with violated constraints, each of which counts at most 1.
+    """
     most = len(problem.constraints)
     excess = np.zeros(constraints.shape)
     for k, constraint in enumerate(problem.constraints):
@@ -147,31 +153,31 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
             excess[:, k] = np.where(np.isfinite(over), over / (1.0 + over), 1.0)
     violation = excess.sum(axis=1)
     verdict = np.where(violation > 0.0, DesignVerdict.CONSTRAINT, DesignVerdict.FEASIBLE)
-    endless = ~np.isfinite(objectives).all(axis=1)
-    verdict[endless], violation[endless] = DesignVerdict.NOT_FINITE, most + 1.0
+    infinite = ~np.isfinite(objectives).all(axis=1)
+    verdict[infinite], violation[infinite] = DesignVerdict.NOT_FINITE, most + 1.0
     counts = np.stack([(status == code).sum(axis=1) for code in Status])
     missing = problem.poses.required - counts[0] / status.shape[1]
     lacking = (missing > 1e-12) | (counts[0] == 0)
-    verdict[lacking] = OF_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
+    verdict[lacking] = VERDICT_BY_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
     violation[lacking] = most + 2.0 + missing[lacking]
     known = np.where(lacking[:, None], np.nan, objectives)
     return Outcome(known, constraints, violation, verdict.astype(np.int8))
 
 
 def join_outcomes(parts: Sequence[Outcome]) -> Outcome:
-    """Outcomes one after the other."""
+    """The outcome of the designs of all parts, one part after the other."""
     if len(parts) == 1:
         return parts[0]
     return Outcome(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
 
 
 def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
-    """Return deviations of as many machines as there are samples, SI, by variable [samples]; the first one has none.
+    """Draw the deviations of machines made to the tolerances, SI, by variable [samples]; the first machine has none.
 
     Args:
         problem: with tolerances and the seed.
-        samples: how many machines, the nominal one included.
-        stream: of random numbers; streams are independent.
+        samples: number of machines, the nominal one included.
+        stream: number of the stream of random numbers; streams are independent.
     """
     source = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
     tolerated = [variable for variable in problem.space.variables if variable.tolerance]
@@ -197,12 +203,12 @@ class Scatter:
     """One objective over many machines of one design, SI.
 
     Attributes:
-        label, unit: of the objective.
-        nominal: of the design itself.
-        mean, deviation: over all machines that can be judged.
-        usual: what 95 percent of them keep within.
-        worst: of all machines, those with every tolerance at an end included.
-        samples: of the random machines; NaN where one cannot be judged.
+        label, unit: name and unit of the objective.
+        nominal: its value for the design itself.
+        mean, deviation: mean and standard deviation over all machines that can be judged.
+        usual: the value that 95 percent of these machines keep within.
+        worst: the worst value of all machines, those with every tolerance at an end included.
+        samples: the values of the random machines; NaN where one cannot be judged.
     """
 
     label: str
@@ -220,9 +226,9 @@ class Robustness:
     """The objectives of a design under its tolerances.
 
     Attributes:
-        scatters: one for each objective.
-        machines: how many random ones.
-        corners: how many combinations of ends of tolerances were tried; 0 if there are too many of them.
+        scatters: the scatter of each objective.
+        machines: number of random machines.
+        corners: number of combinations of ends of tolerances that were tried; 0 if there are too many of them.
         failing: share of the random machines that are not feasible.
     """
 
@@ -249,9 +255,9 @@ def _scatter(assess: Assessor, number: int, made: Outcome, extreme: Outcome) -> 
     samples = made.objectives[:, number]
     known = objective.sign * samples[np.isfinite(samples)]
     ends = objective.sign * extreme.objectives[:, number]
-    every = np.concatenate([known, ends[np.isfinite(ends)]])
+    with_ends = np.concatenate([known, ends[np.isfinite(ends)]])
     if not known.size:
-        known = every = np.array([np.nan])
+        known = with_ends = np.array([np.nan])
     return Scatter(
         objective.term.label,
         objective.term.unit,
@@ -259,6 +265,6 @@ def _scatter(assess: Assessor, number: int, made: Outcome, extreme: Outcome) -> 
         float(objective.sign * known.mean()),
         float(known.std()),
         float(objective.sign * np.quantile(known, 0.95)),
-        float(objective.sign * every.max()),
+        float(objective.sign * with_ends.max()),
         samples,
     )
