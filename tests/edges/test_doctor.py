@@ -16,7 +16,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.commands.doctor import _program_folder, print_checks
 from kinetostat.engine import program_files
-from kinetostat.spec.installation import adding, installing
+from kinetostat.spec.installation import extra_command, install_command
 from kinetostat.studies import diagnosis, self_test
 from kinetostat.studies.diagnosis import InstallationCheck, Soundness, UnsoundError
 from kinetostat.studies.paper import printed
@@ -80,14 +80,14 @@ def test_a_package_that_is_missing(monkeypatch, capsys):
     assert main(["doctor"]) == NO_ANSWER
     text = capsys.readouterr().out
     assert "✗  scipy           is not installed" in text
-    assert f"→ {installing(['scipy>=1.15'])}" in " ".join(text.split())
+    assert f"→ {install_command(['scipy>=1.15'])}" in " ".join(text.split())
     assert "To repair: scipy." in text
 
 
 def test_a_package_that_is_too_old(monkeypatch):
     monkeypatch.setattr(diagnosis, "version", installed_but(numpy="1.26.4"))
     numpy = next(check for check in diagnosis.software_checks() if check.name == "numpy")
-    assert (numpy.state, numpy.fix) == (Soundness.FAILED, installing(["numpy>=2.1"]))
+    assert (numpy.state, numpy.fix) == (Soundness.FAILED, install_command(["numpy>=2.1"]))
     assert numpy.detail == "1.26.4 is installed, but >=2.1 is needed"
 
 
@@ -99,7 +99,7 @@ def test_an_extra_that_is_missing_is_no_failure(monkeypatch):
     monkeypatch.setattr(diagnosis, "version", installed_but(nicegui=None))
     found = list(diagnosis.software_checks())
     studio = next(check for check in found if check.name == "studio")
-    assert (studio.state, studio.fix) == (Soundness.ABSENT, adding("studio"))
+    assert (studio.state, studio.fix) == (Soundness.ABSENT, extra_command("studio"))
     assert diagnosis.healthy(found)
 
 
@@ -107,7 +107,7 @@ def test_not_installed_at_all(monkeypatch):
     monkeypatch.setattr(diagnosis, "version", installed_but(kinetostat=None))
     (only,) = diagnosis.software_checks()
     assert only.state is Soundness.FAILED
-    assert only.fix == installing(["kinetostat"])
+    assert only.fix == install_command(["kinetostat"])
 
 
 def one_digit_off():
@@ -162,5 +162,5 @@ def test_a_broken_library_hides_nothing_else(tmp_path):
     assert "✓ packaging" in said
     assert "✗  vectors         ImportError: wrong processor" in done.stdout
     assert "✗  self-test       cannot be looked at, ImportError: wrong processor" in done.stdout
-    assert installing(["kinetostat"], again=True) in said
+    assert install_command(["kinetostat"], again=True) in said
     assert "none: compiled programs" in done.stdout

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from kinetostat.spec import installation
-from kinetostat.spec.installation import adding, as_typed, command, installing, starting
+from kinetostat.spec.installation import as_typed, command, extra_command, install_command, start_command
 
 NICEGUI = "'nicegui>=3.18'"
 
@@ -42,30 +42,32 @@ def clone(place, monkeypatch):
 
 
 def test_in_a_clone_uv_adds(clone):
-    assert adding("studio") == ".uv/bin/uv sync --inexact --no-dev --extra studio"
-    assert starting("studio", "studio delta") == ".uv/bin/uv run --no-dev --extra studio kinetostat studio delta"
-    assert installing(["numpy>=2.1"], again=True) == ".uv/bin/uv sync --inexact --no-dev --reinstall-package numpy"
+    assert extra_command("studio") == ".uv/bin/uv sync --inexact --no-dev --extra studio"
+    assert start_command("studio", "studio delta") == ".uv/bin/uv run --no-dev --extra studio kinetostat studio delta"
+    assert install_command(["numpy>=2.1"], again=True) == ".uv/bin/uv sync --inexact --no-dev --reinstall-package numpy"
 
 
 def test_from_another_folder_the_clone_is_named(clone, monkeypatch):
     (clone / "elsewhere").mkdir()
-    assert " --project " not in adding("cad")
+    assert " --project " not in extra_command("cad")
     monkeypatch.chdir("/")
-    assert adding("cad").startswith(f"{str(clone)[1:]}/.uv/bin/uv sync --inexact --project {clone} ")
+    assert extra_command("cad").startswith(f"{str(clone)[1:]}/.uv/bin/uv sync --inexact --project {clone} ")
 
 
 def test_with_pip_the_packages_themselves_are_named(place, monkeypatch):
     """No index has kinetostat, and the wheel may be gone."""
     monkeypatch.setattr(installation, "find_spec", lambda name: name == "pip")
-    assert adding("studio") == f".venv/bin/python -m pip install {NICEGUI}"
-    assert starting("studio", "studio") == f".venv/bin/python -m pip install {NICEGUI} && .venv/bin/kinetostat studio"
+    assert extra_command("studio") == f".venv/bin/python -m pip install {NICEGUI}"
+    assert (
+        start_command("studio", "studio") == f".venv/bin/python -m pip install {NICEGUI} && .venv/bin/kinetostat studio"
+    )
     (place / "EXTERNALLY-MANAGED").touch()
     monkeypatch.setattr(sys, "base_prefix", sys.prefix)
-    assert adding("studio") == f".venv/bin/python -m pip install --break-system-packages {NICEGUI}"
+    assert extra_command("studio") == f".venv/bin/python -m pip install --break-system-packages {NICEGUI}"
 
 
 def test_without_pip_uv_installs(place):
-    assert adding("studio") == f"uv pip install --python .venv/bin/python {NICEGUI}"
+    assert extra_command("studio") == f"uv pip install --python .venv/bin/python {NICEGUI}"
 
 
 def test_the_command_is_the_word_or_its_path(place, monkeypatch):
@@ -87,4 +89,4 @@ def test_quoted_commands_are_written_as_they_are_typed(place):
 
 def test_what_is_installed_is_only_started(place, monkeypatch):
     monkeypatch.setattr(installation, "_is_installed", lambda _: True)
-    assert starting("studio", "studio") == ".venv/bin/kinetostat studio"
+    assert start_command("studio", "studio") == ".venv/bin/kinetostat studio"

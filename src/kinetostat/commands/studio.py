@@ -52,11 +52,11 @@ def _port(text: str) -> int:
 def _studio(options: argparse.Namespace) -> int:
     from kinetostat.machine.loading import bundled
     from kinetostat.spec.errors import InputError
-    from kinetostat.spec.installation import adding
+    from kinetostat.spec.installation import extra_command
 
     machine = load_machine(options)
     if find_spec(EXTRA) is None:
-        raise InputError(f"the studio is not installed; install it with `{adding('studio')}`.")
+        raise InputError(f"the studio is not installed; install it with `{extra_command('studio')}`.")
     from kinetostat.studio.design.state_folder import check_state, usual_state
     from kinetostat.studio.serving import serve
 

@@ -22,7 +22,7 @@ from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 
 CHUNK_NUMBERS = 1 << 20
 """Results of one chunk, 8 MB: at least a tenth of a second of work, and little to lose or to keep in memory."""
@@ -110,7 +110,7 @@ def compute_with(crew: Crew) -> Iterator[Compute]:
     try:
         import distributed
     except ModuleNotFoundError:
-        raise InputError(DASK_MISSING.format(adding("cluster"))) from None
+        raise InputError(DASK_MISSING.format(extra_command("cluster"))) from None
     with _client(distributed, crew) as client:
         _check_versions(client)
 

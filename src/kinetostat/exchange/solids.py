@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_bytes
 from kinetostat.views.scene.glb import glb
@@ -41,7 +41,7 @@ def _write(content: bytes, path: Path) -> list[Path]:
 
 def _step_writer() -> Any:
     if find_spec("OCP") is None:
-        raise InputError(NEEDED + MISSING.format(adding("cad")))
+        raise InputError(NEEDED + MISSING.format(extra_command("cad")))
     try:
         return import_module("kinetostat.exchange.step_file")
     except ImportError as error:

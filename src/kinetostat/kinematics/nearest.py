@@ -14,25 +14,26 @@ from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8
-"""Towards the nearest pose; and of Newton's method, which closes the legs again after each of them."""
+"""Number of steps towards the nearest pose, and of Newton's corrections that close the legs again after each step."""
 DAMPINGS: Array = 5.0 ** np.arange(-3.0, 6.0)
 """Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
 CLOSING_CONTRACTION = 0.25
 """Share of a gap that a correction may leave; a step from which it leaves more was too long."""
-BESIDE = 1e-6
-"""Displacement of the unknowns, rad or in units of the machine's length, whose rates show how ways are curved."""
+CURVATURE_STEP = 1e-6
+"""Displacement of the unknowns, rad or in units of the machine's length, for differences of the rates."""
 NEARLY_CLOSED = 1e-3
-"""Gap of the legs after a step, as a share of its square, that is left to the next step: what a step gains in distance
-falls with the same square."""
+"""Gap of the legs that may be left after a step, as a share of the step's square: the distance that a step gains falls
+with the same square, so that closing the legs better would be wasted."""
 LONG_STEP = 0.1
-"""Size of a step, rad or in units of the machine's length, from which this gap grows no more."""
+"""Size of a step, rad or in units of the machine's length, beyond which this gap does not grow."""
 
 
 def nearest_pose(machine: Machine) -> dict[str, float]:
     """Return all coordinates (m, rad) of an admissible pose near a pose that the legs cannot take.
 
-    Distance is that of the pose coordinates given, angles times the machine's characteristic length. From the home pose
-    it becomes less step by step, along what the closed legs allow, so that the branch of the home pose is kept.
+    The distance is measured in the coordinates that the pose gives, angles times the machine's characteristic length.
+    The search starts at the home pose and lowers the distance step by step with closed legs, so that it stays in the
+    assembly mode of the home pose.
     """
     chains = machine.chains()
     names = tuple(name for name in (*POINT, *ANGLES) if name in {*chains.pose, *free_coordinates(chains)})
@@ -56,8 +57,8 @@ class _Search:
     Attributes:
         problems: the equations of all legs, with every coordinate of the pose free.
         home: coordinates of the platform at the home pose.
-        rows: which unknowns have a goal.
-        goal: theirs.
+        rows: numbers of the unknowns that have a goal.
+        goal: the values that these unknowns should have.
     """
 
     problems: Problems
@@ -66,48 +67,49 @@ class _Search:
     goal: Array
 
     def nearest(self) -> Array:
-        """Go on from the home pose until the next step would lead nearer by less than the figures show.
+        """Return the unknowns at the nearest pose, found from the home pose by damped Newton steps.
 
-        Each step is Newton's for the squared distance, along the ways that the legs allow. It is tried with several
-        dampings, which are added to the curvatures; these count without their sign, so that every step leads nearer.
+        Each step minimises the squared distance along the motions that the closed legs allow. It is tried with several
+        dampings, which are added to the absolute values of the curvatures, so that every step leads nearer. The search
+        ends when the next step would gain less than people see in the numbers.
         """
         best, damping = np.zeros(self.problems.size), 1e-3
         gap, rates = (each[0] for each in self.problems.gaps(best[None], self.home))
         for _ in range(MOST_STEPS):
-            pull = np.zeros(len(best))
-            pull[self.rows] = self.goal - best[self.rows]
-            far, ways = np.linalg.norm(pull), _ways(rates)
-            loads = np.linalg.lstsq(rates.T, pull, rcond=DEPENDENT)[0]
-            sizes, turn = np.linalg.eigh(self._curvature(best, rates, ways, loads))
-            along, stiff = ways @ turn, np.maximum(np.abs(sizes), DEPENDENT)
-            slope = along.T @ pull
-            tried = damping * DAMPINGS
-            steps = slope / (stiff + tried[:, None]) @ along.T
-            settled = slope @ (slope / stiff) <= NEAREST_GAIN * far * far
+            to_goal = np.zeros(len(best))
+            to_goal[self.rows] = self.goal - best[self.rows]
+            distance, ways = np.linalg.norm(to_goal), _ways(rates)
+            loads = np.linalg.lstsq(rates.T, to_goal, rcond=DEPENDENT)[0]
+            curvatures, turn = np.linalg.eigh(self._curvature(best, rates, ways, loads))
+            along, stiff = ways @ turn, np.maximum(np.abs(curvatures), DEPENDENT)
+            slope = along.T @ to_goal
+            dampings = damping * DAMPINGS
+            steps = slope / (stiff + dampings[:, None]) @ along.T
+            settled = slope @ (slope / stiff) <= NEAREST_GAIN * distance * distance
             ends, gaps, rates_there = self._closed_ends(best, steps[:1] if settled else steps)
-            worth = self._half_squares(ends, gaps, loads)
-            least = int(np.argmin(np.where(np.isfinite(worth), worth, np.inf)))
-            if worth[least] < self._half_squares(best[None], gap[None], loads)[0]:
-                best, gap, rates, damping = ends[least], gaps[least], rates_there[least], float(tried[least])
+            squares = self._half_squares(ends, gaps, loads)
+            least = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
+            if squares[least] < self._half_squares(best[None], gap[None], loads)[0]:
+                best, gap, rates, damping = ends[least], gaps[least], rates_there[least], float(dampings[least])
             else:
-                damping = float(tried[-1])
+                damping = float(dampings[-1])
             if settled:
                 break
         return self._closed_ends(best, 0.0 * best[None])[0][0]
 
     def _curvature(self, best: Array, rates: Array, ways: Array, loads: Array) -> Array:
-        """The curvature of half the squared distance along the ways [ways x ways], those of the closed legs included.
+        """The curvature of half the squared distance along the ways, with that of the closed legs [ways x ways].
 
         Args:
-            best: unknowns that nearly close them [unknowns].
+            best: unknowns that nearly close the legs [unknowns].
             rates: the rates of the gaps there [rows x unknowns].
-            ways: along which they stay closed to first order [unknowns x ways].
+            ways: directions in which the legs stay closed to first order [unknowns x ways].
             loads: Lagrange's multipliers: how strongly each gap keeps the unknowns from the goal [rows].
         """
         problems = self.problems.take(np.zeros(ways.shape[1], dtype=int))
-        beside = problems.gaps(best + BESIDE * ways.T, self.home)[1]
-        bent = np.einsum("r,nrc->nc", loads, beside - rates) @ ways / BESIDE
-        return np.asarray(ways[self.rows].T @ ways[self.rows] + 0.5 * (bent + bent.T))
+        rates_beside = problems.gaps(best + CURVATURE_STEP * ways.T, self.home)[1]
+        of_legs = np.einsum("r,nrc->nc", loads, rates_beside - rates) @ ways / CURVATURE_STEP
+        return np.asarray(ways[self.rows].T @ ways[self.rows] + 0.5 * (of_legs + of_legs.T))
 
     def _half_squares(self, ends: Array, gaps: Array, loads: Array) -> Array:
         """Half the squared distances from the goal as they will be once the gaps that are left are closed [n]."""
@@ -117,11 +119,12 @@ class _Search:
         """Close the legs again after steps, wherever that takes the platform.
 
         Args:
-            start: unknowns that nearly close them [unknowns].
+            start: unknowns that nearly close the legs [unknowns].
             steps: the steps from there [n x unknowns].
 
         Returns:
-            Unknowns that nearly close them, NaN where that fails; the gaps that are left there, and their rates.
+            Unknowns that nearly close the legs, NaN where that fails [n x unknowns]; the gaps that are left there
+            [n x rows], and their rates [n x rows x unknowns].
         """
         count = len(steps)
         problems = self.problems.take(np.zeros(count, dtype=int))

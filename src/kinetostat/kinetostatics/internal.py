@@ -1,7 +1,7 @@
 """Internal loads: wrenches that legs exert on each other through the platform without any load on it. One pose.
 
-Elasticity decides them where something on their way deflects; where all is rigid, statics leaves them undecided, and no
-motion of the platform depends on them.
+If a spring on their way deflects, elasticity decides how large they are. If everything is rigid, they are undecided,
+and no motion of the platform depends on them.
 
 Source: theory (9) and theory section 7.
 """
@@ -24,10 +24,10 @@ class InternalLoads:
     """Statically indeterminate loads of a machine.
 
     Attributes:
-        degree: how many independent internal loads the legs can carry: 0 for an isostatic machine.
-        undecided: how many of them meet only rigid parts.
-        legs: names of the legs that take part.
-        undecided_legs: names of the legs that take part in undecided ones.
+        degree: number of independent internal loads that the legs can carry: 0 for an isostatic machine.
+        undecided: number of these that deflect no spring.
+        legs: names of the legs that carry internal loads.
+        undecided_legs: names of the legs that carry undecided ones.
     """
 
     degree: int
@@ -41,11 +41,14 @@ def internal_loads(
 ) -> InternalLoads:
     """The internal loads of a machine at a regular pose.
 
+    They are the null space of the matrix whose columns are the wrenches of all legs (and of the guide): amounts of
+    these wrenches that add up to zero on the platform. Those among them that load no elastic spring are undecided.
+
     Args:
-        names: of the legs.
+        names: names of the legs.
         legs: their screws at one reference point, base axes.
-        length: characteristic length, m; moments compare with forces through it.
-        guide: of a planar machine, the wrenches against twists that do not exist there.
+        length: characteristic length, m, by which moments are divided to compare them with forces.
+        guide: the wrenches by which a planar machine is kept in its plane; none for a spatial machine.
     """
     balanced = [free_springs_as_joints(leg) for leg in legs]
     owners = np.repeat(np.arange(len(legs)), [len(leg.wrenches) for leg in balanced])
@@ -57,8 +60,8 @@ def internal_loads(
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)
     internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
-    _, seen, modes = np.linalg.svd(_load_shares(balanced) @ internal)
-    decided = int((seen > CLOSING_ROUND_OFF).sum())
+    _, elastic, modes = np.linalg.svd(_load_shares(balanced) @ internal)
+    decided = int((elastic > CLOSING_ROUND_OFF).sum())
     undecided = internal @ modes[decided:].T
     return InternalLoads(
         internal.shape[1],
@@ -69,17 +72,17 @@ def internal_loads(
 
 
 def _load_shares(legs: Sequence[LegScrews]) -> Array:
-    """Loads in the springs that deflect, as shares of what they may be, per unit of the wrenches of all legs."""
+    """Load in each elastic spring per unit of each leg's wrenches, over its order of size [springs x wrenches]."""
     rows: list[Array] = []
-    every = sum(len(leg.wrenches) for leg in legs)
-    at = 0
+    count = sum(len(leg.wrenches) for leg in legs)
+    start = 0
     for leg in legs:
         for loads, compliance, square in zip(leg.loads, leg.compliance, leg.load_squares, strict=True):
             if compliance > 0.0:
-                rows.append(np.zeros(every))
-                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / math.sqrt(square)
-        at += len(leg.wrenches)
-    return np.array(rows).reshape(len(rows), every)
+                rows.append(np.zeros(count))
+                rows[-1][start : start + len(loads)] = np.array(loads, dtype=float) / math.sqrt(square)
+        start += len(leg.wrenches)
+    return np.array(rows).reshape(len(rows), count)
 
 
 def _involved_legs(names: Sequence[str], owners: Integers, loads: Array) -> tuple[str, ...]:

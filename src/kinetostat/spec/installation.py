@@ -1,7 +1,7 @@
-"""The installation at hand: how its command is typed, and which command adds to it what is missing.
+"""The installation at hand: how `kinetostat` is typed in it, and the commands that install what is missing.
 
 No package index has kinetostat, so a hint must not say `pip install kinetostat`. There are three cases: a clone whose
-environment uv keeps (`uv sync` adds), any other environment with pip, and one without pip, which uv has made.
+environment uv keeps (`uv sync` installs into it), any other environment with pip, and one made by uv without pip.
 """
 
 import os
@@ -25,37 +25,37 @@ def command() -> str:
     known = shutil.which(PACKAGE, path=_path_of_shell())
     if known and Path(known).resolve() == script.resolve():
         return PACKAGE
-    return _local(script) if shutil.which(script) else f"{_python()} -m {PACKAGE}"
+    return _short_path(script) if shutil.which(script) else f"{_python()} -m {PACKAGE}"
 
 
 def as_typed(text: str) -> str:
-    """Return a message or a help text in which every quoted command is written as it works here."""
+    """Return a message or a help text in which every quoted command is written as it is typed in this installation."""
     name = command()
     return text if name == PACKAGE else QUOTED.sub(lambda quoted: f"{quoted[1]}{name} ", text)
 
 
-def adding(extra: str) -> str:
+def extra_command(extra: str) -> str:
     """Return the command that installs what an extra needs, for example "studio"."""
     clone = _clone_of_uv()
-    return f"{clone} --extra {extra}" if clone else installing(_requirements_of(extra))
+    return f"{clone} --extra {extra}" if clone else install_command(_requirements_of(extra))
 
 
-def starting(extra: str, words: str) -> str:
-    """Return one command that starts `kinetostat` with these words, and installs an extra before if it must."""
+def start_command(extra: str, words: str) -> str:
+    """Return one command that starts `kinetostat` with these words, after installing an extra if that is missing."""
     if all(_is_installed(requirement) for requirement in _requirements_of(extra)):
         return f"{command()} {words}"
     clone = _clone_of_uv()
     if clone:
         return f"{clone.replace('sync --inexact', 'run')} --extra {extra} {PACKAGE} {words}"
-    return f"{installing(_requirements_of(extra))} && {command()} {words}"
+    return f"{install_command(_requirements_of(extra))} && {command()} {words}"
 
 
-def installing(packages: Iterable[str], again: bool = False) -> str:
-    """Return the command that installs packages; `again` also replaces those that are there but broken."""
+def install_command(packages: Iterable[str], again: bool = False) -> str:
+    """Return the command that installs packages; with `again`, it also replaces those that are installed but broken."""
     clone = _clone_of_uv()
     if clone:
         return clone + "".join(f" --reinstall-package {re.split('[<>=]', package)[0]}" for package in packages if again)
-    names = " ".join(shlex.quote(_place() if package == PACKAGE else package) for package in packages)
+    names = " ".join(shlex.quote(_source_of_package() if package == PACKAGE else package) for package in packages)
     if find_spec("pip") is None:
         return f"{_uv() or 'uv'} pip install --python {_python()} {'--reinstall ' if again else ''}{names}"
     managed = sys.prefix == sys.base_prefix and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
@@ -64,13 +64,13 @@ def installing(packages: Iterable[str], again: bool = False) -> str:
 
 
 def source_tree() -> Path | None:
-    """Return the clone from which this package runs; None where the package is a copy."""
+    """Return the clone from which this package runs; None if the package was copied into an environment."""
     root = Path(__file__).parents[3]
     return root if (root / "pyproject.toml").exists() else None
 
 
 def _clone_of_uv() -> str:
-    """Return the beginning of `uv sync` for the clone whose own environment this is; empty where there is none."""
+    """Return the beginning of `uv sync` if this is the environment of a clone that uv keeps, else an empty text."""
     root, uv = source_tree(), _uv()
     if root is None or not uv or Path(sys.prefix).resolve() != (root / ".venv").resolve():
         return ""
@@ -82,7 +82,7 @@ def _uv() -> str | None:
     root = source_tree()
     beside = [root / ".uv" / "bin" / "uv"] if root else []
     path = next((str(uv) for uv in beside if uv.exists()), None) or os.environ.get("UV") or shutil.which("uv")
-    return _local(Path(path)) if path and shutil.which(path) else None
+    return _short_path(Path(path)) if path and shutil.which(path) else None
 
 
 def _requirements_of(extra: str) -> list[str]:
@@ -92,7 +92,7 @@ def _requirements_of(extra: str) -> list[str]:
     try:
         texts = requires(PACKAGE) or []
     except PackageNotFoundError:
-        return [f"{_place()}[{extra}]"]
+        return [f"{_source_of_package()}[{extra}]"]
     marked = re.compile(rf"""extra\s*==\s*["']{extra}["']""")
     return [text.partition(";")[0].strip() for text in texts if marked.search(text)]
 
@@ -106,8 +106,8 @@ def _is_installed(requirement: str) -> bool:
         return False
 
 
-def _place() -> str:
-    """Return where kinetostat was installed from; the name of its wheel where that is not known or no longer there."""
+def _source_of_package() -> str:
+    """Return the path from which kinetostat was installed; the name of its wheel if that is unknown or gone."""
     import json
     from importlib.metadata import PackageNotFoundError, distribution
 
@@ -126,7 +126,9 @@ def _place() -> str:
 
 def _python() -> str:
     python = shutil.which("python", path=_path_of_shell())
-    return "python" if python and Path(python).parent == Path(sys.executable).parent else _local(Path(sys.executable))
+    return (
+        "python" if python and Path(python).parent == Path(sys.executable).parent else _short_path(Path(sys.executable))
+    )
 
 
 def _path_of_shell() -> str:
@@ -138,7 +140,7 @@ def _path_of_shell() -> str:
     return os.pathsep.join(folders)
 
 
-def _local(path: Path) -> str:
-    """Return a path from the present folder where it leads downwards, else the whole path."""
+def _short_path(path: Path) -> str:
+    """Return a path relative to the present folder if it lies below it, else the whole path, quoted for a shell."""
     here = Path.cwd()
     return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))

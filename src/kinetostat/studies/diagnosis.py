@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinetostat.frozen import dataclass
 from kinetostat.late import ARRAY_LIBRARIES, show_array_libraries
-from kinetostat.spec.installation import adding, installing
+from kinetostat.spec.installation import extra_command, install_command
 from kinetostat.spec.renamed import with_former_keys
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _first_line(trouble: Exception) -> str:
 
 def reinstall(packages: str) -> str:
     """The command that mends packages."""
-    return installing(packages.split(), again=True)
+    return install_command(packages.split(), again=True)
 
 
 def diagnose() -> Iterator[InstallationCheck]:
@@ -126,7 +126,7 @@ def software_checks() -> Iterator[InstallationCheck]:
         yield InstallationCheck(group, PACKAGE, Soundness.SOUND, version(PACKAGE))
     except PackageNotFoundError:
         text = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield InstallationCheck(group, PACKAGE, Soundness.FAILED, text, installing([PACKAGE]))
+        yield InstallationCheck(group, PACKAGE, Soundness.FAILED, text, install_command([PACKAGE]))
         return
     python = f"{platform.python_version()} ({platform.python_implementation()})"
     yield InstallationCheck(group, "python", Soundness.SOUND, python)
@@ -155,10 +155,10 @@ def _package_state(requirement: "Requirement") -> tuple[Soundness, str, str]:
     wanted = f"{requirement.name}{requirement.specifier}"
     present = _installed_version(requirement)
     if present is None:
-        return Soundness.FAILED, "is not installed", installing([wanted])
+        return Soundness.FAILED, "is not installed", install_command([wanted])
     if not requirement.specifier.contains(present, prereleases=True):
         text = f"{present} is installed, but {requirement.specifier} is needed"
-        return Soundness.FAILED, text, installing([wanted])
+        return Soundness.FAILED, text, install_command([wanted])
     try:
         import_module(LOADED_MODULES[requirement.name.lower()])
     except Exception as trouble:
@@ -173,7 +173,7 @@ def _extra_check(extra: str) -> InstallationCheck:
     missing = [name for name, present in known.items() if present is None]
     if missing:
         text = f"not installed ({', '.join(missing)})"
-        return InstallationCheck("extras", extra, Soundness.ABSENT, text, adding(extra))
+        return InstallationCheck("extras", extra, Soundness.ABSENT, text, extra_command(extra))
     versions = ", ".join(f"{name} {present}" for name, present in known.items())
     return InstallationCheck("extras", extra, Soundness.SOUND, versions)
 

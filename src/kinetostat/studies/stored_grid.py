@@ -1,4 +1,8 @@
-"""Grids of any size: answered chunk by chunk into the folder of a study, so that nothing is lost when it is stopped."""
+"""Answers for grids of any size: chunk by chunk into a folder, so that nothing is lost when the work is stopped.
+
+The numbers lie in one NetCDF file at fixed places; a history beside it notes each chunk that is whole, with a checksum.
+Resuming computes the chunks that are missing or damaged. The format of the file is in `result_file`.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -34,13 +38,14 @@ from kinetostat.studies.storage import settle, writing
 from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_study, read_question, study_folder
 
 MOST_NUMBERS = 10_000_000_000
-"""Points times quantities of one grid: 80 GB."""
+"""Greatest number of points times quantities of one grid: 80 GB."""
 GRID_STUDY_VERSION = 1
+"""Version of the question that a folder keeps."""
 LAYOUT = "layout"
-"""Key of the layout of the file in the question of a folder."""
+"""Key under which the question of a folder has the layout of its file."""
 
 Layout = dict[str, Any]
-"""Places of the numbers in a file, and the checksum of all else: plain data from `result_file.create`."""
+"""Places of the numbers in a file, and the checksum of everything else: plain data from `result_file.create`."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +62,8 @@ class Tally:
     """Counts and extremes over all points of a grid.
 
     Attributes:
-        statuses: how many points have each status.
-        extremes: of each quantity.
+        statuses: number of points that have each status.
+        extremes: extremes of each quantity, by name.
     """
 
     statuses: dict[Status, int]
@@ -75,12 +80,12 @@ class StoredGrid:
     """The answer to a question about a grid, in a file.
 
     Attributes:
-        question: that is answered.
-        path: of the NetCDF file.
-        tally: how many points have which status, and the extremes of each quantity.
-        chunks: in all.
-        computed: how many of them now; the others were there.
-        repaired: what was there, damaged, and has been computed again, in words; empty if nothing.
+        question: the question that is answered.
+        path: path of the NetCDF file.
+        tally: counts and extremes over all points.
+        chunks: number of all chunks.
+        computed: number of chunks that were computed now; the others were in the folder.
+        repaired: the parts of the folder that were damaged and were computed again, in words; empty if none were.
         unchecked: whether the folder was begun without checksums.
     """
 
@@ -101,17 +106,17 @@ def answer_into(
     compute: Compute = in_this_process,
     resume: bool = False,
 ) -> StoredGrid:
-    """Answer a question about a grid into FOLDER/STEM.nc; go on with what the folder holds of the same answer.
+    """Answer a question about a grid into FOLDER/STEM.nc; continue if the folder holds a part of the same answer.
 
-    The file is called STEM.partial.nc until it is whole; in it, status -1 marks what is not computed yet.
+    The file is called STEM.partial.nc until it is whole; in it, status -1 marks points that are not computed yet.
 
     Args:
-        question: of any size that the disk holds.
-        folder: of this study alone.
+        question: a question of any size that the disk holds.
+        folder: a folder for this study alone.
         stem: name of the file.
-        progress: receives how far the work is.
-        compute: where chunks are computed; results are the same bit for bit.
-        resume: insist that the folder holds a part of the answer.
+        progress: receives the number of points done, and that of all.
+        compute: computes chunks, here or in other processes; results are the same bit for bit.
+        resume: refuse a folder that holds no part of the answer.
 
     Raises:
         InputError: too many points, no space, another study or another process in the folder, nothing to resume.
@@ -123,8 +128,8 @@ def answer_into(
     if not holds_study(folder):
         _check_room(question, final)
     with study_folder(folder) as study:
-        work, layout = _taken_up(question, study, final)
-        repaired = "" if layout is None else _without_damage(question, study, final, work, layout)
+        work, layout = _begin_or_continue(question, study, final)
+        repaired = "" if layout is None else _repair(question, study, final, work, layout)
         known = study.records()
         missing = [number for number in range(work.count) if number not in known]
         if missing:
@@ -157,8 +162,8 @@ def _partial(final: Path) -> Path:
     return final.with_suffix(f".partial{final.suffix}")
 
 
-def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[Work, Layout | None]:
-    """The work as the folder has it, or new work where it has none, and the layout of its file if it is known."""
+def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[Work, Layout | None]:
+    """Begin the study, or take its work from the folder; the layout is None in a folder from before layouts."""
     work = in_chunks(question.machine, question.grid, question.names)
     wanted = _as_record(question, final.name)
     stored = study.question(wanted, _in_this_version)
@@ -176,8 +181,11 @@ def _create(question: GridQuestion, final: Path) -> Layout:
     return create(_partial(final), question.labels, question.dims, attributes)
 
 
-def _without_damage(question: GridQuestion, study: StudyFolder, final: Path, work: Work, layout: Layout) -> str:
-    """Forget the chunks that are damaged, make the file again where more than its numbers is, and say what it was."""
+def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work, layout: Layout) -> str:
+    """Forget damaged chunks, so that they are computed again, and return what was damaged in words.
+
+    A file whose structure is damaged is made again, and the numbers of its sound chunks are copied.
+    """
     path = final if final.exists() else _partial(final)
     records = study.records()
     lost = study.damaged
@@ -205,10 +213,10 @@ def damaged_chunks(path: Path, layout: Layout, records: Mapping[int, Record], ch
     """Return the numbers of the chunks whose numbers in a file are not those that were written.
 
     Args:
-        path: of the file.
-        layout: of it.
-        records: what was noted about chunks.
-        chunk: points of one.
+        path: path of the file.
+        layout: its layout.
+        records: the notes about its chunks, by number.
+        chunk: number of points of a chunk.
     """
     with path.open("rb") as stream:
         return {
@@ -225,7 +233,7 @@ def _about_status() -> Mapping[str, Any]:
 
 
 def _as_record(question: GridQuestion, file: str) -> Record:
-    """Everything that the numbers depend on: a folder with another record holds another study."""
+    """Everything on which the numbers depend: a folder with another record holds another study."""
     attributes = question.labels.attrs
     axes = [
         {"field": field, "from": float(axis.values[0]), "to": float(axis.values[-1]), "count": len(axis.values)}
@@ -250,14 +258,14 @@ def _in_this_version(stored: Record) -> Record:
 
 
 def _text_of(machine: Machine) -> str:
-    """A machine as a question has it: how results are shown does not part a study from the one that it continues."""
+    """A machine as text for the question, without its units of display: these do not make it another study."""
     return as_toml(replace(machine, display=ENGINEERING))
 
 
 def _compute_missing(
     work: Work, missing: Sequence[int], path: Path, study: StudyFolder, progress: Progress, compute: Compute
 ) -> None:
-    """Compute chunks; while one is computed, the one before is written."""
+    """Compute chunks; a thread writes each of them while the next one is computed."""
     total = work.points.size
     done = total - sum(len(work.part(number)) for number in missing)
     progress(done, total)
@@ -266,20 +274,21 @@ def _compute_missing(
         for number, evaluation in compute(work, missing):
             if pending:
                 pending.result()
-            pending = writer.submit(_keep, file, study, number, work.part(number).start, evaluation)
+            pending = writer.submit(_write_chunk, file, study, number, work.part(number).start, evaluation)
             done += len(evaluation.status)
             progress(done, total)
         if pending:
             pending.result()
 
 
-def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, evaluation: Evaluation) -> None:
+def _write_chunk(file: ResultFile, study: StudyFolder, number: int, start: int, evaluation: Evaluation) -> None:
+    """Write the numbers first, and then the note that they are there."""
     written = file.write(start, evaluation.values, evaluation.status)
     study.note({"chunk": number, **tally(evaluation), DATA: written})
 
 
 def tally(evaluation: Evaluation) -> dict[str, Any]:
-    """Count and bound the results of one chunk, as plain data."""
+    """Return the counts and extremes of one chunk, as plain data."""
     codes, counts = np.unique(evaluation.status, return_counts=True)
     quantities = {}
     for name, values in evaluation.values.items():
@@ -294,12 +303,12 @@ def tally(evaluation: Evaluation) -> dict[str, Any]:
 
 def tally_of(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
     """Combine counts and extremes of several chunks."""
-    kept = list(parts)
+    chunks = list(parts)
     words: Counter[str] = Counter()
-    for part in kept:
+    for part in chunks:
         words.update(part["status"])
     statuses = {status: words[status.word] for status in Status if words[status.word]}
-    return Tally(statuses, {name: _extremes([part["quantities"][name] for part in kept]) for name in names})
+    return Tally(statuses, {name: _extremes([part["quantities"][name] for part in chunks]) for name in names})
 
 
 def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:

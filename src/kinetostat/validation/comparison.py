@@ -23,7 +23,7 @@ from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
@@ -82,7 +82,9 @@ class Engine:
     def _answer_of(self, question: Callable[[], Any]) -> Any:
         """Answer of the engine to a question; its trouble is an InputError."""
         if self.version is None:
-            raise InputError(f"The engine {self.name} is not installed. {INSTALL_ENGINE.format(adding('validate'))}")
+            raise InputError(
+                f"The engine {self.name} is not installed. {INSTALL_ENGINE.format(extra_command('validate'))}"
+            )
         try:
             return question()
         except InputError:
@@ -168,9 +170,8 @@ def choose(name: str | None) -> Engine:
         installed = [engine for engine in KNOWN if engine.version is not None]
         if not installed:
             names = " or ".join(engine.package for engine in KNOWN)
-            raise InputError(
-                f"No independent engine is installed; {names} can be used. {INSTALL_ENGINE.format(adding('validate'))}"
-            )
+            hint = INSTALL_ENGINE.format(extra_command("validate"))
+            raise InputError(f"No independent engine is installed; {names} can be used. {hint}")
         return installed[0]
     named = [engine for engine in KNOWN if engine.name == name]
     if not named:

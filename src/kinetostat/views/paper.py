@@ -22,7 +22,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
-from kinetostat.spec.installation import command, starting
+from kinetostat.spec.installation import command, start_command
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
 from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
@@ -84,7 +84,7 @@ def print_summary(console: Console, reproduction: Reproduction, written: Sequenc
     more = "" if full else "; --full prints every number, equation and statement"
     console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{more}", highlight=False)
     console.print("next:", highlight=False)
-    for line in (f"{command()} analyze tripteron", starting("studio", "studio")):
+    for line in (f"{command()} analyze tripteron", start_command("studio", "studio")):
         console.print(f"  {line}", highlight=False, soft_wrap=True)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import matplotlib as mpl
 
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.views.report.content import Block, Figure, Formula, Report, Section
 
 TEMPLATE = Path(__file__).with_name("report.typ")
@@ -32,7 +32,7 @@ def check_typst() -> None:
         InputError: it is not; the message says how to install it.
     """
     if find_spec("typst") is None:
-        raise InputError(INSTALL_TYPST.format(adding("report")))
+        raise InputError(INSTALL_TYPST.format(extra_command("report")))
 
 
 def pdf_bytes(report: Report) -> bytes:

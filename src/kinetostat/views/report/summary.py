@@ -11,7 +11,7 @@ from kinetostat.display import Display
 from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.fields import NO_LIMIT
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranking_of
 from kinetostat.studies.guideline_sentences import statements
@@ -106,7 +106,7 @@ def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figur
     machine, turning = analysis.machine, live and can_be_live()
     caption = f"{machine.name} at its pose: actuated legs blue, passive ones orange."
     if live and not turning:
-        caption += NO_RENDERER.format(adding("report"))
+        caption += NO_RENDERER.format(extra_command("report"))
     if turning and pictures.factor is not None:
         caption += f" Deflections are drawn {pictures.factor:,.6g} times as large as they are."
     if turning and pictures.swings:
