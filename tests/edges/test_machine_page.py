@@ -14,12 +14,14 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.attribution import by_part
 from kinetostat.views.live_page import viewer
+from kinetostat.views.scene.anatomy import anatomy
 
 POSES = 1000
 AGREED = 1e-12
@@ -31,6 +33,13 @@ PROGRAMS = """rows => rows.map(row => {
     const status = opened.programs.answers(row, out);
     return [status, ...Array.from(out, x => Number.isFinite(x) ? x : String(x))];
 })"""
+
+PLACES = """() => {
+    const { data, programs } = opened, first = data.actuators.length + 12;
+    const out = new Float64Array(first + 3 * data.drawing.points);
+    programs.places(data.inputs.map(({ home }) => home), out);
+    return [data.drawing, Array.from(out.slice(first))];
+}"""
 
 
 def printable():
@@ -257,9 +266,24 @@ def test_formulas_of_every_machine_are_those_of_the_engine(pages):
             ok = codes == Status.OK
             assert ok.sum() > 20, name
             assert worst(numbers[ok], np.stack([expected.values[e] for e in ENTRIES], axis=1)[ok]) < AGREED, name
+            joins_what_the_scene_joins(machine, *watched.tab.evaluate(PLACES))
             assert not watched.complaints
             assert watched.hosts <= {""}
             watched.tab.close()
+
+
+def joins_what_the_scene_joins(machine, drawing, points):
+    """Links of the picture end where those of the scene do, at the pose of the file."""
+    points = np.array(points).reshape(-1, 3)
+    legs = [anatomy(leg) for leg in state_of(machine).configuration.legs]
+    for leg, drawn in zip(legs, drawing["legs"], strict=True):
+        for end, number in ((leg.foot, drawn["foot"]), (leg.head, drawn["head"])):
+            assert points[number] == pytest.approx(end.components(), abs=1e-9), leg.leg
+        for link, (kind, _, length, *pairs) in zip(leg.links, drawn["links"], strict=True):
+            assert (kind, len(pairs)) == (link.kind, 2 if kind == "bars" else 1)
+            for start, end in pairs:
+                assert points[end] - points[start] == pytest.approx(link.span.components(), abs=1e-9), link.name
+                assert length == pytest.approx(link.span.norm())
 
 
 def worst(found, expected):

@@ -25,6 +25,8 @@ from kinetostat.kinetostatics.assembly import compliance_shares
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
@@ -238,14 +240,20 @@ class TracedPlacement:
 
     Attributes:
         formula: whose results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
-            and the points of the legs (m), in the base frame; its code is the `Status` by reach alone.
+            and the `drawn_points` of the legs (m), in the base frame; its code is the `Status` by reach alone.
         actuators: with traced coordinates.
-        legs: name of each leg, and number of its points, from base to platform.
     """
 
     formula: TracedFormula
     actuators: tuple[Actuator, ...]
-    legs: tuple[tuple[str, int], ...]
+
+
+def drawn_points(leg: Leg) -> list[Vector]:
+    """Return the points of a leg that a drawing joins, base frame, m: of its joints, links and springs, ends of bars."""
+    path = [point for element in leg.chain for point in element.path]
+    path += [spring.joint.point for spring in leg.springs if spring.joint.point is not None]
+    pairs = [element.bars for element in leg.chain if isinstance(element, Parallelogram)]
+    return path + [end for bars in pairs for bar in bars for end in bar]
 
 
 def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool) -> TracedPlacement:
@@ -269,14 +277,13 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
         status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
     platform = configuration.platform
     tool = platform.apply(Vector(*given.machine.tables["tool"].offset))
-    points = [[point for element in leg.chain for point in element.path] for leg in configuration.legs]
-    vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *(p for row in points for p in row)]
+    points = [point for leg in configuration.legs for point in drawn_points(leg)]
+    vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *points]
     wanted = [actuator.coordinate for actuator in actuators] + [c for vector in vectors for c in vector.components()]
     accepted = status < Status.OK + 0.5
     results = [result_of(where(accepted, value, math.nan)) for value in wanted]
     formula = formula_of(given, (), results, result_of(status), paths)
-    legs = zip((leg.name for leg in configuration.legs), map(len, points), strict=True)
-    return TracedPlacement(formula, tuple(actuators), tuple(legs))
+    return TracedPlacement(formula, tuple(actuators))
 
 
 @dataclass(frozen=True)

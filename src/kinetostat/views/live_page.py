@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.engine.form import objectives_of, step_of
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.engine.form import drawn_points, objectives_of, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.machine_functions import (
@@ -36,12 +37,17 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import CLOSED
 from kinetostat.units import KINDS
 from kinetostat.views.page import whole_page
+from kinetostat.views.scene.anatomy import anatomy
+from kinetostat.views.scene.leg_solids import rail_ends
+from kinetostat.views.scene.machine_scene import has_open_frame, plates
+from kinetostat.views.scene.proportions import proportions_of
 
 TEMPLATES = Path(__file__).with_name("live")
 SPAN, TURN, SHARE = 0.4, math.radians(30.0), 0.5
@@ -136,6 +142,7 @@ def _page(name: str, content: object) -> str:
         "name": escape(name),
         "version": version("kinetostat"),
         "machine": json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "picture": (TEMPLATES / "picture.js").read_text("utf-8"),
         "script": (TEMPLATES / "page.js").read_text("utf-8"),
         "formulas": (TEMPLATES / "formulas.js")
         .read_text("utf-8")
@@ -191,7 +198,7 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "name": machine.name,
         "inputs": rows,
         "actuators": [{"name": a.name, "si": a.unit} for a in functions.actuators],
-        "legs": functions.placement.legs,
+        "drawing": _drawing(machine),
         "parts": functions.shares.parts,
         "quantities": quantities,
         "planar": machine.family.planar,
@@ -203,6 +210,49 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "file": as_toml(machine),
         "fileName": f"{stem}.toml",
     }
+
+
+def _drawing(machine: Machine) -> dict[str, Any]:
+    """The bodies of a machine by the points that they join, as the scene of the machine has them at its pose.
+
+    Points count through the `drawn_points` of all legs. A link is its kind, whether its leg is driven, its length at
+    this pose (m), from which the cylinder of a telescope is drawn, and the points at its ends; of two bars, of both.
+    """
+    configuration = respond(machine).configuration
+    sizes = proportions_of(machine, configuration)
+    legs: list[dict[str, Any]] = []
+    count = 0
+    for leg in configuration.legs:
+        points, parts, before = drawn_points(leg), anatomy(leg), count
+        count += len(points)
+
+        def number_of(point: Vector, points: list[Vector] = points, before: int = before) -> int:
+            return before + min(range(len(points)), key=lambda k: (points[k] - point).norm())
+
+        links = []
+        for link in parts.links:
+            sides = [ZERO] if link.side is None else [link.side, -link.side]
+            ends = [(number_of(link.start + side), number_of(link.end + side)) for side in sides]
+            links.append((link.kind, link.driven or parts.actuated, link.span.norm(), *ends))
+        rails = [
+            {"ends": [p.components() for p in rail_ends(r, sizes)], "at": number_of(r.point), "driven": r.driven}
+            for r in parts.rails
+        ]
+        legs.append(
+            {
+                "links": links,
+                "joints": sorted({number_of(joint.point) for joint in parts.joints}),
+                "rails": rails,
+                "stands": not parts.on_rail,
+                "foot": number_of(parts.foot),
+                "second": number_of(parts.second_point),
+                "head": number_of(parts.head),
+                "before": number_of(parts.last_but_one),
+            }
+        )
+    base, platform = plates(configuration, [anatomy(leg) for leg in configuration.legs], sizes.leg)
+    stands = base is not None and base.block is None and not has_open_frame(configuration)
+    return {"radius": sizes.leg, "base": stands, "block": platform.block is not None, "points": count, "legs": legs}
 
 
 def _sample(functions: MachineFunctions, point: list[float]) -> dict[str, object]:

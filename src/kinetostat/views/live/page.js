@@ -2,13 +2,12 @@
 const $ = (id) => document.getElementById(id);
 
 function openMachine(data, programs) {
-  const { inputs, actuators, legs, quantities, parts, rest, planar, length, samples } = data;
+  const { inputs, actuators, quantities, parts, rest, planar, samples } = data;
   const NAMES = ["rx", "ry", "rz", "x", "y", "z"];
   const at = inputs.map((input) => input.home);
   const free = quantities.filter((quantity) => !quantity.loaded);
   const answers = new Float64Array(42 + free.length), loaded = new Float64Array(6 + quantities.length - free.length);
-  const points = legs.reduce((sum, [, count]) => sum + count, 0);
-  const places = new Float64Array(actuators.length + 12 + 3 * points), shares = new Float64Array(6 * (parts?.length ?? 0));
+  const places = new Float64Array(actuators.length + 12 + 3 * data.drawing.points), shares = new Float64Array(6 * (parts?.length ?? 0));
 
   // Units that people read: a factor from SI and a word, by kind of quantity.
   const UNITS = { m: [1e3, "mm"], rad: [180 / Math.PI, "°"] };
@@ -38,7 +37,7 @@ function openMachine(data, programs) {
     const point = prepared(values);
     return programs.loaded(point, loaded, restOf(point, rest, programs));
   };
-  const place = (values) => programs.places(prepared(values), places);
+  const place = (values) => { programs.places(prepared(values), places); return places; };
   const entry = (matrix, i, j) => {
     const [a, b] = i < j ? [i, j] : [j, i];
     return answers[(matrix === "K" ? 21 : 0) + 6 * a - (a * (a - 1)) / 2 + b - a];
@@ -186,129 +185,7 @@ function openMachine(data, programs) {
   }
   const option = (value, text) => { const one = document.createElement("option"); one.value = value; one.textContent = text; return one; };
 
-  // The picture: legs, platform and base, seen from a camera that turns about the middle.
-  const view = { azimuth: planar ? -Math.PI / 2 : -0.9, elevation: planar ? Math.PI / 2 : 0.42, zoom: 1 };
-  const start = { ...view };
-  let middle = [0, 0, 0], reach = 1;
-  function measure() {
-    place(inputs.map((input) => input.home));
-    const first = actuators.length + 12, low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
-    const tool = actuators.length;
-    for (const k of [tool, tool + 1, tool + 2, ...Array.from({ length: places.length - first }, (_, n) => first + n)]) {
-      const axis = (k - (k < first ? tool : first)) % 3;
-      if (!Number.isFinite(places[k])) continue;
-      low[axis] = Math.min(low[axis], places[k]); high[axis] = Math.max(high[axis], places[k]);
-    }
-    middle = low.map((value, k) => (value + high[k]) / 2);
-    reach = Math.hypot(...low.map((value, k) => high[k] - value)) / 2 || length;
-  }
-  function drawPicture() {
-    const canvas = $("picture"), ratio = devicePixelRatio || 1, box = canvas.getBoundingClientRect();
-    canvas.width = Math.round(box.width * ratio); canvas.height = Math.round(box.height * ratio);
-    const pen = canvas.getContext("2d"), ink = getComputedStyle(document.documentElement);
-    const colour = (name) => ink.getPropertyValue(name).trim();
-    pen.scale(ratio, ratio);
-    const size = (Math.min(box.width, box.height) / 2) * 1.05 * view.zoom;
-    const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
-    const eye = 5 * reach;
-    const project = (p) => {
-      const [x, y, z] = p.map((value, k) => value - middle[k]);
-      const right = -sa * x + ca * y, deep = ca * ce * x + sa * ce * y + se * z, up = -ca * se * x - sa * se * y + ce * z;
-      const scale = (size / reach) * (eye / (eye - deep));
-      return [box.width / 2 + right * scale, box.height / 2 - up * scale, deep, scale];
-    };
-    const point = (k) => [places[k], places[k + 1], places[k + 2]];
-    const shapes = [];
-    const line = (a, b, width, stroke) => {
-      const [p, q] = [project(a), project(b)];
-      shapes.push([(p[2] + q[2]) / 2, () => {
-        for (const [extra, style] of [[2.5, colour("--paper")], [0, stroke]]) {
-          pen.lineWidth = Math.max(1, width * p[3]) + extra; pen.strokeStyle = style; pen.lineCap = "round";
-          pen.beginPath(); pen.moveTo(p[0], p[1]); pen.lineTo(q[0], q[1]); pen.stroke();
-        }
-      }]);
-    };
-    const ball = (a, radius, fill) => {
-      const p = project(a);
-      shapes.push([p[2] + 1e-3 * reach, () => {
-        pen.beginPath(); pen.arc(p[0], p[1], Math.max(1.5, radius * p[3]), 0, 7);
-        pen.fillStyle = fill; pen.fill(); pen.lineWidth = 1; pen.strokeStyle = colour("--paper"); pen.stroke();
-      }]);
-    };
-    const plate = (corners, fill, stroke) => {
-      if (corners.length < 3) return;
-      const mean = [0, 1, 2].map((k) => corners.reduce((sum, c) => sum + c[k], 0) / corners.length);
-      const seen = corners.map(project), centre = project(mean);
-      const order = [...seen].sort((a, b) => Math.atan2(a[1] - centre[1], a[0] - centre[0]) - Math.atan2(b[1] - centre[1], b[0] - centre[0]));
-      shapes.push([centre[2] - 1e-3 * reach, () => {
-        pen.beginPath(); order.forEach((p, k) => (k ? pen.lineTo(p[0], p[1]) : pen.moveTo(p[0], p[1]))); pen.closePath();
-        pen.globalAlpha = 0.28; pen.fillStyle = fill; pen.fill(); pen.globalAlpha = 1;
-        pen.lineWidth = 1.5; pen.strokeStyle = stroke; pen.stroke();
-      }]);
-    };
-    const tool = point(actuators.length), reached = Number.isFinite(places[actuators.length]);
-    const base = [], platform = [], thick = 0.032 * reach;
-    let k = actuators.length + 12;
-    for (const [, count] of legs) {
-      const chain = [];
-      for (let n = 0; n < count; n++, k += 3) {
-        const p = point(k);
-        if (Number.isFinite(p[0]) && (!chain.length || Math.hypot(...p.map((v, i) => v - chain.at(-1)[i])) > 1e-6 * reach)) chain.push(p);
-      }
-      if (!chain.length) continue;
-      base.push(chain[0]); platform.push(chain.at(-1));
-      for (let n = 1; n < chain.length; n++) line(chain[n - 1], chain[n], thick, colour(n % 2 ? "--accent" : "--strong"));
-      chain.forEach((p) => ball(p, 0.8 * thick, colour("--ink")));
-    }
-    plate(base, colour("--strong"), colour("--strong"));
-    plate(platform, colour("--accent"), colour("--accent"));
-    if (reached) {
-      const centre = [0, 1, 2].map((k) => platform.reduce((sum, p) => sum + p[k], 0) / platform.length);
-      if (platform.length < 3) platform.forEach((p) => line(p, tool, 0.6 * thick, colour("--soft")));
-      else if (Math.hypot(...centre.map((c, k) => c - tool[k])) > 0.05 * reach) line(centre, tool, 0.4 * thick, colour("--soft"));
-      ball(tool, 0.9 * thick, "#d1495b");
-      ["#d1495b", "#3b8a4b", "#2f6fb0"].forEach((paint, axis) => {
-        const c = actuators.length + 3 + 3 * axis;
-        line(tool, tool.map((value, i) => value + 0.22 * reach * places[c + i]), 0.35 * thick, paint);
-      });
-    }
-    shapes.sort((a, b) => a[0] - b[0]).forEach(([, draw]) => draw());
-    // The axes of the base, in a corner.
-    pen.font = "12px system-ui, sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle";
-    const corner = [38, box.height - 38];
-    [["x", -sa, -ca * se, "#d1495b"], ["y", ca, -sa * se, "#3b8a4b"], ["z", 0, ce, "#2f6fb0"]].forEach(([name, right, up, paint]) => {
-      pen.strokeStyle = pen.fillStyle = paint; pen.lineWidth = 2;
-      pen.beginPath(); pen.moveTo(...corner); pen.lineTo(corner[0] + 22 * right, corner[1] - 22 * up); pen.stroke();
-      pen.fillText(name, corner[0] + 30 * right, corner[1] - 30 * up);
-    });
-    if (!reached) {
-      pen.fillStyle = colour("--soft"); pen.font = "14px system-ui, sans-serif";
-      pen.fillText("The machine cannot be at this pose.", box.width / 2, box.height / 2);
-    }
-  }
-  function turning() {
-    const canvas = $("picture");
-    let held = null;
-    canvas.addEventListener("pointerdown", (event) => { held = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
-    canvas.addEventListener("pointermove", (event) => {
-      if (!held) return;
-      view.azimuth -= 0.01 * (event.clientX - held[0]);
-      view.elevation = Math.max(-1.57, Math.min(1.57, view.elevation + 0.01 * (event.clientY - held[1])));
-      held = [event.clientX, event.clientY]; drawPicture();
-    });
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { held = null; });
-    canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(-0.0015 * event.deltaY)); }, { passive: false });
-    canvas.addEventListener("dblclick", () => { Object.assign(view, start); drawPicture(); });
-    canvas.addEventListener("keydown", (event) => {
-      const moves = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
-      if (moves) { view.azimuth += moves[0]; view.elevation = Math.max(-1.57, Math.min(1.57, view.elevation + moves[1])); drawPicture(); }
-      else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.1 : 1 / 1.1);
-      else if (event.key === "Home") { Object.assign(view, start); drawPicture(); }
-      else return;
-      event.preventDefault();
-    });
-  }
-  function zoom(factor) { view.zoom = Math.max(0.2, Math.min(8, view.zoom * factor)); drawPicture(); }
+  const picture = pictureOf($("picture"), data, actuators.length);
 
   // The map: a quantity over two inputs, the others as they are.
   const mapped = ["K", "C"].flatMap((name) => data.components.map((k) => {
@@ -390,7 +267,7 @@ function openMachine(data, programs) {
       $("status").textContent = refusal || STATUSES[status];
       $("status").classList.toggle("bad", status !== 0 || refusal !== "");
       [...inputs, ...actuators].forEach((row) => row.follow());
-      showMatrix(); showQuantities(); showParts(); drawPicture(); drawMap(); writeAddress();
+      showMatrix(); showQuantities(); showParts(); picture.draw(places); drawMap(); writeAddress();
     });
   }
   for (const name of ["K", "C"]) $(`show-${name}`).addEventListener("click", () => {
@@ -418,7 +295,8 @@ function openMachine(data, programs) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
   document.title = $("name").textContent = data.name;
   if (inputs.some(({ name }) => name.includes("."))) $("pose").textContent = "Pose and parameters";
-  selfCheck(); readAddress(); buildSliders(); buildActuators(); buildParts(); buildMap(); measure(); turning(); show();
+  selfCheck(); readAddress(); buildSliders(); buildActuators(); buildParts(); buildMap();
+  picture.measure(place(inputs.map((input) => input.home))); show();
 }
 
 // The machine is in the address, or else in the page.

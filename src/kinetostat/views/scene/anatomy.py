@@ -17,7 +17,7 @@ from kinetostat.tolerances import SAME_TO_THE_EYE
 from kinetostat.views.scene.solids import unit
 
 JointKind: TypeAlias = Literal["revolute", "universal", "spherical", "helical", "flexure", "motor"]
-LinkKind: TypeAlias = Literal["bar", "telescope", "bars"]
+LinkKind: TypeAlias = Literal["bar", "telescope", "bars", "cable"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LinkPart:
 
     Attributes:
         name: of the link, where it has one; unique within the leg.
-        kind: a bar, two parallel bars, or a telescope along which a slide runs.
+        kind: a bar, two parallel bars, a telescope along which a slide runs, or a cable, which is a slide that only pulls.
         start, end: of its axis.
         driven: whether it holds an actuated slide.
         up: in which the cross-section's z axis lies, if that matters.
@@ -183,7 +183,9 @@ class _Reading:
         start, slide = self.at, self.slide
         apart = start is not None and not linked and not together(start, point)
         if apart and slide is not None and _along(slide[1], point - (start or point)):
-            self.links.append(LinkPart(slide[0], "telescope", start or point, point, slide[2]))
+            pulls = any(spring.acts == "pulls" for spring in self.leg.springs)
+            kind: LinkKind = "cable" if pulls else "telescope"
+            self.links.append(LinkPart(slide[0], kind, start or point, point, slide[2]))
         elif slide is not None:
             self.rails.append(RailPart(slide[0], start or point, slide[1], slide[2]))
         if apart and (slide is None or not _along(slide[1], point - (start or point))):

@@ -25,6 +25,8 @@ LONGEST_BARREL = 0.88
 """Share of a leg that its cylinder takes at most, however short the leg becomes."""
 BAR_RADIUS = 0.72
 """Radius of a bar as a share of a leg's cylinder, where the file gives no cross-section."""
+CABLE_RADIUS = 0.3
+"""Radius of a cable as a share of a leg's."""
 JOINT_PER_WIDTH = 0.42
 """Radius from which joints are drawn, in widths of the thickest link of the leg."""
 
@@ -216,6 +218,9 @@ def _link(link: LinkPart, radius: float, material: str, profile: Profile | None,
         return _telescope(link, radius, material, span)
     if link.kind == "bars":
         return _bars(link, radius, material)
+    if link.kind == "cable":
+        place = upright(link.start, link.span)
+        return [Solid(f"{link.name}/cable", shapes.shaft(CABLE_RADIUS * radius, link.span.norm()), material, place)]
     return [_bar(link, radius, material, profile)]
 
 

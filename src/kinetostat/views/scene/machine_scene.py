@@ -49,9 +49,8 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     """
     legs = [anatomy(leg) for leg in configuration.legs]
     base, platform = plates(configuration, legs, sizes.leg)
-    open_frame = all(spring.acts for leg in configuration.legs for spring in leg.springs if spring.actuated)
-    # Cables hang between the posts of a frame: a plate behind their anchors would hide the machine.
-    of_base = [solid for solid in base.solids() if not (open_frame and solid.name == "base/plate")] if base else []
+    hidden = has_open_frame(configuration)
+    of_base = [solid for solid in base.solids() if not (hidden and solid.name == "base/plate")] if base else []
     solids = [*of_base, *platform.solids()]
     solids += tool_solids(machine, configuration, platform, sizes.leg)
     for leg in legs:
@@ -74,6 +73,11 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     return Scene(tuple(solids), tuple(labels), (low + high) * 0.5, math.hypot(*span.components()), floor)
 
 
+def has_open_frame(configuration: Configuration) -> bool:
+    """Whether cables hang between the posts of a frame: a plate behind their anchors would hide the machine."""
+    return all(spring.acts for leg in configuration.legs for spring in leg.springs if spring.actuated)
+
+
 def plates(configuration: Configuration, legs: Sequence[Anatomy], radius: float) -> tuple[Plate | None, Plate]:
     """Return the base plate, None where all legs slide along rails, and the platform."""
     up = configuration.plane.frame.rotation.z if configuration.plane else configuration.platform.translation
@@ -92,7 +96,7 @@ def tool_solids(machine: Machine, configuration: Configuration, platform: Plate,
     tip, point = machine.tool_point(configuration.platform), configuration.platform.translation
     solids = []
     near = (point - platform.place.translation).norm()
-    if near > 4.0 * radius and not platform.hub:
+    if near > 4.0 * radius and platform.block is None:
         way = point - platform.place.translation
         shape = shapes.shaft(1.3 * radius, way.norm(), 0.2 * radius)
         solids.append(Solid("platform/neck", shape, "platform", upright(platform.place.translation, way)))

@@ -13,7 +13,11 @@ from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
 PLATE_CLEARANCE = 2.3
 """Distance of a plate from the joint centres, in radii of a leg: enough room for the fork of a joint."""
 HUB_SPREAD = 1.0
-"""If the joints spread less than this, in radii of a leg, a hub takes the place of the plate."""
+"""If the joints spread less than this, in radii of a leg, a block takes the place of the plate."""
+BLOCK_SIZE = 3.4
+"""Size of a block around joints that coincide, in radii of a leg; one around others is as much larger than they."""
+FLATNESS = 0.2
+"""Spread of joints across their mean plane, as a share of their greatest spread, above which a platform is a block."""
 PLATE_MARGIN = {"base": 3.6, "platform": 2.9}
 """Width of the rim of a plate beyond its joints, in radii of a leg."""
 PLATE_THICKNESS = {"base": 1.7, "platform": 1.3}
@@ -29,14 +33,15 @@ class Plate:
         place: frame with z towards the joints and the origin in their middle, in their mean plane, base frame.
         joints: centres of the joints, base frame, m.
         radius: radius of a leg, m.
-        hub: whether the plate is a block around the joints, because they are close together.
+        block: size of the block that takes the place of the plate, along the axes of `place`, m: joints are close
+            together, or those of a platform do not lie near a plane. None for a plate.
     """
 
     name: str
     place: Displacement
     joints: tuple[Vector, ...]
     radius: float
-    hub: bool
+    block: Vector | None
 
     @property
     def normal(self) -> Vector:
@@ -51,8 +56,8 @@ class Plate:
 
     def solids(self) -> list[Solid]:
         """Make the plate and its pedestals."""
-        if self.hub:
-            return [self._hub()]
+        if self.block is not None:
+            return [self._solid_block(self.block)]
         thick = PLATE_THICKNESS[self.name] * self.radius
         outline = rounded_hull(self._flat(), PLATE_MARGIN[self.name] * self.radius)
         origin = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
@@ -64,10 +69,10 @@ class Plate:
         )
         return [plate, *(self._pedestal(n, joint) for n, joint in enumerate(self.joints, 1))]
 
-    def _hub(self) -> Solid:
-        size = 3.4 * self.radius
-        down = Displacement(self.place.rotation, self.place.apply(Vector(0.0, 0.0, -0.5 * size)))
-        return Solid(f"{self.name}/hub", shapes.block(size, size, size, 0.12 * size), self.name, down)
+    def _solid_block(self, size: Vector) -> Solid:
+        down = Displacement(self.place.rotation, self.place.apply(Vector(0.0, 0.0, -0.5 * size.z)))
+        shape = shapes.block(size.x, size.y, size.z, 0.12 * min(size.components()))
+        return Solid(f"{self.name}/block", shape, self.name, down)
 
     def _flat(self) -> list[tuple[float, float]]:
         axes, origin = self.place.rotation, self.place.translation
@@ -108,5 +113,12 @@ def plate_behind(
     lean = inward.dot(normal)
     # Links in the plane of the joints do not say on which side the plate has room; then `side` decides.
     normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
-    hub = float(sizes[0]) < HUB_SPREAD * radius and len(points) > 1
-    return Plate(name, upright(centre, normal, frame.rotation.x), tuple(joints), radius, hub)
+    place, block = upright(centre, normal, frame.rotation.x), None
+    if len(points) > 1 and float(sizes[0]) < HUB_SPREAD * radius:
+        block = Vector(*[BLOCK_SIZE * radius] * 3)
+    elif name == "platform" and len(points) > 3 and sizes[2] > FLATNESS * sizes[0]:
+        in_frame = np.array([frame.rotation.inverse().apply(joint).components() for joint in joints], dtype=float)
+        low, high = in_frame.min(axis=0), in_frame.max(axis=0)
+        place = Displacement(frame.rotation, frame.rotation.apply(Vector(*(0.5 * (low + high)).tolist())))
+        block = Vector(*(high - low + BLOCK_SIZE * radius).tolist())
+    return Plate(name, place, tuple(joints), radius, block)
