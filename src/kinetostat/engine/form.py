@@ -249,7 +249,7 @@ class TracedPlacement:
 
 
 def drawn_points(leg: Leg) -> list[Vector]:
-    """Return the points of a leg that a drawing joins, base frame, m: of its joints, links and springs, ends of bars."""
+    """Return the points of a leg that a drawing joins (base frame, m): joints, links, springs, then ends of bars."""
     path = [point for element in leg.chain for point in element.path]
     path += [spring.joint.point for spring in leg.springs if spring.joint.point is not None]
     pairs = [element.bars for element in leg.chain if isinstance(element, Parallelogram)]

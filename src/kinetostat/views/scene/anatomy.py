@@ -36,7 +36,7 @@ class LinkPart:
 
     Attributes:
         name: of the link, where it has one; unique within the leg.
-        kind: a bar, two parallel bars, a telescope along which a slide runs, or a cable, which is a slide that only pulls.
+        kind: a bar, two parallel bars, a telescope along which a slide runs, or a cable: a slide that only pulls.
         start, end: of its axis.
         driven: whether it holds an actuated slide.
         up: in which the cross-section's z axis lies, if that matters.
