@@ -19,7 +19,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import adding
 from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.report import REPORT_PARTS, usual_ranges
+from kinetostat.studies.map_ranges import usual_ranges
+from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.provenance import Origin

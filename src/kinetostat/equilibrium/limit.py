@@ -1,7 +1,7 @@
 """Load factor of a mechanism up to its loads: the last stable state of rest while these grow from nothing.
 
-Preloads are there from the beginning. The state is followed in steps, each from the one before. It is lost where no
-other one is nearby, where it is not stable, or where the next one is a leap away: the mechanism has snapped over.
+Preloads act from the beginning. The state is followed in steps of the loads, each from the one before. It ends where no
+state of rest is nearby, where that is not stable, or where it is a leap away because the mechanism has snapped over.
 """
 
 from dataclasses import replace
@@ -16,11 +16,11 @@ from kinetostat.equilibrium.tangent import Stability, stabilities, stability
 from kinetostat.frozen import dataclass
 
 STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
-"""Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
-where the machine may stand under all."""
+"""Steps that are tried together: the rest of the loads, and steps each smaller by this ratio than the one before; few
+steps where the machine may stand under all of its loads."""
 MOST_LOAD_STEPS = 14
-"""Number of steps of the loads: a machine that moves very far before it is lost is not followed to its end, which takes
-seconds."""
+"""Greatest number of steps: a machine that moves very far before it gives way is not followed to its end, which would
+take seconds."""
 ACCURACY_OF_SHARE = 1e-3
 """Relative accuracy of the load factor."""
 
@@ -30,15 +30,15 @@ class LoadLimit:
     """The last stable state of rest while the loads grow.
 
     Attributes:
-        share: share of the loads there.
-        balance: equations there.
-        judged: how it gives way.
-        least: whether the machine was not followed to its end: it stands by this share or more.
+        share: share of the loads under which it is at rest.
+        balance: the equations of that state.
+        stability: its stability, with the motion by which it gives way.
+        least: whether the machine was not followed to its end, so that it stands under this share or a greater one.
     """
 
     share: float
     balance: Balance
-    judged: Stability
+    stability: Stability
     least: bool = False
 
 
@@ -49,14 +49,14 @@ def limit_of(mechanism: Mechanism) -> LoadLimit | None:
         mechanism: the mechanism with all of its loads.
 
     Returns:
-        Where it stands last, share 1 if it stands under all of them; None if no share was found under which it
-        stands.
+        The last stable state, share 1 if the mechanism stands under all of its loads; None if no share was found under
+        which it stands.
     """
     last = _standing(mechanism, np.zeros(1), None)
     reached = None if last is None else _limit_from(mechanism, last)
     if reached is not None and reached.share > 0.0:
         return reached
-    # Springs that only pull may hold nothing until a load tensions them: then it stands from some share on.
+    # Springs that only pull may hold nothing until a load tensions them: then the mechanism stands from some share on.
     if not any(leg.sign.any() for leg in mechanism.legs):
         return reached
     shares = _shares(0.0, FEW_CANDIDATES)
@@ -76,18 +76,18 @@ def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
     for _ in range(MOST_LOAD_STEPS):
         if last.share == 1.0:
             return last
-        there = _standing(mechanism, _shares(last.share, CANDIDATES), last)
-        if there is None:
+        next_state = _standing(mechanism, _shares(last.share, CANDIDATES), last)
+        if next_state is None:
             return last
-        nearly = there.share - last.share < ACCURACY_OF_SHARE * there.share
-        last = there
-        if nearly:
+        accurate = next_state.share - last.share < ACCURACY_OF_SHARE * next_state.share
+        last = next_state
+        if accurate:
             return last
     return replace(last, least=True)
 
 
 def _shares(last: float, count: int) -> Array:
-    """Return so many shares of the loads beyond the last one, up to all of them."""
+    """Return so many shares of the loads beyond the last one, the greatest of them 1."""
     left = STEP_RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
     return np.append(last + (1.0 - last) * left, 1.0)
 

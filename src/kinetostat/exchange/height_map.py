@@ -20,8 +20,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.map_ranges import usual_ranges
 from kinetostat.studies.poses import chosen_axes, grid_of
-from kinetostat.studies.report import usual_ranges
 from kinetostat.studies.storage import write_text
 
 ACROSS, UPWARDS, HEIGHT = "pose.x", "pose.y", "pose.z"

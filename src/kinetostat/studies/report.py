@@ -1,29 +1,23 @@
 """The subject of a report, a machine or a study, and the questions that are asked of it. Nothing is written here.
 
-Each question has a condition: the error budget is asked where the file has tolerances, the state under load where the
-machine is meant so. A part that has no answer says why.
+Each question has a condition: the error budget, for instance, is asked if the file has tolerances. A part of the report
+that has no answer says why.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from kinetostat.arrays import Array
-from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.points import PointTable
+from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
-from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, find, parameters, values
+from kinetostat.machine.parameters import find
 from kinetostat.machine.saving import as_file
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, choice
@@ -38,6 +32,7 @@ from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.lobes import lobes
+from kinetostat.studies.map_ranges import MOST_RANGES, coarser_ranges, usual_ranges
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import stored_problem
@@ -48,27 +43,14 @@ from kinetostat.studies.tensions import tensions
 from kinetostat.studies.under_load import under_load
 from kinetostat.studies.vibration import modes
 
-PROBE_STEPS = 48
-"""Steps to each side in which it is tried how far a coordinate goes."""
-FARTHEST_FREE = {"length": 0.3, "angle": math.radians(15.0)}
-"""Farthest from the pose, by kind: in units of the characteristic length, and in rad."""
-FARTHEST_LIMITED = {"length": 1.0, "angle": math.radians(90.0)}
-"""The same for a machine whose file has limits, which then say how far it goes."""
-LEAST_MARGIN = 0.1
-"""Share of the pose's singularity margin that is kept, so that maps are not about singularities."""
-ROUND_SLACK = 1e-6
-"""Share of a step within which an end counts as round already."""
-ROUND_UNIT = {"length": 1.0, "angle": math.radians(1.0)}
-"""The unit in which numbers of a kind are round."""
 MAP_POINTS, GUIDELINE_POINTS = 41, 7
 """Points along each coordinate of the maps, and of the poses at which guidelines are tried."""
-MOST_AXES = 2
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
-"""Parts that take time and may be left out of a report; validation is computed elsewhere, by an independent engine."""
+"""Parts that take time and may be left out; an independent engine computes validation (`views.report.writing`)."""
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."
 
 Texts = tuple[tuple[str, str], ...]
-"""Name and text of each input."""
+"""Name and text of each file."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +58,10 @@ class Subject:
     """The machine or the study of a report.
 
     Attributes:
-        machine: with its overrides; of a study as it is before.
-        inputs: name and text of each file that it was read from.
-        problem: of a study; None for a machine alone.
-        folder: that holds the search of the study, if there is one.
+        machine: the machine with its overrides; of a study, the machine before the search.
+        inputs: name and text of each file from which the subject was read.
+        problem: the problem of a study; None for a machine alone.
+        folder: the folder that holds the search of the study, if there is one.
     """
 
     machine: Machine
@@ -116,7 +98,7 @@ def _study_in_folder(folder: Path, settings: Sequence[str]) -> Subject:
 
 
 def texts_of(problem: Problem) -> Texts:
-    """Texts from which a problem can be read again, the study first."""
+    """The files from which a problem can be read again, the study first."""
     return ("study.toml", study_toml(problem.study)), ("machine.toml", as_file(problem.machine))
 
 
@@ -135,15 +117,15 @@ def _read(name: str, path: Path) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Answers:
-    """All that is known of a machine at its pose.
+    """The answers of a report on a machine at its pose.
 
     Attributes:
-        machine: the subject; of a study its best design.
-        state: of it at its pose, made once for all questions.
-        analysis: at its pose; nothing else is asked unless its status is OK.
-        ranges: of the maps.
-        fit: what measurements have said of the machine as built, if a record of that is given.
-        result: of the study that the machine is the best design of.
+        machine: the machine; of a study, its best design.
+        state: the machine's state at its pose, made once for all questions.
+        analysis: the analysis of the pose; no other question is asked unless its status is OK.
+        ranges: ranges of the maps.
+        fit: the record of an identification of the machine as built, if one is given.
+        result: the result of the study whose best design the machine is.
         motion: path of the motion that its drives make; None for none.
         given: the answer to each question of `REPORT_QUESTIONS` that was asked, by its name.
     """
@@ -167,10 +149,10 @@ class ReportQuestion:
     """A question that a report asks.
 
     Attributes:
-        name: of its answer.
-        ask: answers it, from what is known so far.
-        when: whether it is asked.
-        part: of `REPORT_PARTS`, that leaves it out.
+        name: name of the question and of its answer.
+        ask: answers the question, from the answers so far.
+        when: whether the question is asked.
+        part: the part of `REPORT_PARTS` to which it belongs; empty if it is always asked.
     """
 
     name: str
@@ -189,7 +171,7 @@ REPORT_QUESTIONS = (
     ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
     ReportQuestion("drives", lambda known: drives(known.state, known.motion), lambda known: known.motion is not None),
-    ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _cuts(known.machine)),
+    ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _says_what_it_cuts(known.machine)),
     ReportQuestion(
         "maps",
         lambda known: evaluate_grid(known.state, known.ranges, _compliances(known.machine)),
@@ -205,12 +187,10 @@ REPORT_QUESTIONS = (
     ReportQuestion("sensitivity", lambda known: sensitivity(known.state), part="sensitivity"),
     ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
 )
-"""The questions in the order in which they are asked. The state under load is asked where the machine is meant so, the
-error budget where the file has tolerances, capability where it limits its drives, tensions where all legs are cables,
-vibrations where it has masses, drives where a motion is given, lobes where the file says what the tool cuts, and
-frequencies over the poses of the maps where there are modes."""
+"""The questions in the order in which they are asked, each with its condition. Later ones may read earlier answers: the
+map of frequencies is drawn only if vibrations have modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
-"""Steps of the whole work on a report, as progress counts them; the last two are validation and the file."""
+"""Number of steps that progress counts; the last two are validation and writing the file."""
 
 
 def gather(
@@ -225,11 +205,11 @@ def gather(
     """Answer every question of a report on a machine.
 
     Args:
-        machine: with its pose.
-        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: what is left out, of `REPORT_PARTS`.
-        result: of a study whose best design the machine is.
-        progress: receives how far the work on a report is: all but the last two of `REPORT_STEPS`.
+        machine: the machine with its pose.
+        ranges: ranges of the maps, "FIELD=from:to:count[:log]", one or two; `usual_ranges` if there are none.
+        without: parts of `REPORT_PARTS` to leave out.
+        result: the result of the study whose best design the machine is.
+        progress: receives the number of steps done, and `REPORT_STEPS`; the last two steps are not done here.
         fit: record of an identification of the machine, or the folder in which it lies.
         motion: path of the CSV file of a motion, as `drives` takes it; None for none.
 
@@ -239,7 +219,7 @@ def gather(
     """
     for part in without:
         choice(part, REPORT_PARTS, "the part of a report to leave out")
-    if len(ranges) > MOST_AXES:
+    if len(ranges) > MOST_RANGES:
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
     record = read_fit(fit) if fit else None
     if record:
@@ -257,7 +237,8 @@ def gather(
     return known
 
 
-def _cuts(machine: Machine) -> bool:
+def _says_what_it_cuts(machine: Machine) -> bool:
+    """Whether the file gives masses, and a table [cutting] that is complete enough for stability lobes."""
     cutting = machine.tables["cutting"]
     return _has_mass(machine) and bool(cutting.pressure and any(cutting.direction))
 
@@ -274,69 +255,12 @@ def _first_frequency(machine: Machine) -> str:
 def _advice(state: MachineState, over: Sequence[str]) -> Guidelines:
     """Guidelines, over a grid of those ranges that are coordinates of the pose."""
     fields = {text: find(state.machine.family, parse_range(text).field).path for text in over}
-    return guidelines(state, coarser([text for text in over if fields[text].startswith("pose.")], GUIDELINE_POINTS))
+    return guidelines(
+        state, coarser_ranges([text for text in over if fields[text].startswith("pose.")], GUIDELINE_POINTS)
+    )
 
 
 def _compliances(machine: Machine) -> list[str]:
     """Names of the entries of the diagonal of C that the machine has."""
-    there = machine.family.component_names
-    return [name for name in GROUPS["compliance"] if name.removeprefix("compliance_") in there]
-
-
-def usual_ranges(machine: Machine, count: int) -> list[str]:
-    """Two ranges "pose.x=from:to:count" about the pose, translations first; fewer where fewer coordinates can change.
-
-    Each coordinate goes as far as the machine can follow while the others stay: within its limits if the file has some,
-    else not far from the pose, and never near a singularity.
-
-    Args:
-        machine: whose pose has an answer.
-        count: of points of each.
-    """
-    kinds = FARTHEST_LIMITED if limits_set(machine.tables["limits"]) else FARTHEST_FREE
-    coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
-    ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
-    length, ranges = float(state_of(machine).configuration.length), []
-    for parameter in ordered:
-        reach = kinds[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
-        low, high = _extent(machine, parameter, reach)
-        if high > low:
-            ranges.append(f"{parameter.path}={low:.9g}:{high:.9g}:{count}")
-        if len(ranges) == 2:
-            break
-    return ranges
-
-
-def coarser(ranges: Sequence[str], most: int) -> list[str]:
-    """The same ranges "FIELD=from:to:count[:log]" with at most that many points each.
-
-    Raises:
-        InputError: not of that form.
-    """
-    read = [parse_range(text) for text in ranges]
-    return [
-        f"{span.field}={span.start}:{span.end}:{min(span.count, most)}{':log' if span.logarithmic else ''}"
-        for span in read
-    ]
-
-
-def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float, float]:
-    """Both ends to which a coordinate goes, SI, before there is no good answer."""
-    (path,), here = parameter.leaves, float(values(machine)[parameter.path])
-    steps = np.linspace(-reach, reach, 2 * PROBE_STEPS + 1)
-    answer = evaluate(machine, PointTable({path: here + steps}), ["singularity_margin"])
-    singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
-    good = (answer.status == Status.OK) & (singularity_margin >= LEAST_MARGIN * singularity_margin[PROBE_STEPS])
-    bad = np.flatnonzero(~good)
-    first = bad[bad < PROBE_STEPS].max(initial=-1) + 1
-    last = bad[bad > PROBE_STEPS].min(initial=len(steps)) - 1
-    return _rounded_inwards(here + steps[[first, last]], ROUND_UNIT[parameter.quantity.kind])
-
-
-def _rounded_inwards(ends: Array, unit: float) -> tuple[float, float]:
-    """The ends, inwards to numbers that are round to a tenth of the range or less."""
-    low, high = (float(end) for end in ends)
-    if high == low:
-        return low, high
-    step = 10.0 ** math.floor(math.log10((high - low) / unit / 10.0)) * unit
-    return math.ceil(low / step - ROUND_SLACK) * step, math.floor(high / step + ROUND_SLACK) * step
+    components = machine.family.component_names
+    return [name for name in GROUPS["compliance"] if name.removeprefix("compliance_") in components]

@@ -1,4 +1,4 @@
-"""A machine at rest under its loads: where its tool comes to, what every leg carries, how stiff and how stable it is.
+"""A machine at rest under its loads: displacement of its tool, loads of its springs, stiffness and stability.
 
 The equations are in `equilibrium`; the command is `analyze --loaded`.
 """
@@ -35,7 +35,7 @@ from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
 CURVE_SHARES = tuple(i / 12 for i in range(16))
-"""Of the loads, at which a curve is drawn: up to 125 %."""
+"""Shares of the loads at which a curve is drawn: up to 125 %."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class SpringState:
     """A spring at rest under load.
 
     Attributes:
-        name, leg: of it.
-        turning: whether it is a rotation: N·m and rad, otherwise N and m.
+        name, leg: name of the spring and of its leg.
+        turning: whether it is a torsion spring: N·m and rad, otherwise N and m.
         actuated: whether it is an actuator.
-        load: that it carries, positive where it pulls its ends together.
-        deformation: from the free state.
-        slack: whether it could carry loads of the other sign only, and carries nothing.
+        load: force or moment that it carries, positive where it pulls its ends together.
+        deformation: its deformation from the free state.
+        slack: whether it can only pull or only push, would have to do the other, and so carries nothing.
     """
 
     name: str
@@ -65,26 +65,27 @@ class LoadedState(Immutable):
     """A machine at rest under gravity, its preload and its table [load]; base axes, at the loaded tool point, SI.
 
     Attributes:
-        state: of the machine, at the pose that it has without loads.
-        rest: whether it comes to rest, and whether it stays there: with stable springs, and struts that do not bend;
-            then whether it keeps to its limits, those of the loads of its actuators at rest among them.
-        message: what is special about it, or why there is no state of rest.
+        state: the machine's state, at the pose that it has without loads.
+        rest: whether it comes to rest; whether it stays there, with stable springs and struts that do not buckle; and
+            whether it keeps to its limits, those of the loads of its actuators at rest among them.
+        message: what is special about the state of rest, or why there is none.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
         displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose.
-        linear: the same to first order, C w with all weights; None where C is not finite.
-        springs: all that deform.
+        linear: the displacement to first order, C w with all weights; None where C is not finite.
+        springs: all springs that deform.
         slack_legs: names of the legs in which a spring is slack.
-        elastic, tangent: stiffness of the springs alone where they are now, and that which further loads meet: with
-            what the loads do by turning; infinite where rigid parts hold a component, None where none is free of them.
+        elastic, tangent: stiffness of the springs alone at rest, and stiffness against further loads, to which also
+            the loads add by turning; infinite where rigid parts hold a component, None where they hold all.
         compliance: inverse of the tangent stiffness.
-        factor: by which the loads may grow in proportion until the springs are unstable; infinite if no growth does
-            it, None where springs alone hold nothing. Without a state of rest, the share of them up to which it stands.
+        factor: factor by which the loads may grow in proportion until the springs are unstable; infinite if no growth
+            makes them so, None where springs alone hold nothing. Without a state of rest, the share of the loads up to
+            which there is one.
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
-        mode_legs: the legs that move most then.
-        struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
-        residual: what is left of the equations, as a share of what the load and the legs carry.
-        links: of all legs, with the exact motions of their ends.
-        requirements: verdicts on the requirements of the machine's file, where they were asked for.
+        mode_legs: the legs that move most in that motion.
+        struts: compression of each strut whose E I is known, and Euler's load at which it buckles.
+        residual: largest residual of the equations, as a share of what the load and the legs carry.
+        links: links of all legs, with the exact motions of their ends.
+        requirements: verdicts on the requirements of the machine's file, if these were judged.
     """
 
     state: MachineState
@@ -124,10 +125,10 @@ def under_load(machine: Machine | MachineState) -> LoadedState:
     where it would have to do the other.
 
     Args:
-        machine: with its pose and loads; or its state, as `state_of` returns it.
+        machine: the machine with its pose and loads; or its state, as `state_of` returns it.
 
     Raises:
-        InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
+        InputError: there is gravity but no mass in the file, or bounds of tensions contradict each other.
     """
     state = state_of(machine)
     names = state.machine.family.component_names
@@ -144,14 +145,14 @@ def under_load(machine: Machine | MachineState) -> LoadedState:
 
 @dataclass(frozen=True, eq=False)
 class LoadCurve(Immutable):
-    """How a preloaded machine gives way while its loads grow in proportion.
+    """Displacement of the tool and loads of the springs of a preloaded machine while its loads grow in proportion.
 
     Attributes:
-        shares: of the loads.
+        shares: shares of the loads.
         displacement: rotation vector (rad) and displacement of the tool point (m), components of the machine
-            [shares x components]; NaN from where it comes to no rest.
+            [shares x components]; NaN where it comes to no rest.
         springs: names of the springs.
-        loads: that each carries [shares x springs], N or N·m.
+        loads: force or moment of each spring [shares x springs], N or N·m.
     """
 
     shares: Array
@@ -164,67 +165,67 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
     """Follow the state of rest while the loads grow, each share from the one before.
 
     Args:
-        machine: that comes to rest under all of them, or its state.
-        shares: of the loads, from the least to the greatest.
+        machine: the machine with all of its loads, or its state.
+        shares: shares of the loads, from the least to the greatest.
 
     Raises:
         InputError: as for `under_load`.
     """
     start = state_of(machine)
     mechanism = start.mechanism
-    parts, state = list(start.machine.family.components), free_state(mechanism)
-    moved, loads = [], []
+    parts, last = list(start.machine.family.components), free_state(mechanism)
+    displacements, loads = [], []
     for share in shares:
-        solution = at_rest(with_share(mechanism, share, preload=1.0), state)
+        solution = at_rest(with_share(mechanism, share, preload=1.0), last)
         springs, there = _springs(solution.balance), solution.balance.state
-        known, state = (1.0, there) if solution.settled[0] else (math.nan, state)
-        moved.append([known * c for c in _in_si(mechanism, there.platform.amounts()[0], parts)])
+        known, last = (1.0, there) if solution.settled[0] else (math.nan, last)
+        displacements.append([known * c for c in _in_si(mechanism, there.platform.amounts()[0], parts)])
         loads.append([known * spring.load for spring in springs])
-    return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
+    return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in springs), np.array(loads))
 
 
-def _at_rest(state: MachineState, equations: Balance, judged: Stability) -> LoadedState:
-    machine, response, pressed = state.machine, state.free, state.struts
+def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> LoadedState:
+    """The answer for a machine that comes to rest, stable or not."""
+    machine, response = state.machine, state.free
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)
-    compliances = compliance(equations)
-    soft = (compliances * mechanism.compliance_units)[0][square]
-    springs_alone = (elastic_stiffness(equations, compliances) / mechanism.compliance_units)[0][square]
+    all_compliances = compliance(equations)
+    compliances = (all_compliances * mechanism.compliance_units)[0][square]
+    springs_alone = (elastic_stiffness(equations, all_compliances) / mechanism.compliance_units)[0][square]
     springs = _springs(equations)
     slack = tuple(dict.fromkeys(spring.leg for spring in springs if spring.slack))
-    moving = moving_legs(equations, judged)
     checks = _limits_at_rest(state)
-    stays = judged.stable and not any(strut.bends_away for strut in pressed)
-    passed = [] if within(checks) else [why_beyond(checks, machine.display)]
+    stays = stability.stable and not any(strut.bends_away for strut in state.struts)
+    beyond_limits = [] if within(checks) else [why_beyond(checks, machine.display)]
     return LoadedState(
-        state,
-        Rest.UNSTABLE if not stays else Rest.JOINT_LIMIT if passed else Rest.OK,
-        " ".join([about_rest(state, judged, slack), *passed]),
-        machine.family.component_names,
-        _in_si(mechanism, equations.state.platform.amounts()[0], parts),
-        _linear(response, mechanism, parts),
-        tuple(springs),
-        slack,
-        _clean_stiffness(springs_alone),
-        _clean_stiffness(inverse(soft[None])[0]),
-        clean_matrix(soft.tolist()),
-        None if math.isnan(judged.factor) else judged.factor,
-        tuple((judged.mode * units)[parts].tolist()),
-        tuple(moving) if math.isfinite(judged.factor) else (),
-        pressed,
-        float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
-        loaded_links(equations, response.configuration.legs, response.reference),
+        state=state,
+        rest=Rest.UNSTABLE if not stays else Rest.JOINT_LIMIT if beyond_limits else Rest.OK,
+        message=" ".join([about_rest(state, stability, slack), *beyond_limits]),
+        components=machine.family.component_names,
+        displacement=_in_si(mechanism, equations.state.platform.amounts()[0], parts),
+        linear=_linear(response, mechanism, parts),
+        springs=tuple(springs),
+        slack_legs=slack,
+        elastic=_clean_stiffness(springs_alone),
+        tangent=_clean_stiffness(inverse(compliances[None])[0]),
+        compliance=clean_matrix(compliances.tolist()),
+        factor=None if math.isnan(stability.factor) else stability.factor,
+        mode=tuple((stability.mode * units)[parts].tolist()),
+        mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
+        struts=state.struts,
+        residual=float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
+        links=loaded_links(equations, response.configuration.legs, response.reference),
     )
 
 
 def _limits_at_rest(state: MachineState) -> list[Check]:
-    """The limits of geometry as they are at the pose, and those of the loads of actuators with what these carry."""
+    """The limits of geometry at the pose, and those of actuators' loads compared with the loads at rest."""
     at_the_pose = [check for check in state.free.checks if check.limit.about is not About.LOAD]
     return [*at_the_pose, *load_checks(state.machine, state.configuration, state.actuator_loads)]
 
 
 def _largest_wrench(equations: Balance) -> float:
-    """The largest component of the load, of what the legs carry, which preloads alone may be, and of the growths."""
+    """The largest component of the load, of what the legs carry (it may be preload alone), and of thermal growth."""
     sizes = (equations.load, *equations.state.wrenches, equations.mechanism.growth)
     return float(max(np.abs(size).max(initial=0.0) for size in sizes))
 
@@ -259,49 +260,49 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple
 
 
 def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float, ...]:
-    """Components of a displacement in rad and m, round-off cut off."""
-    seen = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
-    cleaned = clean_screw(Twist(Vector(*seen[:3]), Vector(*seen[3:])), 1.0).components()
+    """Components of a displacement in rad and m; round-off is set to zero."""
+    moved = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
+    cleaned = clean_screw(Twist(Vector(*moved[:3]), Vector(*moved[3:])), 1.0).components()
     return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
 
 
 def _clean_stiffness(stiffness: Array) -> list[list[float]] | None:
-    """A stiffness without round-off; None where no component has a finite one.
+    """A stiffness without round-off; None if no component has a finite stiffness.
 
-    Where springs hold nothing in a direction, its entries are round-off beside those of the others of their kind.
+    The entries of a direction in which springs hold nothing are round-off beside those of the others of its kind.
     """
     diagonal = np.abs(np.diag(stiffness))
-    free = np.isfinite(diagonal)
-    if not free.any() or not np.isfinite(stiffness[np.ix_(free, free)]).all():
+    finite = np.isfinite(diagonal)
+    if not finite.any() or not np.isfinite(stiffness[np.ix_(finite, finite)]).all():
         return None
     turning = np.arange(len(stiffness)) < (SIZE // 2 if len(stiffness) == SIZE else 1)
-    largest = np.sqrt([diagonal[free & (turning == kind)].max(initial=0.0) for kind in turning])
+    largest = np.sqrt([diagonal[finite & (turning == kind)].max(initial=0.0) for kind in turning])
     negligible = np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest)
     return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 
 
 def _without_rest(state: MachineState) -> LoadedState:
-    """A machine that comes to no rest, with the state in which it stood last while its loads grew."""
+    """The answer for a machine that comes to no rest: its last state of rest while the loads grew."""
     family, limit = state.machine.family, state.limit
     names, parts, message = family.component_names, list(family.components), why_no_rest(state.machine, limit)
     if limit is None:
         return LoadedState(state, Rest.NO_REST, message, names)
-    mode = (limit.judged.mode * state.mechanism.twist_units[0])[parts]
-    legs = moving_legs(limit.balance, limit.judged) if mode.any() else []
+    mode = (limit.stability.mode * state.mechanism.twist_units[0])[parts]
+    legs = moving_legs(limit.balance, limit.stability) if mode.any() else []
     return LoadedState(
         state, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
     )
 
 
-def about_rest(state: MachineState, judged: Stability, slack: Sequence[str]) -> str:
+def about_rest(state: MachineState, stability: Stability, slack: Sequence[str]) -> str:
     """Say what is special about a state of rest.
 
     Args:
-        state: of the machine that is at rest.
-        judged: what the springs make of it.
+        state: the state of a machine that is at rest.
+        stability: the stability of its springs there.
         slack: names of legs in which a spring carries nothing.
     """
-    sentences = [*_about_stability(judged, state.limit)]
+    sentences = [*_about_stability(stability, state.limit)]
     if slack:
         sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
     bent = sorted((strut for strut in state.struts if strut.bends_away), key=lambda strut: strut.factor)
@@ -310,9 +311,9 @@ def about_rest(state: MachineState, judged: Stability, slack: Sequence[str]) -> 
     return " ".join(sentences) or "At rest and stable."
 
 
-def _about_stability(judged: Stability, limit: LoadLimit | None) -> list[str]:
-    """That the machine is not stable, or has passed a state in which it was not, and how it gives way there."""
-    if not judged.stable:
+def _about_stability(stability: Stability, limit: LoadLimit | None) -> list[str]:
+    """A sentence if the machine is unstable, or has passed an unstable state, and how it gives way there; else none."""
+    if not stability.stable:
         stands = how_it_gives_way(limit)
         return [f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"]
     if limit is None or limit.share == 1.0 or limit.least:
@@ -321,7 +322,7 @@ def _about_stability(judged: Stability, limit: LoadLimit | None) -> list[str]:
 
 
 def _bends_away(machine: Machine, strut: Strut, others: int) -> str:
-    """That a strut is pressed with more than Euler's load, which the springs do not know, and so many others too."""
+    """Say that a strut, and so many others, are pressed with more than Euler's load, which the springs do not know."""
     show, more = machine.display.show, f" (and {others} more)" if others else ""
     return (
         f"Strut {strut.name} bends away{more}: it is pressed with {show(strut.compression, 'N')}, and Euler's load of "
@@ -354,22 +355,23 @@ def how_it_gives_way(limit: LoadLimit | None) -> str:
     """
     if limit is None:
         return "No share of it was found under which it stands."
-    mode = describe((limit.judged.mode * limit.balance.mechanism.twist_units[0]).tolist(), ("rad", "m"))
-    slack, legs = _slack_legs(limit.balance), moving_legs(limit.balance, limit.judged)
-    known = limit.judged.mode.any()
+    stability = limit.stability
+    mode = describe((stability.mode * limit.balance.mechanism.twist_units[0]).tolist(), ("rad", "m"))
+    slack, legs = _slack_legs(limit.balance), moving_legs(limit.balance, stability)
+    known = stability.mode.any()
     by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
     what = f" Slack there: {', '.join(slack)}." if slack else ""
     least = "at least " if limit.least else ""
     return f"It stands up to {least}{limit.share:.3g} times this load{by}.{what}"
 
 
-def moving_legs(equations: Balance, judged: Stability) -> list[str]:
-    """The legs that move most when a state gives way."""
-    legs = zip(equations.mechanism.legs, judged.legs, strict=True)
-    return [leg.name for leg, size in legs if size > 0.5 * max(judged.legs)]
+def moving_legs(equations: Balance, stability: Stability) -> list[str]:
+    """The legs that move at least half as much as the one that moves most when a state gives way."""
+    legs = zip(equations.mechanism.legs, stability.legs, strict=True)
+    return [leg.name for leg, size in legs if size > 0.5 * max(stability.legs)]
 
 
 def _slack_legs(equations: Balance) -> list[str]:
-    """The legs in which a spring could carry loads of the other sign only, and carries nothing."""
+    """The legs in which a spring is slack."""
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
     return [leg.name for leg, terms in pairs if ((leg.sign != 0.0) & (terms.carrying[0] == 0.0)).any()]

@@ -52,7 +52,7 @@ class ReportOptions:
 
     Attributes:
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
-        without: parts to leave out because they take time, of `studies.report.PARTS`.
+        without: parts to leave out because they take time, of `REPORT_PARTS`.
         engine: for the validation; None for the first that is installed.
         author, date: for the title block; None for none.
         loaded: whether the machine is to be shown under its loads, whatever its file says.
