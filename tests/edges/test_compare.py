@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from kinetostat import budget, evaluate, modes, requirements
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison import compare, read_design
 from kinetostat.studies.grid import evaluate_grid
@@ -108,6 +110,92 @@ def test_over_a_grid():
     assert found["grid"]["designs"] == [{"answered": 20, "poses": 20}] * 2
 
 
+TOOL = [
+    "tool.mass=12 kg", 'load.force=["100 N", "0 N", "-500 N"]', "cutting.direction=[1, 0, 0]",
+    "cutting.pressure=2000 N/mm**2", "tolerances.joints=0.05 mm",
+]  # fmt: skip
+STIFFER = "hexapod:stiffness.actuator=40 N/um"
+
+
+def test_vibrations_displacement_and_error_stand_beside_the_stiffness():
+    _, by_name = rows("hexapod", STIFFER, "tripteron", settings=TOOL[:1])
+    assert by_name["first natural frequency"]["values"][0] == pytest.approx(
+        modes(load("hexapod", TOOL[:1])).modes[0].frequency
+    )
+    assert "stable width of cut" not in by_name, "no file says anything of a cut"
+    _, by_name = rows("hexapod", STIFFER, settings=TOOL)
+    machine = load("hexapod", TOOL)
+    names = ["displacement_x", "displacement_y", "displacement_z", "stable_width"]
+    alone = evaluate(machine, {"x": [0.0]}, names)
+    moved = by_name["displacement under load"]
+    assert moved["values"][0] == pytest.approx(np.linalg.norm([float(alone[name][0]) for name in names[:3]]))
+    assert (moved["best"], moved["better"]) == ([1], "less")
+    assert by_name["stable width of cut"]["values"][0] == float(alone["stable_width"][0])
+    assert by_name["error as built, 95 %"]["values"][0] == float(budget(machine).size("usual", "position")[0])
+    assert by_name["error as built, 95 %"]["best"] == [], "tolerances of joints do not ask for the stiffness"
+
+
+def test_any_quantity_over_poses_of_a_file(tmp_path):
+    """Forces are columns as poses are; a quantity without a better side shows what is greatest in size."""
+    file = tmp_path / "path.csv"
+    file.write_text("x [mm],load.force.0 [N]\n0,100\n10,-300\n20,50\n", "utf-8")
+    designs = {"A": load("hexapod", TOOL), "B": load("hexapod", [*TOOL, "stiffness.actuator=40 N/um"])}
+    answer = compare(designs, quantities=["displacement", "frequency_1"], poses=file)
+    by_name = {(row.group, row.name): row for row in answer.over}
+    alone = evaluate(designs["B"], str(file), ["displacement_x", "displacement_y", "displacement_z", "frequency_1"])
+    size = np.linalg.norm([alone[f"displacement_{axis}"].values for axis in "xyz"], axis=0)
+    assert by_name["displacement", "worst"].values[1] == pytest.approx(size.max())
+    assert by_name["frequency 1", "worst"].values[1] == alone["frequency_1"].values.min()
+    along = alone["displacement_x"].values
+    assert by_name["displacement x", "greatest in size"].values[1] == along[np.abs(along).argmax()] < 0.0
+    assert by_name["displacement x", "greatest in size"].best == ()
+    assert ("C_x", "worst") not in by_name
+    assert answer.poses == ((3, 3), (3, 3))
+    assert [panel.get_ylabel().split(" (")[0] for panel in comparison_figure(answer).axes] == [
+        "displacement", "displacement about axes", "displacement along axes", "frequency", "moving mass",
+    ]  # fmt: skip
+
+
+def test_the_error_as_built_over_a_region():
+    machine = load("hexapod", TOOL)
+    answer = compare(
+        [machine, machine.with_values({"geometry.base_radius": 0.13})], ["x=-1 cm:1 cm:3"], quantities="built_error"
+    )
+    errors = budget(machine, ranges=["x=-1 cm:1 cm:3"]).size("usual", "position")
+    worst, _, mean = answer.over
+    assert worst.values[0] == pytest.approx(errors.max())
+    assert mean.values[0] == pytest.approx(errors.mean())
+    assert worst.values[1] < worst.values[0]
+
+
+def test_requirements_of_one_file_are_judged_for_all(capsys):
+    required = ['requirements.stiff=["free_stiffness_x > 30 N/um", "free_stiffness_z > 1 N/um"]']
+    designs = [load("hexapod", required), load("hexapod", ["stiffness.actuator=40 N/um"]), load("planar-3rpr")]
+    answer = compare(designs)
+    x, z = answer.verdicts
+    assert [verdict and verdict.met for verdict in x] == [False, True, None]
+    assert [verdict and verdict.met for verdict in z] == [True, True, None]
+    assert x[0].worst == requirements(designs[0])[0].worst
+    found = json_of(COMPARISON, answer)["requirements"][0]
+    assert (found["name"], found["designs"][2]) == ("stiff", None)
+    assert found["designs"][1]["margin"] == pytest.approx(x[1].worst / 30e6 - 1)
+    assert main(["compare", "hexapod", STIFFER, "--set", required[0]]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "A misses stiff. Required B meets every requirement." in said
+    assert "missed: 21.05 N/µm (-29.8 %)" in said
+
+
+def test_a_quantity_of_none_of_them_is_refused():
+    with pytest.raises(InputError, match="tolerances"):
+        compare(["hexapod", STIFFER], quantities=["built_error"])
+    with pytest.raises(InputError, match="did you mean frequency"):
+        compare(["hexapod", STIFFER], quantities=["frequncy"])
+    with pytest.raises(InputError, match="not from both"):
+        compare(["hexapod", STIFFER], ["x=0:1 cm:2"], poses={"x": [0.0]})
+    only = compare(["hexapod", "planar-3rpr"], quantities=["compliance_z"]).rows[-1]
+    assert (only.name, only.values[1]) == ("compliance_z", None)
+
+
 def test_files_are_designs_too(tmp_path, capsys):
     file = tmp_path / "mine.toml"
     file.write_text(as_toml(load("hexapod", ["geometry.base_radius=13 cm"])), "utf-8")
@@ -160,4 +248,4 @@ def test_bars_start_at_zero_and_what_is_not_known_is_said():
     for name in ("compliance about axes", "singularity margin", "moving mass"):
         assert panels[name].get_ylim()[0] == 0.0
     assert [text.get_text() for text in panels["moving mass"].texts] == ["not known"]
-    assert figure.legends[0].get_title().get_text() == "compliance in base axes at the platform point P"
+    assert figure.legends[0].get_title().get_text() == "in base axes at the platform point P"

@@ -57,6 +57,22 @@ def test_an_entry_of_a_list_that_the_file_leaves_out_is_set_beside_the_others():
         build(tables, "delta", ["load.gravty.2=1"])
 
 
+@pytest.mark.parametrize(
+    ("by_axis", "by_number"),
+    [("load.force.z", "load.force.2"), ("force.y", "load.force.1"), ("tool.inertia.xy", "tool.inertia.3")],
+)
+def test_components_are_named_by_their_axes(by_axis, by_number):
+    inertia = "tool.inertia=[1, 1, 1, 0, 0, 0]"
+    machine = load("hexapod", [inertia, f"{by_number}=0.25"])
+    assert load("hexapod", [inertia, f"{by_axis}=0.25"]) == machine
+    assert load("hexapod", [inertia]).with_values({by_axis: 0.25}) == machine
+
+
+def test_an_axis_that_a_vector_does_not_have_is_refused_as_it_was_written():
+    with refused("force.w"):
+        load("hexapod").with_values({"force.w": 1.0})
+
+
 def test_text_may_hold_an_equals_sign():
     assert load(NAME, ["name=one = two"]).name == "one = two"
 

@@ -206,7 +206,18 @@ def test_favourites_are_kept_loaded_compared_and_deleted(tmp_path):
         shown = page.one("comparison").content
         assert "wide &lt;b&gt;" in shown
         assert "geometry.base_radius" in shown
+        assert "<figure>" in shown
         await page.send("comparison-close", "click")
+        await page.choose("favourite-quantities", "singularity_margin, least_translational_stiffness")
+        await page.choose("favourite-over", "x=-1 cm:1 cm:3")
+        await page.send("favourite-compare", "click")
+        assert "Over x=-1 cm:1 cm:3" in page.one("comparison").content
+        assert "least translational stiffness worst" in page.one("comparison").content
+        await page.send("comparison-close", "click")
+        await page.choose("favourite-over", "nonsense")
+        await page.send("favourite-compare", "click")
+        assert any("nonsense" in message for message in page.user.notify.messages)
+        await page.choose("favourite-over", "")
         await page.send("favourite 1 load", "click")
         assert page.one("control geometry.base_radius")._props["text"] == "250 mm"
         assert page.one("undo").enabled

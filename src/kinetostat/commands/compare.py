@@ -47,6 +47,15 @@ def add_compare_commands(commands: "Commands") -> None:
         compare,
         "a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
     )
+    compare.add_argument(
+        "--poses", metavar="FILE", type=Path,
+        help="a CSV file of poses, as `path` takes it, instead of ranges; forces may be columns, such as force.x [N]",
+    )  # fmt: skip
+    compare.add_argument(
+        "--quantity", metavar="NAME", action="append", default=[], dest="quantities",
+        help="a number to compare, by the name of a quantity or group as `sweep` takes it, or built_error, which 95 %% "
+        "of the machines within [tolerances] keep; over poses these take the place of compliances; repeatable",
+    )  # fmt: skip
     takes_figures(compare, "the figure and JSON")
     takes_json(compare)
     validate = add_command(
@@ -88,7 +97,7 @@ def _compare(options: argparse.Namespace) -> int:
     shown = [f"display.units={options.units}"] if options.units else []
     designs = [read_design(text, [*options.settings, *shown]) for text in options.designs]
     with progress_bar("computing") as progress:
-        result = compare(designs, options.ranges, progress)
+        result = compare(designs, options.ranges, progress, options.quantities, options.poses)
     return show_answer(options, result)
 
 

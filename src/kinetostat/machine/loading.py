@@ -22,7 +22,7 @@ from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import form_of, make_room, with_angles
-from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, with_values
+from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, numbered_entry, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
@@ -113,7 +113,10 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
     """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"; unknown names stay."""
     pairs = ((setting, *setting.partition("=")) for setting in several(settings))
-    return [f"{_whole_path(document, name.strip())}={value}" if sign else given for given, name, sign, value in pairs]
+    return [
+        f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign else given
+        for given, name, sign, value in pairs
+    ]
 
 
 def _whole_path(document: Document, name: str) -> str:

@@ -112,6 +112,14 @@ def entry_name(field: str, entry: int) -> str:
     return AXES[entry] if field in VECTORS else str(entry + 1)
 
 
+def numbered_entry(text: str) -> str:
+    """Return a path with the number of an entry that was named by its axes: "load.force.0" of "load.force.x"."""
+    field, _, entry = text.rpartition(".")
+    last = field.rpartition(".")[2]
+    names = TENSOR if last in TENSORS else AXES if last in VECTORS else ()
+    return f"{field}.{names.index(entry)}" if entry in names else text
+
+
 POSE = "pose."
 
 
@@ -147,7 +155,8 @@ def find(family: HasFields, text: str) -> Parameter:
 
     Args:
         family: the family of the machine.
-        text: "x", "pose.x", "geometry.base_angles.1", "geometry_base_angles_1" or "base_angles.1".
+        text: "x", "pose.x", "geometry.base_angles.1", "geometry_base_angles_1" or "base_angles.1"; entries of
+            vectors and inertia tensors also by their axes, "force.x".
 
     Raises:
         InputError: none, several, or several numbers that are never alike; the message lists what is near.
@@ -167,6 +176,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
         InputError: there is no such field, or several; the message lists what is near.
     """
     known = {parameter.path: parameter for parameter in parameters(family)}
+    given, text = text, numbered_entry(text)
     for exact in (text, f"{POSE}{text}"):
         if exact in known:
             return known[exact]
@@ -179,7 +189,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
     hint = f"did you mean {near[0]}?" if near else rest
-    raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
+    raise InputError(f'"{given}" is not a field of family {family.name}; {hint}')
 
 
 def values(machine: HasNumbers) -> dict[str, Scalar]:

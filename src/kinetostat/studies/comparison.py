@@ -6,21 +6,17 @@ printed or drawn is in `views`.
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
-from typing import TYPE_CHECKING
-
-import numpy as np
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
-from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
@@ -30,8 +26,8 @@ from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.grid import evaluate_grid
-from kinetostat.tolerances import EQUAL_DESIGNS
+from kinetostat.studies.design_numbers import DesignRow, rows_at_poses, rows_over
+from kinetostat.studies.requirements import Verdict, requirements
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,54 +35,8 @@ if TYPE_CHECKING:
 MOST_DESIGNS = 12
 OVERRIDE_SEPARATOR = ";"
 """Between overrides of one design."""
-PERCENTILE = 95.0
-"""Percent of the poses of a grid that are at least as good as the value shown."""
 
 _OVERRIDDEN = re.compile(r"(.+?):(\s*[A-Za-z_][\w.-]*\s*=.*)", re.DOTALL)
-
-
-class Better(StrEnum):
-    """The better one of two values: the smaller or the greater."""
-
-    LESS = "less"
-    MORE = "more"
-
-
-@dataclass(frozen=True)
-class DesignRow:
-    """One number of every design.
-
-    Attributes:
-        group: heading under which rows stand together.
-        name: name of the number.
-        unit: unit of the number, SI.
-        better: whether less or more is better.
-        values: the number of each design; None if a design lacks it, infinite where the design is rigid or free.
-    """
-
-    group: str
-    name: str
-    unit: str
-    better: Better
-    values: tuple[float | None, ...]
-
-    @property
-    def percents(self) -> tuple[float | None, ...]:
-        """Change against the first design, percent; None where the change is undefined."""
-        first = self.values[0]
-        if first is None or first == 0.0 or not math.isfinite(first):
-            return (None,) * len(self.values)
-        return tuple(None if v is None or not math.isfinite(v) else 100.0 * (v / first - 1.0) for v in self.values)
-
-    @property
-    def best(self) -> tuple[int, ...]:
-        """Indices of the best designs; empty where all are equal."""
-        known = {i: v for i, v in enumerate(self.values) if v is not None}
-        if len(known) < 2:
-            return ()
-        top = (min if self.better is Better.LESS else max)(known.values())
-        places = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
-        return places if len(places) < len(known) else ()
 
 
 @dataclass(frozen=True)
@@ -146,7 +96,9 @@ class Comparison(Immutable):
         differences: fields that two designs have at least and that differ.
         rows: numbers at the pose of each design.
         softest: the softest rotation and translation of each design; fewer where it has none.
+        verdicts: on the requirements of all files, each judged for every design; None where it lacks the quantity.
         ranges: of the grid, as written.
+        where: these poses in words, "over x=-1 cm:1 cm:5"; empty without any.
         poses: of each design, how many poses of the grid have an answer, and how many there are.
         over: numbers over those poses.
     """
@@ -155,7 +107,9 @@ class Comparison(Immutable):
     differences: tuple[Difference, ...]
     rows: tuple[DesignRow, ...]
     softest: tuple[tuple[SoftDirection, ...], ...]
+    verdicts: tuple[tuple[Verdict | None, ...], ...] = ()
     ranges: tuple[str, ...] = ()
+    where: str = ""
     poses: tuple[tuple[int, int], ...] = ()
     over: tuple[DesignRow, ...] = ()
 
@@ -200,17 +154,25 @@ def compare(
     designs: Sequence[Design | Machine | str] | Mapping[str, Machine | str],
     ranges: Sequence[str] = (),
     progress: Progress = silent,
+    quantities: Sequence[str] = (),
+    poses: Any = None,
 ) -> Comparison:
-    """Compare designs, each at its own pose and, where ranges are given, all over the same grid.
+    """Compare designs, each at its own pose and, where ranges or poses are given, all over the same of them.
+
+    Requirements of any of the files are judged for all designs.
 
     Args:
         designs: two or more; machines, by names of your choice if you like, or texts, "NAME" or
             "NAME:path=value;path=value".
         ranges: "FIELD=from:to:count", of fields that all of them have.
         progress: receives how far the work is.
+        quantities: further numbers, by the names of quantities or groups; "built_error" is the error as built that 95 %
+            of the machines within the tolerances keep. Over poses they take the place of compliances and margin.
+        poses: instead of ranges, poses as `evaluate` takes them, such as the path of a CSV file.
 
     Raises:
-        InputError: fewer than two designs or too many, or a range that one of them does not take.
+        InputError: fewer than two designs or too many, ranges or poses that one of them does not take, both of them, or
+            a quantity that none of them has.
     """
     designs, ranges = [designs] if isinstance(designs, str) else designs, several(ranges)
     if not 2 <= len(designs) <= MOST_DESIGNS:
@@ -218,18 +180,49 @@ def compare(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
     given = list(_designs(designs))
+    if ranges and poses is not None:
+        raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
     for design in given:
         _refuse_absent(design, ranges)
-    over, poses = rows_over([design.machine for design in given], ranges, progress) if ranges else ((), ())
+    analyses, names = [design.analysis for design in given], several(quantities)
+    looked = bool(ranges) or poses is not None
+    over, counts = rows_over(analyses, ranges, poses, names, progress) if looked else ((), ())
+    where = f"over {', '.join(ranges)}" if ranges else "at the poses of " + _poses_name(poses) if looked else ""
     return Comparison(
         tuple(given),
         _differences(given),
-        rows_at_poses([design.analysis for design in given]),
+        rows_at_poses(analyses, names),
         tuple(_softest(design) for design in given),
+        _verdicts(given),
         tuple(ranges),
-        poses,
+        where,
+        counts,
         over,
     )
+
+
+def _poses_name(poses: Any) -> str:
+    return str(poses) if isinstance(poses, str | Path) else "the list"
+
+
+def _verdicts(designs: Sequence[Design]) -> tuple[tuple[Verdict | None, ...], ...]:
+    """Judge the requirements of all files for every design, of those with one name the first; a row for a condition."""
+    judged = dict[str, Any]()
+    for design in designs:
+        judged = {**design.machine.requirements, **judged}
+    columns = []
+    for design in designs:
+        column = dict[tuple[str, str], Verdict]()
+        for name, requirement in judged.items():
+            try:
+                verdicts = requirements(replace(design.machine, requirements={name: requirement}))
+            except InputError:  # what it is about is nothing that this machine has
+                if name in design.machine.requirements:
+                    raise
+                continue
+            column |= {(name, verdict.condition): verdict for verdict in verdicts}
+        columns.append(column)
+    return tuple(tuple(column.get(key) for column in columns) for key in dict.fromkeys(k for c in columns for k in c))
 
 
 def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
@@ -295,75 +288,3 @@ def _softest(design: Design) -> tuple[SoftDirection, ...]:
             ]
             softest.append(SoftDirection(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
     return tuple(softest)
-
-
-def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[DesignRow, ...]:
-    """Collect numbers at each design's pose; a row for which no design has a number is left out."""
-    rows = []
-    for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
-        for name in COMPONENTS:
-            entry = QUANTITIES[f"{group}_{name}"]
-            numbers = tuple(_diagonal(analysis, group, name) for analysis in analyses)
-            rows.append(DesignRow(group, f"{letter}_{name}", entry.unit, better, numbers))
-    scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
-        ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
-        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
-        ("condition of K", "1", Better.LESS, _condition),
-        ("singularity margin", "1", Better.MORE, lambda analysis: analysis.singularity_margin),
-        ("moving mass", "kg", Better.LESS, lambda analysis: analysis.moving_mass),
-    ]
-    for name, unit, better, value in scalars:
-        numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
-        rows.append(DesignRow("indices", name, unit, better, numbers))
-    return tuple(row for row in rows if any(value is not None for value in row.values))
-
-
-def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
-    diagonal = analysis.compliance_diagonal if group == "compliance" else analysis.stiffness_diagonal
-    return dict(zip(analysis.components, diagonal, strict=False)).get(name)
-
-
-def _least(analysis: Analysis, block: str) -> float | None:
-    """The least principal stiffness of a block, with the motions of the other block free."""
-    blocks = analysis.indices.free if analysis.indices else None
-    return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
-
-
-def _condition(analysis: Analysis) -> float | None:
-    value = analysis.indices.stiffness_condition if analysis.indices else math.inf
-    return value if math.isfinite(value) else None
-
-
-def rows_over(
-    machines: Sequence[Machine], ranges: Sequence[str], progress: Progress
-) -> tuple[tuple[DesignRow, ...], tuple[tuple[int, int], ...]]:
-    """Compute the worst value, a percentile and the mean over a grid; and for each design (poses answered, all poses).
-
-    Raises:
-        InputError: a range that one of the machines does not take.
-    """
-    common = [name for name in COMPONENTS if any(name in machine.family.component_names for machine in machines)]
-    spreads: list[dict[str, tuple[float, ...]]] = []
-    poses = []
-    for done, machine in enumerate(machines, 1):
-        dataset = evaluate_grid(machine, ranges, ["compliance", "singularity_margin"])
-        good = dataset["status"].values == Status.OK
-        poses.append((int(good.sum()), int(good.size)))
-        columns = {str(name): dataset[name].values[good] for name in dataset.data_vars if name != "status"}
-        spreads.append({name: _spread(name, row) for name, row in columns.items() if row.size})
-        progress(done, len(machines))
-    rows = []
-    for name in [*(f"compliance_{component}" for component in common), "singularity_margin"]:
-        better = Better.MORE if name == "singularity_margin" else Better.LESS
-        shown = name.replace("compliance_", "C_").replace("_margin", " margin")
-        for k, what in enumerate(("worst", f"{PERCENTILE:g} %", "mean")):
-            by_design = tuple(spread[name][k] if name in spread else None for spread in spreads)
-            rows.append(DesignRow(shown, what, QUANTITIES[name].unit, better, by_design))
-    return tuple(rows), tuple(poses)
-
-
-def _spread(name: str, row: Array) -> tuple[float, ...]:
-    """Return the worst value, the value that `PERCENTILE` percent of the poses reach or better, and the mean."""
-    if name == "singularity_margin":
-        return float(row.min()), float(np.percentile(row, 100.0 - PERCENTILE)), float(row.mean())
-    return float(row.max()), float(np.percentile(row, PERCENTILE)), float(row.mean())

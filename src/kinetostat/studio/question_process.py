@@ -22,7 +22,7 @@ from kinetostat.studio.processes import REFUSED, limit_process
 from kinetostat.studio.wording import paragraph, table
 from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
-from kinetostat.views.question import Description, Option, Question, late
+from kinetostat.views.question import Description, Drawing, Option, Question, late
 from kinetostat.views.questions import QUESTIONS
 from kinetostat.views.report.typesetting import as_table
 
@@ -108,11 +108,14 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
         title = str(shown.title or description.title)
         rows = as_table(shown, title)
         parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer"))
-    for drawing in description.drawings(answer).values():
-        data = base64.b64encode(as_svg(drawing(title="")).encode()).decode()
-        image = f'<img alt="{escape(drawing.caption)}" src="data:image/svg+xml;base64,{data}">'
-        parts.append(f"<figure>{image}<figcaption>{escape(drawing.caption)}</figcaption></figure>")
-    return "".join(parts)
+    return "".join(parts) + "".join(figure_html(drawing) for drawing in description.drawings(answer).values())
+
+
+def figure_html(drawing: Drawing) -> str:
+    """Return a figure with its caption as HTML."""
+    data = base64.b64encode(as_svg(drawing(title="")).encode()).decode()
+    image = f'<img alt="{escape(drawing.caption)}" src="data:image/svg+xml;base64,{data}">'
+    return f"<figure>{image}<figcaption>{escape(drawing.caption)}</figcaption></figure>"
 
 
 def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:

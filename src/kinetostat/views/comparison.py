@@ -7,7 +7,9 @@ from typing import Any
 from rich.text import Text
 
 from kinetostat.display import Display
-from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
+from kinetostat.studies.comparison import Comparison, SoftDirection
+from kinetostat.studies.design_numbers import Better, DesignRow
+from kinetostat.studies.requirements import Verdict
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Description, Field, Lines
 from kinetostat.views.tables import numeric_table, readable, text_table
@@ -36,9 +38,51 @@ def _lines(comparison: Comparison) -> Lines:
         yield "Files", "The files have equal values."
     if len(_families(comparison)) > 1:
         yield "Files", "Fields that only one design has are omitted."
-    if comparison.ranges:
+    if comparison.verdicts:
+        yield from (
+            ("Required", f"{letter} {sentence}") for letter, sentence in zip(letters, _judged(comparison), strict=True)
+        )
+    if comparison.where:
         counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, comparison.poses, strict=True))
         yield "Poses", f"Poses with a result: {counts}."
+
+
+def _judged(comparison: Comparison) -> Iterator[str]:
+    """Which requirements each design misses, and which are about something that it lacks."""
+    names = [condition_of(row)[0] for row in comparison.verdicts]
+    for column in zip(*comparison.verdicts, strict=True):
+        missed = dict.fromkeys(name for name, each in zip(names, column, strict=True) if each and not each.met)
+        absent = dict.fromkeys(name for name, each in zip(names, column, strict=True) if each is None)
+        met = "misses " + ", ".join(missed) if missed else "meets every requirement"
+        yield met + (f"; it lacks what {', '.join(absent)} is about." if absent else ".")
+
+
+def condition_of(row: Sequence[Verdict | None]) -> tuple[str, str]:
+    """The name of a requirement and its condition: that of the first design for which it could be judged."""
+    verdict = next(verdict for verdict in row if verdict)
+    return verdict.name, verdict.condition
+
+
+def verdict_text(verdict: Verdict | None, display: Display) -> str:
+    """Whether a requirement is met, by which worst value, and by how much."""
+    if verdict is None:
+        return NO_FIELD
+    word = "met" if verdict.met else "missed"
+    if verdict.worst is None:
+        return f"{word}: no result"
+    margin = "" if verdict.margin is None else f" ({_percent(100.0 * verdict.margin)})"
+    return f"{word}: {display.show(verdict.worst, verdict.unit)}{margin}"
+
+
+def _verdict_table(comparison: Comparison, letters: str) -> FittedTable:
+    table = text_table("Requirements, with the worst value and its distance from the bound", "", *letters)
+    for row in comparison.verdicts:
+        cells = [verdict_text(verdict, comparison.machine.display) for verdict in row]
+        styled = [
+            Text(cell, "red" if cell.startswith("missed") else "green" if cell != NO_FIELD else "") for cell in cells
+        ]
+        table.add_row(": ".join(condition_of(row)), *styled)
+    return table
 
 
 def _families(comparison: Comparison) -> set[str]:
@@ -66,10 +110,13 @@ def _tables(comparison: Comparison, _full: bool) -> Iterator[FittedTable]:
             table.add_row(path, *cells)
         yield table
     yield _row_table("At the pose of each design", letters, comparison.rows, display)
+    if comparison.verdicts:
+        yield _verdict_table(comparison, letters)
     if any(comparison.softest):
         yield _softest_table(comparison)
-    if comparison.ranges:
-        yield _row_table(f"Over {', '.join(comparison.ranges)}", letters, comparison.over, display, by_group=True)
+    if comparison.where:
+        title = f"{comparison.where[0].upper()}{comparison.where[1:]}"
+        yield _row_table(title, letters, comparison.over, display, by_group=True)
 
 
 def _row_table(
@@ -95,7 +142,7 @@ def _cell(row: DesignRow, i: int, display: Display) -> Text:
     if i == 0 or percent is None:
         return Text.assemble(shown, "" if i == 0 else " " * 9)
     better = (percent < 0.0) == (row.better is Better.LESS)
-    colour = "default" if abs(percent) < 0.05 else "green" if better else "red"
+    colour = "default" if abs(percent) < 0.05 or row.better is None else "green" if better else "red"
     return Text.assemble(shown, (f" {_percent(percent):>8}", colour))
 
 
@@ -159,11 +206,27 @@ def _numbers(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     ]
 
 
+def _verdicts(comparison: Comparison) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": condition_of(row)[0],
+            "condition": condition_of(row)[1],
+            "designs": [
+                verdict
+                and {"met": verdict.met, "worst": verdict.worst, "margin": verdict.margin, "place": verdict.place}
+                for verdict in row
+            ],
+        }
+        for row in comparison.verdicts
+    ]
+
+
 def _grid(comparison: Comparison) -> dict[str, Any] | None:
-    if not comparison.ranges:
+    if not comparison.where:
         return None
     return {
         "over": comparison.ranges,
+        "poses": comparison.where,
         "designs": [{"answered": answered, "poses": poses} for answered, poses in comparison.poses],
         "rows": _numbers(comparison.over),
     }
@@ -175,6 +238,7 @@ COMPARISON = Description(
         Field("designs", _designs),
         Field("differences", _differences),
         Field("rows", lambda comparison: _numbers(comparison.rows)),
+        Field("requirements", _verdicts),
         Field("grid", _grid),
     ),
     lines=_lines,

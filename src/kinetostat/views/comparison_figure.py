@@ -2,7 +2,6 @@
 
 import math
 import string
-from collections.abc import Sequence
 from functools import partial
 
 import matplotlib as mpl
@@ -11,8 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.display import Display
-from kinetostat.studies.comparison import Comparison, DesignRow
+from kinetostat.studies.comparison import Comparison
+from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.setting import frame_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 from kinetostat.views.question import Drawing
@@ -23,35 +24,39 @@ LONGEST_DESIGN_NAME = 100
 """Greatest number of characters of a design's name in the legend."""
 
 
-def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}") -> Figure:
-    """Draw the compliance, singularity margin and mass of each design; over a grid, bars are means and dots the worst.
+PANELS_IN_A_ROW = 4
 
+
+def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}") -> Figure:
+    """Draw the numbers of each design in panels, one for each unit; over poses, bars are means and dots the worst.
+
+    Without named quantities these are the compliance, singularity margin, vibrations, displacement and error, and mass.
     Bars start at 0. If the numbers of a panel differ too much for that, its axis is logarithmic, and marks take the
     place of bars, because the length of a bar has no meaning there.
     """
-    grid = bool(comparison.ranges)
-    rows = comparison.over if grid else comparison.rows
-    panels = [panel for panel in (*_compliance(rows, grid), *_scalars(comparison, rows, grid)) if panel[1]]
-    widths = [0.9 + 0.55 * len(bars) for _, bars in panels]
+    panels = [panel for panel in _panels(comparison) if panel[1]]
+    lines = [panels[i : i + PANELS_IN_A_ROW] for i in range(0, len(panels), PANELS_IN_A_ROW)]
+    sizes = [[0.9 + 0.55 * len(bars) for _, bars in line] for line in lines]
     with mpl.rc_context(STYLE):
-        height = 2.9 + 0.17 * len(comparison.designs)
-        figure = Figure(figsize=(sum(widths) + 0.6 * len(panels) + 0.6, height), layout="constrained")
-        axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=widths).flat
-        for panel, (title, bars) in zip(axes, panels, strict=True):
-            _bars(panel, title, bars, len(comparison.designs), comparison.machine.display)
+        width = max(sum(line) + 0.6 * len(line) + 0.6 for line in sizes)
+        height = 2.3 * len(lines) + 0.6 + 0.17 * len(comparison.designs)
+        figure = Figure(figsize=(width, height), layout="constrained")
+        rows = figure.add_gridspec(len(lines), 1)
+        for row, (line, widths) in enumerate(zip(lines, sizes, strict=True)):
+            cells = rows[row].subgridspec(1, len(line), width_ratios=widths)
+            for column, (name, bars) in enumerate(line):
+                _bars(
+                    figure.add_subplot(cells[column]), name, bars, len(comparison.designs), comparison.machine.display
+                )
         styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
         handles = [
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
             for i, (letter, design) in enumerate(styles)
         ]
         frames = dict.fromkeys(frame_of(design.machine) for design in comparison.designs)
-        legend = f"compliance in {' or '.join(frames)}"
+        legend = f"in {' or '.join(frames)}"
         figure.legend(handles=handles, loc="outside lower left", title=legend, title_fontsize=6.5, alignment="left")
-        over = (
-            f"mean (bars) and worst (dots) over {', '.join(comparison.ranges)}"
-            if grid
-            else "at the pose of each design"
-        )
+        over = f"mean (bars) and worst (dots) {comparison.where}" if comparison.where else "at the pose of each design"
         set_title(figure, title.format(over))
         fix_layout(figure)
     return figure
@@ -61,27 +66,40 @@ Bars = list[tuple[str, DesignRow, DesignRow | None]]
 """For each group of bars: its label, the row of the bars, and the row of the dots if there are any."""
 
 
-def _compliance(rows: Sequence[DesignRow], grid: bool) -> list[tuple[str, Bars]]:
-    diagonal = [row for row in rows if (row.group.startswith("C_") if grid else row.group == "compliance")]
-    panels: dict[str, Bars] = {"compliance about axes": [], "compliance along axes": []}
-    for label, bar, dot in _pairs(diagonal, grid):
-        panels[f"compliance {'about' if label.startswith('r') else 'along'} axes"].append((label, bar, dot))
+def _panels(comparison: Comparison) -> list[tuple[str, Bars]]:
+    """Panels by title: those of the quantities that were named, or else the usual ones; the mass closes them."""
+    mass: list[tuple[str, Bars]] = [
+        ("moving mass", [("", row, None) for row in comparison.rows if row.name == "moving mass"])
+    ]
+    if comparison.where:
+        groups: dict[str, dict[str, DesignRow]] = {}
+        for row in comparison.over:
+            groups.setdefault(row.group, {})[row.name] = row
+        pairs: Bars = [
+            (name, group["mean"], group.get("worst") or group["greatest in size"]) for name, group in groups.items()
+        ]
+        return [*_by_title(pairs), *mass]
+    named: Bars = [(row.name, row, None) for row in comparison.rows if row.group == "quantities"]
+    usual: Bars = [
+        (row.name, row, None)
+        for row in comparison.rows
+        if row.group in ("compliance", "loads and vibration") or row.name == "singularity margin"
+    ]
+    return [*_by_title(named or usual), *mass]
+
+
+def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
+    """Bars under the title of their panel: entries of a matrix about and along axes, members of a group together."""
+    panels: dict[str, Bars] = {}
+    for name, bar, dot in pairs:
+        stem, _, member = name.rpartition("_") if "_" in name else name.rpartition(" ")
+        known = stem and (member.isdigit() or member in COMPONENTS)
+        title, label = (stem.replace("_", " "), member) if known else (name.replace("_", " "), "")
+        title = "compliance" if title == "C" else title
+        if known and member in COMPONENTS:
+            title = f"{title} {'about' if member.startswith('r') else 'along'} axes"
+        panels.setdefault(title, []).append((label, bar, dot))
     return list(panels.items())
-
-
-def _scalars(comparison: Comparison, rows: Sequence[DesignRow], grid: bool) -> list[tuple[str, Bars]]:
-    regular = [row for row in rows if (row.group if grid else row.name) == "singularity margin"]
-    mass = [row for row in comparison.rows if row.name == "moving mass"]
-    return [("singularity margin", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
-
-
-def _pairs(rows: Sequence[DesignRow], grid: bool) -> Bars:
-    if not grid:
-        return [(row.name.removeprefix("C_").replace("singularity margin", ""), row, None) for row in rows]
-    groups: dict[str, dict[str, DesignRow]] = {}
-    for row in rows:
-        groups.setdefault(row.group.removeprefix("C_").replace("singularity margin", ""), {})[row.name] = row
-    return [(label, group["mean"], group["worst"]) for label, group in groups.items()]
 
 
 def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> None:
@@ -110,7 +128,7 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     panel.grid(visible=False, axis="x")
     panel.set_axisbelow(True)
     panel.tick_params(axis="x", length=0)
-    panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)")
+    panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)" if "margin" in title else title)
 
 
 def _say_missing(panel: Axes, place: float, row: DesignRow, i: int) -> None:
@@ -137,5 +155,5 @@ def _short(label: str) -> str:
 
 def comparison_figures(comparison: Comparison) -> dict[str, Drawing]:
     """Return designs side by side as the one figure that they have."""
-    caption = "Compliance, singularity margin and mass of each design."
+    caption = "Numbers of each design beside those of the others."
     return {"comparison": Drawing(caption, partial(comparison_figure, comparison), file="compare")}

@@ -1,6 +1,6 @@
 """The design tab: a study on the left, searches, their results and favourites on the right, the machine between them.
 
-`Workshop` holds what outlives the page. Favourites are machines with a note, of which two to four are compared.
+`Workshop` holds what outlives the page. Favourites are machines with a note, of which two to five are compared.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from nicegui import ui
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison import Comparison, Design, compare
+from kinetostat.studies.comparison import Design, compare
 from kinetostat.studio.design.draft import Draft
 from kinetostat.studio.design.run_panel import RunPanel
 from kinetostat.studio.design.runs import Runs
@@ -94,13 +94,15 @@ class DesignTab:
         self.runs.follow(run)
 
 
-LEAST, MOST = 2, 4
+LEAST, MOST = 2, 5
 """Designs that are compared at a time."""
 PRESENT = 0
 """The number of the present machine in the list; favourites begin at 1."""
 PRESENT_NAME = "present machine"
 
 Named = list[tuple[str, Machine]]
+Asked = tuple[Named, list[str], list[str]]
+"""Machines by name, the quantities to compare, and ranges of poses."""
 
 
 class FavouritesPanel:
@@ -125,8 +127,13 @@ class FavouritesPanel:
             button = ui.button("Keep", icon="star", on_click=self._keep).props(MAIN_BUTTON)
             button.tooltip("keep the present machine as a favourite").mark("favourite-keep")
         self._list = ui.element("div").classes("favourites")
+        with ui.element("div").classes("keep-row"):
+            self.quantities = ui.input("numbers, e.g. frequency_1, stable_width").mark("favourite-quantities")
+            self.over = ui.input("over, e.g. x=-2 cm:2 cm:5").mark("favourite-over")
+            for box in (self.quantities, self.over):
+                box.props(f"dense outlined maxlength={LONGEST_NOTE}").classes("field grow")
         with ui.element("div").classes("design-foot"):
-            ui.label("Tick two to four machines to compare them.").classes("note grow")
+            ui.label("Tick two to five machines to compare them.").classes("note grow")
             self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)
             self.compare.props(MAIN_BUTTON).mark("favourite-compare")
         with ui.dialog() as self.window, ui.element("div").classes("comparison-window"):
@@ -205,12 +212,25 @@ class FavouritesPanel:
         if PRESENT in self._chosen:
             machines.insert(0, (PRESENT_NAME, self._session.machine))
         if len(machines) >= LEAST:
-            self._lane.ask(machines)
+            self._lane.ask((machines, _listed(self.quantities.value), _listed(self.over.value)))
 
-    def _show(self, _machines: Named, comparison: Comparison) -> None:
-        self.comparison.set_content(comparison_text(comparison))
+    def _show(self, _asked: Asked, shown: str | InputError) -> None:
+        if isinstance(shown, InputError):
+            refuse(str(shown))
+            return
+        self.comparison.set_content(shown)
         self.window.open()
 
 
-def _comparison_of(machines: Named) -> Comparison:
-    return compare([Design(label, machine, analyze(machine)) for label, machine in machines])
+def _listed(text: str) -> list[str]:
+    """What is written between commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def _comparison_of(asked: Asked) -> str | InputError:
+    machines, quantities, ranges = asked
+    designs = [Design(label, machine, analyze(machine)) for label, machine in machines]
+    try:
+        return comparison_text(compare(designs, ranges, quantities=quantities))
+    except InputError as refusal:
+        return refusal

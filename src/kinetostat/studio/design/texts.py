@@ -1,19 +1,24 @@
-"""Results of the design tab as HTML: the best design next to the initial one, and two to four designs side by side.
+"""Results of the design tab as HTML: the best design next to the initial one, and two to five designs side by side.
 
 The numbers are those of `optimize --json` and of `studies.comparison`; here they are only rounded and arranged.
 """
 
 import math
 import string
+from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 from typing import Any
 
 from kinetostat.display import DASH, Display, Scale, number
 from kinetostat.kinetostatics.quantities import spoken
-from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
+from kinetostat.studies.comparison import Comparison, SoftDirection
+from kinetostat.studies.design_numbers import Better, DesignRow
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import EXACT, Progress
+from kinetostat.studio.question_process import figure_html
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
+from kinetostat.views.comparison import COMPARISON, condition_of, verdict_text
 from kinetostat.views.tables import readable
 
 SACRIFICED = 0.01
@@ -141,13 +146,23 @@ def comparison_text(comparison: Comparison) -> str:
         heading("Stiffness, times that of A (logarithmic bars; orange: less stiff)"),
         _gains(comparison, letters),
     ]
-    parts += [heading("At the pose of each design"), _rows(comparison, letters)]
+    parts += [heading("At the pose of each design"), _rows(comparison, comparison.rows, letters)]
+    if comparison.where:
+        over = [replace(row, name=f"{row.group} {row.name}") for row in comparison.over]
+        title = f"{comparison.where[0].upper()}{comparison.where[1:]}"
+        parts += [heading(title), _rows(comparison, over, letters)]
+    if comparison.verdicts:
+        display = comparison.machine.display
+        judged = [[": ".join(condition_of(row)), *(verdict_text(each, display) for each in row)]
+                  for row in comparison.verdicts]  # fmt: skip
+        title = "Requirements, with the worst value and its distance from the bound"
+        parts += [heading(title), table(title, ["", *letters], judged, "words")]
     parts += [heading("Where they differ"), _differences(comparison, letters)]
     if any(comparison.softest):
         parts_of = [[letter, *_softest(weakest)] for letter, weakest in zip(letters, comparison.softest, strict=True)]
         title = "Largest contributions in the softest directions"
         parts += [heading(title), table(title, ["", "rotation", "translation"], parts_of, "words")]
-    return "".join(parts)
+    return "".join([*parts, *map(figure_html, COMPARISON.drawings(comparison).values())])
 
 
 def _legend(comparison: Comparison, letters: str) -> str:
@@ -176,9 +191,9 @@ def _gain(row: DesignRow, k: int) -> float | None:
     return first / other
 
 
-def _rows(comparison: Comparison, letters: str) -> str:
+def _rows(comparison: Comparison, rows: Sequence[DesignRow], letters: str) -> str:
     head = "".join(f'<th scope="col">{letter}</th>' for letter in letters)
-    body = "".join(_row(row, comparison.machine.display) for row in comparison.rows)
+    body = "".join(_row(row, comparison.machine.display) for row in rows)
     caption = "<caption>At the pose of each design</caption>"
     return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
 
@@ -197,6 +212,8 @@ def _change(row: DesignRow, percent: float | None) -> str:
         return ""
     if abs(percent) < SAME:
         return ' <span class="change">=</span>'
+    if row.better is None:
+        return f' <span class="change">{percent:+.1f} %</span>'
     kind = "better" if (percent < 0.0) == (row.better is Better.LESS) else "worse"
     shown = f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
     return f' <span class="change {kind}">{shown}</span>'

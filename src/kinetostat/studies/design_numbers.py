@@ -1,0 +1,309 @@
+"""Numbers of several designs side by side: at the pose of each, and over poses that are the same for all.
+
+A design that lacks a number has None in its place. Designs themselves are in `comparison`.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from enum import StrEnum
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
+from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.points import Points, PointTable
+from kinetostat.equilibrium.state import MachineState
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, Parameter, parameters, values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.poses import chosen_axes, given_poses, grid_of
+from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities
+from kinetostat.tolerances import EQUAL_DESIGNS
+
+PERCENTILE = 95.0
+"""Percent of the poses that are at least as good as the value shown."""
+BUILT_ERROR = "built_error"
+"""A number of designs that is no quantity: what 95 % of the machines within the tolerances of a file keep within."""
+MOVED = "displacement"
+"""The whole way of the tool point, of which the quantities of this group are the components."""
+USUAL = ("compliance", "singularity_margin")
+"""Quantities over poses, if none is named."""
+
+
+class Better(StrEnum):
+    """The better one of two values: the smaller or the greater."""
+
+    LESS = "less"
+    MORE = "more"
+
+
+@dataclass(frozen=True)
+class DesignRow:
+    """One number of every design.
+
+    Attributes:
+        group: heading under which rows stand together.
+        name: name of the number.
+        unit: unit of the number, SI.
+        better: whether less or more is better; None where that depends on the machine.
+        values: the number of each design; None if a design lacks it, infinite where the design is rigid or free.
+    """
+
+    group: str
+    name: str
+    unit: str
+    better: Better | None
+    values: tuple[float | None, ...]
+
+    @property
+    def percents(self) -> tuple[float | None, ...]:
+        """Change against the first design, percent; None where the change is undefined."""
+        first = self.values[0]
+        if first is None or first == 0.0 or not math.isfinite(first):
+            return (None,) * len(self.values)
+        return tuple(None if v is None or not math.isfinite(v) else 100.0 * (v / first - 1.0) for v in self.values)
+
+    @property
+    def best(self) -> tuple[int, ...]:
+        """Indices of the best designs; empty where all are equal, or where nothing says what is better."""
+        known = {i: v for i, v in enumerate(self.values) if v is not None}
+        if len(known) < 2 or self.better is None:
+            return ()
+        top = (min if self.better is Better.LESS else max)(known.values())
+        places = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
+        return places if len(places) < len(known) else ()
+
+
+def rows_at_poses(analyses: Sequence[Analysis], quantities: Sequence[str] = ()) -> tuple[DesignRow, ...]:
+    """Collect numbers at each design's pose; a row for which no design has a number is left out.
+
+    Args:
+        analyses: of the designs.
+        quantities: names of further quantities or groups.
+
+    Raises:
+        InputError: a quantity that none of the designs has.
+    """
+    rows = []
+    for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
+        for name in COMPONENTS:
+            entry = QUANTITIES[f"{group}_{name}"]
+            numbers = tuple(_diagonal(analysis, group, name) for analysis in analyses)
+            rows.append(DesignRow(group, f"{letter}_{name}", entry.unit, better, numbers))
+    scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
+        ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
+        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
+        ("condition of K", "1", Better.LESS, _condition),
+        ("singularity margin", "1", Better.MORE, lambda analysis: analysis.singularity_margin),
+        ("moving mass", "kg", Better.LESS, lambda analysis: analysis.moving_mass),
+    ]
+    for name, unit, better, value in scalars:
+        numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
+        rows.append(DesignRow("indices", name, unit, better, numbers))
+    known = [_at_pose(analysis.state) for analysis in analyses]
+    for name, unit, better in (
+        ("first natural frequency", "Hz", Better.MORE),
+        ("stable width of cut", "m", Better.MORE),
+        ("displacement under load", "m", Better.LESS),
+        ("error as built, 95 %", "m", Better.LESS),
+    ):
+        rows.append(DesignRow("loads and vibration", name, unit, better, tuple(each.get(name) for each in known)))
+    named = [_numbers_of(analysis.state.machine, _one_point(analysis.state.machine), names)[0]
+             for analysis, names in zip(analyses, _names(analyses, quantities), strict=True)]  # fmt: skip
+    for name in dict.fromkeys(name for numbers in named for name in numbers):
+        known_values = tuple(_known(numbers[name][0]) if name in numbers else None for numbers in named)
+        rows.append(DesignRow("quantities", name, *_about(name), known_values))
+    return tuple(row for row in rows if any(value is not None for value in row.values))
+
+
+def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
+    diagonal = analysis.compliance_diagonal if group == "compliance" else analysis.stiffness_diagonal
+    return dict(zip(analysis.components, diagonal, strict=False)).get(name)
+
+
+def _least(analysis: Analysis, block: str) -> float | None:
+    """The least principal stiffness of a block, with the motions of the other block free."""
+    blocks = analysis.indices.free if analysis.indices else None
+    return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
+
+
+def _condition(analysis: Analysis) -> float | None:
+    value = analysis.indices.stiffness_condition if analysis.indices else math.inf
+    return value if math.isfinite(value) else None
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)
+
+
+def _at_pose(state: MachineState) -> dict[str, float | None]:
+    """Vibrations, the way of the tool under the loads, and the error as built, where the file tells them."""
+    machine, result = state.machine, dict[str, float | None]()
+    if state.status is not Status.OK:
+        return result
+    point = _one_point(machine)
+    frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
+    wanted = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
+    if loads_platform(machine):
+        wanted["displacement under load"] = MOVED
+    if machine.tolerances:
+        wanted["error as built, 95 %"] = BUILT_ERROR
+    for row, name in wanted.items():
+        try:
+            refuse_absent(state, _quantities_of(machine, name))
+        except InputError:  # the file does not tell masses or the cut: the row has a dash
+            continue
+        result[row] = _known(_numbers_of(machine, point, [name])[0][name][0])
+    return result
+
+
+def _one_point(machine: Machine) -> PointTable:
+    """The pose of a machine as a table of points: any coordinate can be the column that it must have."""
+    coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
+    return PointTable({coordinate.path: np.array([float(values(machine)[coordinate.path])])})
+
+
+def _quantities_of(machine: Machine, name: str) -> list[str]:
+    """The quantities from which a number of a design is computed."""
+    return (
+        [] if name == BUILT_ERROR else resolve_quantities([name], machine.family.component_names, cable_count(machine))
+    )
+
+
+def _names(
+    analyses: Sequence[Analysis], given: Sequence[str], varied: Sequence[Sequence[Parameter]] = ()
+) -> list[list[str]]:
+    """The numbers that each design has of those that are named; groups stand for their members.
+
+    Raises:
+        InputError: a name that means nothing for any of the designs.
+    """
+    result: list[list[str]] = [[] for _ in analyses]
+    for name in given:
+        refusals = []
+        for place, analysis in enumerate(analyses):
+            machine = analysis.state.machine
+            try:
+                members = _quantities_of(machine, name)
+                if name == BUILT_ERROR and not machine.tolerances:
+                    raise InputError(
+                        f'"{BUILT_ERROR}" is not known: the file of {machine.name} has no tolerances; write '
+                        'joints = "0.05 mm", say, in the table [tolerances].'
+                    )
+                refuse_absent(analysis.state, members, varied[place] if varied else ())
+            except InputError as error:
+                refusals.append(error)
+                continue
+            result[place] += [name] if name == BUILT_ERROR else [*([MOVED] * (name == MOVED)), *members]
+        if len(refusals) == len(analyses):
+            raise refusals[0]
+    return [[*dict.fromkeys(names)] for names in result]
+
+
+def _numbers_of(
+    machine: Machine, points: Points, names: Sequence[str], progress: Progress = silent
+) -> tuple[dict[str, Array], Array]:
+    """Numbers at points by name [points], NaN where there is none, and the points that have a result [points]."""
+    wanted = [name for name in names if name not in (MOVED, BUILT_ERROR)]
+    if MOVED in names:
+        wanted += _quantities_of(machine, MOVED)
+    evaluation = evaluate(machine, points, [*dict.fromkeys(wanted)] or ["singularity_margin"], progress)
+    answered, result = evaluation.status == Status.OK, dict[str, Array]()
+    for name in names:
+        if name == MOVED:
+            ways = [evaluation.values[each] for each in _quantities_of(machine, MOVED) if not each[-2:].startswith("r")]
+            result[name] = np.linalg.norm(ways, axis=0)
+        elif name == BUILT_ERROR:
+            result[name] = np.full(points.size, np.nan)
+            if answered.any():
+                errors = budget(machine, points.columns(0, points.size))
+                result[name][errors.settled] = errors.size("usual", "position")[errors.settled]
+        else:
+            result[name] = evaluation.values[name]
+    return result, answered
+
+
+def _about(name: str) -> tuple[str, Better | None]:
+    """The unit of a number, and what is better."""
+    if name in (MOVED, BUILT_ERROR):
+        return "m", Better.LESS
+    quantity = QUANTITIES[name]
+    return quantity.unit, Better(quantity.better) if quantity.better else None
+
+
+def rows_over(
+    analyses: Sequence[Analysis], ranges: Sequence[str], poses: Any, quantities: Sequence[str], progress: Progress
+) -> tuple[tuple[DesignRow, ...], tuple[tuple[int, int], ...]]:
+    """Compute the worst value, a percentile and the mean over poses; and for each design (poses answered, all poses).
+
+    Args:
+        analyses: of the designs.
+        ranges: of a grid; none if the poses are given.
+        poses: as for `evaluate`, of fields that all designs have; None if there are ranges.
+        quantities: names or groups; the diagonal of C and the singularity margin if empty.
+        progress: receives how many poses are done.
+
+    Raises:
+        InputError: poses or a range that one of the machines does not take, or a quantity that none of them has.
+    """
+    machines = [analysis.state.machine for analysis in analyses]
+    places = [_points_of(machine, ranges, poses) for machine in machines]
+    names = _names(analyses, quantities or USUAL, [fields for _, fields in places])
+    spreads: list[dict[str, tuple[float, ...]]] = []
+    counts = []
+    every = sum(points.size for points, _ in places)
+    done = 0
+    for machine, (points, _), wanted in zip(machines, places, names, strict=True):
+        share = partial(_share, progress, done, every)
+        numbers, answered = _numbers_of(machine, points, wanted, share)
+        counts.append((int(answered.sum()), points.size))
+        known = {name: row[answered & ~np.isnan(row)] for name, row in numbers.items()}
+        spreads.append({name: _spread(_about(name)[1], row) for name, row in known.items() if row.size})
+        done += points.size
+        progress(done, every)
+    rows = []
+    for name in dict.fromkeys(name for wanted in names for name in wanted):
+        unit, better = _about(name)
+        shown = name.replace("compliance_", "C_") if name in GROUPS["compliance"] else name.replace("_", " ")
+        for k, what in enumerate(("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")):
+            by_design = tuple(spread[name][k] if name in spread else None for spread in spreads)
+            rows.append(DesignRow(shown, what, unit, better, by_design))
+    return tuple(rows), tuple(counts)
+
+
+def _share(progress: Progress, before: int, every: int, done: int, _total: int) -> None:
+    progress(before + done, every)
+
+
+def _points_of(machine: Machine, ranges: Sequence[str], poses: Any) -> tuple[Points, list[Parameter]]:
+    """The points over which a machine is looked at, and the fields that vary."""
+    if poses is None:
+        pairs = chosen_axes(machine, ranges)
+        return grid_of(pairs), [parameter for _, parameter in pairs]
+    columns = given_poses(machine, poses)
+    return PointTable(columns.leaves), list(columns.fields)
+
+
+def _spread(better: Better | None, row: Array) -> tuple[float, ...]:
+    """Return the worst value, a percentile towards it, and the mean; where nothing is better, the greatest in size."""
+    if better is None:
+        return float(row[np.abs(row).argmax()]), _percentile(np.abs(row), PERCENTILE), float(row.mean())
+    if better is Better.MORE:
+        return float(row.min()), _percentile(row, 100.0 - PERCENTILE), float(row.mean())
+    return float(row.max()), _percentile(row, PERCENTILE), float(row.mean())
+
+
+def _percentile(row: Array, percent: float) -> float:
+    """A percentile; between two values only where all are finite, since infinity has no distance."""
+    if np.isfinite(row).all():
+        return float(np.percentile(row, percent))
+    return float(np.percentile(row, percent, method="nearest"))
