@@ -32,7 +32,7 @@ from kinetostat.tolerances import EQUAL_DESIGNS
 PERCENTILE = 95.0
 """Percent of the poses that are at least as good as the value shown."""
 BUILT_ERROR = "built_error"
-"""A number of designs that is no quantity: what 95 % of the machines within the tolerances of a file keep within."""
+"""A number beside the quantities: what 95 % of the machines within the tolerances of a file keep within."""
 MOVED = "displacement"
 """The whole way of the tool point, of which the quantities of this group are the components."""
 USUAL = ("compliance", "singularity_margin")
@@ -120,7 +120,7 @@ def rows_at_poses(analyses: Sequence[Analysis], quantities: Sequence[str] = ()) 
     named = [_numbers_of(analysis.state.machine, _one_point(analysis.state.machine), names)[0]
              for analysis, names in zip(analyses, _names(analyses, quantities), strict=True)]  # fmt: skip
     for name in dict.fromkeys(name for numbers in named for name in numbers):
-        known_values = tuple(_known(numbers[name][0]) if name in numbers else None for numbers in named)
+        known_values = tuple(_number_or_none(numbers[name][0]) if name in numbers else None for numbers in named)
         rows.append(DesignRow("quantities", name, *_about(name), known_values))
     return tuple(row for row in rows if any(value is not None for value in row.values))
 
@@ -141,7 +141,7 @@ def _condition(analysis: Analysis) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _known(value: float) -> float | None:
+def _number_or_none(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
@@ -162,7 +162,7 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
             refuse_absent(state, _quantities_of(machine, name))
         except InputError:  # the file does not tell masses or the cut: the row has a dash
             continue
-        result[row] = _known(_numbers_of(machine, point, [name])[0][name][0])
+        result[row] = _number_or_none(_numbers_of(machine, point, [name])[0][name][0])
     return result
 
 

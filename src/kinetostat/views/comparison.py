@@ -40,14 +40,15 @@ def _lines(comparison: Comparison) -> Lines:
         yield "Files", "Fields that only one design has are omitted."
     if comparison.verdicts:
         yield from (
-            ("Required", f"{letter} {sentence}") for letter, sentence in zip(letters, _judged(comparison), strict=True)
+            ("Required", f"{letter} {sentence}")
+            for letter, sentence in zip(letters, _verdict_sentences(comparison), strict=True)
         )
     if comparison.where:
         counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, comparison.poses, strict=True))
         yield "Poses", f"Poses with a result: {counts}."
 
 
-def _judged(comparison: Comparison) -> Iterator[str]:
+def _verdict_sentences(comparison: Comparison) -> Iterator[str]:
     """Which requirements each design misses, and which are about something that it lacks."""
     names = [condition_of(row)[0] for row in comparison.verdicts]
     for column in zip(*comparison.verdicts, strict=True):

@@ -101,7 +101,7 @@ PRESENT = 0
 PRESENT_NAME = "present machine"
 
 Named = list[tuple[str, Machine]]
-Asked = tuple[Named, list[str], list[str]]
+Request = tuple[Named, list[str], list[str]]
 """Machines by name, the quantities to compare, and ranges of poses."""
 
 
@@ -212,9 +212,9 @@ class FavouritesPanel:
         if PRESENT in self._chosen:
             machines.insert(0, (PRESENT_NAME, self._session.machine))
         if len(machines) >= LEAST:
-            self._lane.ask((machines, _listed(self.quantities.value), _listed(self.over.value)))
+            self._lane.ask((machines, _entries_of(self.quantities.value), _entries_of(self.over.value)))
 
-    def _show(self, _asked: Asked, shown: str | InputError) -> None:
+    def _show(self, _request: Request, shown: str | InputError) -> None:
         if isinstance(shown, InputError):
             refuse(str(shown))
             return
@@ -222,13 +222,13 @@ class FavouritesPanel:
         self.window.open()
 
 
-def _listed(text: str) -> list[str]:
-    """What is written between commas."""
+def _entries_of(text: str) -> list[str]:
+    """Entries of a list that is written with commas."""
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def _comparison_of(asked: Asked) -> str | InputError:
-    machines, quantities, ranges = asked
+def _comparison_of(request: Request) -> str | InputError:
+    machines, quantities, ranges = request
     designs = [Design(label, machine, analyze(machine)) for label, machine in machines]
     try:
         return comparison_text(compare(designs, ranges, quantities=quantities))
