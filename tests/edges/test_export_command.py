@@ -16,7 +16,7 @@ from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import with_values
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -67,7 +67,7 @@ def test_step_is_for_cad_programs_by_either_suffix(tmp_path, capfd):
 def test_step_without_its_extra_is_one_sentence(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(solids, "find_spec", lambda _: None)
     assert main(["export", MACHINE, "-o", str(tmp_path / "machine.step")]) == BAD_INPUT
-    assert adding("cad") in " ".join(capsys.readouterr().err.split())
+    assert extra_command("cad") in " ".join(capsys.readouterr().err.split())
     assert not list(tmp_path.iterdir())
 
 

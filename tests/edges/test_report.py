@@ -16,7 +16,7 @@ from kinetostat.commands.common import STOPPED
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.map_ranges import usual_ranges
@@ -239,7 +239,7 @@ def test_bad_input_is_refused_with_its_reason(words, reason, tmp_path, capsys, m
 def test_without_typst_a_pdf_is_refused_at_once(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(pdf, "find_spec", lambda _: None)
     assert main(["report", MACHINE, "-o", str(tmp_path / "r.pdf")]) == 2
-    assert adding("report") in capsys.readouterr().err
+    assert extra_command("report") in capsys.readouterr().err
 
 
 def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
@@ -247,7 +247,7 @@ def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
     page = Page(quick(load(MACHINE)))
     assert "live-data" not in page.attached
     assert "img" in page.tags
-    assert f"run this before you make the report: {adding('report')}" in page.text
+    assert f"run this before you make the report: {extra_command('report')}" in page.text
 
 
 def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_a_port_in_use_is_bad_input(capsys):
 def test_without_the_extra_it_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     assert main(["studio", "hexapod"]) == BAD_INPUT
-    assert f"install it with `{adding('studio')}`" in capsys.readouterr().err
+    assert f"install it with `{extra_command('studio')}`" in capsys.readouterr().err
 
 
 def test_a_state_folder_that_cannot_be_read_is_refused(served, tmp_path, monkeypatch, capsys):

@@ -17,7 +17,7 @@ from kinetostat.engine.chunks import Crew, compute_with, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
-from kinetostat.spec.installation import adding
+from kinetostat.spec.installation import extra_command
 from kinetostat.studies import grid
 from refusals import refused
 
@@ -167,7 +167,7 @@ def test_another_version_on_a_worker_is_refused():
 def test_without_dask_the_fix_is_named(how, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert main([*WORDS, *how]) == BAD_INPUT
-    assert adding("cluster") in capsys.readouterr().err
+    assert extra_command("cluster") in capsys.readouterr().err
 
 
 def test_no_scheduler_at_an_address_is_said(monkeypatch, capsys):
