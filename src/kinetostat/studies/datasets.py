@@ -28,6 +28,8 @@ from kinetostat.units import KINDS
 # to the import of this module: then the first answer takes as long as the others.
 xr.Dataset(coords={"pose": [0]})
 
+POSES_KEPT = 10_000
+"""Most poses of which the labels of an answer are kept; the labels of more take little of their time."""
 LOADS_LEFT_OUT = "loads_left_out"
 """Attribute with the sentence on loads of the file that do not count; missing where all do."""
 ABOUT_STATUS = {
@@ -116,21 +118,52 @@ def evaluate(
 
 def as_dataset(answers: PoseAnswers) -> xr.Dataset:
     """Label answers: dimensions pose, and row and column of K and C."""
-    machine, poses = answers.machine, answers.poses
-    coordinates: dict[str, Any] = {"pose": np.arange(poses.count)}
-    coordinates |= {name: ("pose", values) for name, values in poses.labels.items()}
-    for field, values in zip(poses.fields, poses.values, strict=True):
-        coordinates[field.dimension] = ("pose", values, {**about_field(field), "path": field.path})
-    variables: dict[str, Any] = {name: ("pose", answers.values[name], about_quantity(name)) for name in answers.names}
-    if answers.matrices:
-        names = list(machine.family.component_names)
-        coordinates |= {"row": names, "column": names}
-    for matrix in answers.matrices:
+    poses = answers.poses
+    fields = {field.dimension: values for field, values in zip(poses.fields, poses.values, strict=True)}
+    values = {"status": answers.status, **{name: answers.values[name] for name in answers.names}, **fields}
+    values |= {matrix: answers.matrix(matrix) for matrix in answers.matrices}
+    layout = _layout if poses.count <= POSES_KEPT else _layout.__wrapped__
+    empty = layout(
+        Identical(answers.machine),
+        tuple(Identical(field) for field in poses.fields),
+        answers.names,
+        answers.matrices,
+        poses.count,
+        answers.loads_left_out,
+    )
+    dataset = empty.copy(data=values).set_coords(list(fields))
+    labels = {name: ("pose", label) for name, label in poses.labels.items()}
+    return dataset.assign_coords(labels) if labels else dataset
+
+
+@lru_cache(MACHINES_KEPT)
+def _layout(
+    machine: Identical,
+    fields: tuple[Identical, ...],
+    names: tuple[str, ...],
+    matrices: tuple[str, ...],
+    count: int,
+    uncounted: str,
+) -> xr.Dataset:
+    """Return a dataset without values, whose copies take them: xarray makes a copy in a third of the time.
+
+    Fields are variables in it, because copies take the values of variables alone.
+    """
+    nothing, parts = np.broadcast_to(0.0, count), machine.value.family.component_names
+    coordinates: dict[str, Any] = {"pose": np.arange(count)}
+    for field in (each.value for each in fields):
+        coordinates[field.dimension] = ("pose", nothing, {**about_field(field), "path": field.path})
+    variables: dict[str, Any] = {name: ("pose", nothing, about_quantity(name)) for name in names}
+    if matrices:
+        coordinates |= {"row": list(parts), "column": list(parts)}
+    for matrix in matrices:
         units = "SI: N·m/rad, N/rad, N/m" if matrix == "K" else "SI: rad/(N·m), rad/N, m/N"
         described = {"long_name": f"{MATRICES[matrix]} matrix", "units": units}
-        variables[matrix] = (("pose", "row", "column"), answers.matrix(matrix), described)
+        entries = np.broadcast_to(0.0, (count, len(parts), len(parts)))
+        variables[matrix] = (("pose", "row", "column"), entries, described)
+    leaves = [leaf for field in fields for leaf in field.value.leaves]
     return xr.Dataset(
-        {"status": ("pose", answers.status, ABOUT_STATUS), **variables},
+        {"status": ("pose", nothing, ABOUT_STATUS), **variables},
         coordinates,
-        origin_of(machine, list(poses.leaves), answers.loads_left_out),
-    )
+        origin_of(machine.value, leaves, uncounted),
+    ).reset_coords([field.value.dimension for field in fields])
