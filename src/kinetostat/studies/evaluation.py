@@ -90,8 +90,8 @@ def answers_at(
     """
     wanted, parts = several(quantities), machine.family.component_names
     matrices = tuple(dict.fromkeys(name for name in wanted if name in MATRICES))
-    names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts, cable_count(machine)))
-    state = _state_of(Identical(machine))
+    state, cables = _state_and_cables(Identical(machine))
+    names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts, cables))
     refuse_absent(state, names, poses.fields)
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
@@ -100,9 +100,9 @@ def answers_at(
 
 
 @lru_cache(MACHINES_KEPT)
-def _state_of(machine: Identical) -> MachineState:
-    """The state of a machine at its pose; where it is asked about again, what it has computed is still there."""
-    return state_of(machine.value)
+def _state_and_cables(machine: Identical) -> tuple[MachineState, int]:
+    """The state of a machine at its pose, where all that it has computed is still there, and its number of cables."""
+    return state_of(machine.value), cable_count(machine.value)
 
 
 def as_csv(answers: PoseAnswers) -> str:
