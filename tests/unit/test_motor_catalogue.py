@@ -5,7 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat import InputError, drives, load, motors, save
+from kinetostat import InputError, build, bundled, drives, load, motors, requirements, save
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
+from kinetostat.machine.loading import as_toml
 from kinetostat.studies.motors import MotorRating, read_catalogue
 from kinetostat.views.motors import MOTORS, motors_figure
 
@@ -33,6 +36,21 @@ def test_every_motor_of_the_catalogue_has_the_power_and_the_source_of_its_data_s
     for name, motor in catalogue.motors.items():
         assert motor.torque * motor.rated_speed == pytest.approx(watts[name], rel=0.03)
         assert "Yaskawa" in catalogue.sources["motors", name]
+
+
+def test_gears_pass_on_the_torque_that_their_data_sheet_prints_behind_them():
+    """Rated torque of the motor, and of the gear's output, N·m: two numbers of the sheet that are not in the file."""
+    printed = {
+        "yaskawa-sgmah-01aj1": (0.318, 1.27),
+        "yaskawa-sgmah-02aj1": (0.637, 2.55),
+        "yaskawa-sgmah-01aj7": (0.318, 8.40),
+    }
+    catalogue = read_catalogue()
+    assert catalogue.gears.keys() == printed.keys()
+    for name, (before, behind) in printed.items():
+        gear = catalogue.gears[name]
+        assert before * gear.ratio * gear.efficiency == pytest.approx(behind, rel=2e-3)
+        assert "p. 3-7" in catalogue.sources["gears", name]
 
 
 def test_limits_are_constant_then_of_constant_power_then_nothing():
@@ -104,3 +122,64 @@ def test_the_answer_describes_itself(motion, tmp_path):
     save(answer, tmp_path / "motors.csv")
     assert len((tmp_path / "motors.csv").read_text().splitlines()) == 5
     assert len(motors_figure(answer).axes) == 4
+
+
+def required(folder, parts, name="mine.toml"):
+    """The path of a machine file with settings and a requirement beside its motion."""
+    text = as_toml(load("hexapod", SETTINGS)) + f"[requirements]\nservo = {{ {parts} }}\n"
+    (folder / name).write_text(text, "utf-8")
+    return str(folder / name)
+
+
+def test_a_file_requires_that_a_motor_fits_its_motion(motion, tmp_path, capsys):
+    paths = [required(tmp_path, f'fits = "{name}", motion = "motion.csv"') for name in ("yaskawa-sgm7d-02k",)]
+    (slow,) = requirements(load(paths[0]))
+    fits = {fit.name: fit for fit in motors(load("hexapod", SETTINGS), motion).fits}
+    assert (slow.met, slow.worst, slow.poses) == (False, fits["yaskawa-sgm7d-02k"].greatest_share, 401)
+    machine = load(required(tmp_path, 'fits = "yaskawa-sgmp-03b", motion = "motion.csv"', "good.toml"))
+    (good,) = requirements(machine)
+    fit = fits["yaskawa-sgmp-03b"]
+    assert (good.met, good.worst) == (fit.fits, fit.greatest_share) == (True, pytest.approx(1.0 - good.margin))
+    assert f"the motion uses {100.0 * fit.hardest[1]:.0f} % of its {fit.hardest[0]}" in good.sentence(machine.display)
+    there = machine.with_values(good.worst_pose)
+    assert there.tables["pose"] != machine.tables["pose"]
+    motion.unlink()  # the machine has its lines
+    assert requirements(machine) == (good,) == requirements(build(as_toml(machine)))
+    with pytest.raises(InputError, match=r"servo\.motion: .*cannot be read"):
+        load(paths[0])
+
+
+def test_every_command_about_drives_judges_it_and_takes_its_motion(motion, tmp_path, capsys):
+    for name, code in (("yaskawa-sgmp-03b", DONE), ("yaskawa-sgm7d-02k", NO_ANSWER)):
+        path = required(tmp_path, f'fits = "{name}", motion = "motion.csv"')
+        for command in ("analyze", "check", "drives", "motors"):
+            assert main([command, path]) == code
+            met = "The requirement is met." if code == DONE else "The requirement is not met."
+            assert met in capsys.readouterr().out
+    alone = drives(load("hexapod", SETTINGS), motion)
+    np.testing.assert_array_equal(drives(load(path)).curves.motor_torque, alone.curves.motor_torque)
+    assert main(["motors", "hexapod"]) == BAD_INPUT
+    assert "no motion is given" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ('fits = "yaskawa-sgmp-03b"', r"servo\.motion is wrong"),
+        ('fits = "sgmp", motion = "motion.csv"', "fits is .*did you mean|fits is .*choose from"),
+        ('fits = "yaskawa-sgmp-03b", motion = "../motion.csv"', "folder of the machine file"),
+        ('fits = "yaskawa-sgmp-03b", motion = "/motion.csv"', "folder of the machine file"),
+        ('fits = "yaskawa-sgmp-03b", motion = "motion.csv", over = ["x=0:1:2"]', r"servo\.over is wrong"),
+        ('fits = "yaskawa-sgmp-03b", motion = "motion.csv", screw = "steep"', "the screw of the catalogue"),
+        ('fits = "a", motion = "motion.csv", catalogue = "[motors.a]\\ntorque = 1"', "lacks peak_torque"),
+    ],
+)
+def test_a_mistake_in_a_required_motor_names_it(parts, said, motion, tmp_path):
+    with pytest.raises(InputError, match=said):
+        requirements(load(required(tmp_path, parts)))
+
+
+def test_a_machine_of_a_text_has_no_folder_of_motions():
+    text = bundled()["hexapod"] + '[requirements]\nservo = { fits = "yaskawa-sgmp-03b", motion = "motion.csv" }\n'
+    with pytest.raises(InputError, match="write the lines of the file"):
+        requirements(build(text, settings=SETTINGS))

@@ -32,7 +32,7 @@ from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, several, shorten
 from kinetostat.spec.fields import optional, quantities
 from kinetostat.spec.immutable import FixedDict
-from kinetostat.spec.requirements import TABLE, requirement_lines, take_requirements
+from kinetostat.spec.requirements import TABLE, requirement_lines, take_requirements, with_files
 from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
 from kinetostat.spec.tolerance_table import take_tolerances, tolerance_lines
 from kinetostat.spec.validation import SCHEMA_VERSION, validated_tables
@@ -83,7 +83,8 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
-    return build(documents.read_text(path), name, settings)
+    read = build(documents.read_text(path), name, settings)
+    return replace(read, requirements=with_files(dict(read.requirements), path.parent)) if read.requirements else read
 
 
 @checked

@@ -4,11 +4,12 @@ Which quantities and fields exist depends on the machine and is checked where th
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from kinetostat.frozen import dataclass
-from kinetostat.spec.document import Document, override, toml_key, toml_value
+from kinetostat.spec.document import Document, override, read_text, toml_key, toml_value
 from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
@@ -19,26 +20,44 @@ LONGEST_NAME = 80
 """Characters of the name of a requirement."""
 
 
+FILES = ("motion", "catalogue")
+"""Parts of a requirement that are texts of files, or the name of a file beside that of the machine."""
+DRIVEN = ("fits", *FILES, "gear", "screw")
+"""Parts of a requirement on motors."""
+
+
 @dataclass(frozen=True)
 class Requirement:
     """Conditions that must hold, and where: at the pose of the file unless `over` or `poses` is given.
 
+    Or a motor that must do a motion at every drive.
+
     Attributes:
-        demand: conditions that must all hold, such as "free_stiffness_z > 50 N/um".
+        demand: conditions that must all hold, such as "free_stiffness_z > 50 N/um"; none of a motor.
         over: a box: ranges such as "x=-2 cm:2 cm:11".
         poses: poses, each with the fields in which it differs.
+        fits: name of a motor of the catalogue; empty if the requirement is not about motors.
+        motion: that the motor must do: the lines of a CSV file, or the name of such a file.
+        catalogue: the lines of a catalogue, or the name of such a file; that of kinetostat if empty.
+        gear, screw: names of a gear and a screw of the catalogue; those of the machine's [drives] if empty.
     """
 
-    demand: list[str]
+    demand: list[str] = field(default_factory=list)
     over: list[str] = field(default_factory=list)
     poses: list[dict[str, float | str]] = field(default_factory=list)
+    fits: str = ""
+    motion: str = ""
+    catalogue: str = ""
+    gear: str = ""
+    screw: str = ""
 
 
 Requirements: TypeAlias = dict[str, Requirement]
 """Requirements by the names that people give them."""
 HOW = (
     'write NAME = "free_stiffness_z > 50 N/um", or NAME = { demand = "...", over = ["x=-2 cm:2 cm:11"] } for a box, or '
-    'NAME = { demand = "...", poses = [{ x = "1 cm" }, { x = "2 cm" }] } for a list of poses'
+    'NAME = { demand = "...", poses = [{ x = "1 cm" }, { x = "2 cm" }] } for a list of poses, or '
+    'NAME = { fits = "MOTOR", motion = "motion.csv" } for a motor of a catalogue'
 )
 
 
@@ -87,6 +106,9 @@ def _wrong_part(name: object, table: Any) -> list[str] | None:
     """Return the key of the first part of a requirement that is not as it must be; no key where the whole is not."""
     if not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and isinstance(table, dict)):
         return []
+    if "fits" in table:
+        wrong = [str(key) for key, given in table.items() if key not in DRIVEN or not isinstance(given, str)]
+        return wrong[:1] or next(([key] for key in ("fits", "motion") if not table.get(key)), None)
     demand, over, poses = table.get("demand"), table.get("over", []), table.get("poses", [])
     if not (isinstance(demand, str) or (_are_texts(demand, MOST_CONDITIONS) and demand)):
         return ["demand"]
@@ -98,10 +120,49 @@ def _wrong_part(name: object, table: Any) -> list[str] | None:
     return unknown[:1] or None
 
 
-def _requirement_of(demand: Any, over: Sequence[str] = (), poses: Sequence[Mapping[str, Any]] = ()) -> Requirement:
+def _requirement_of(
+    demand: Any = (), over: Sequence[str] = (), poses: Sequence[Mapping[str, Any]] = (), **driven: str
+) -> Requirement:
     """Make a requirement of what was written; numbers of poses are SI, and all else of them is text."""
     listed = [{key: value if isinstance(value, str) else float(value) for key, value in pose.items()} for pose in poses]
-    return Requirement(several(demand), list(over), listed)
+    return Requirement(several(demand), list(over), listed, **driven)
+
+
+def with_files(requirements: Requirements, folder: Path) -> Requirements:
+    """Put the lines of files that requirements name in the place of their names, so that a machine needs no folder.
+
+    Args:
+        requirements: as they were written.
+        folder: of the file in which they were written; others lie beside it or below.
+
+    Raises:
+        InputError: names the requirement whose file cannot be read, or lies elsewhere.
+    """
+    return {name: _with_files(requirement, name, folder) for name, requirement in requirements.items()}
+
+
+def _with_files(requirement: Requirement, name: str, folder: Path) -> Requirement:
+    for part in FILES:
+        file = getattr(requirement, part)
+        if not file or is_text(file):
+            continue
+        # A machine file may come from anybody; it is not to make a server read what lies elsewhere.
+        if Path(file).is_absolute() or ".." in Path(file).parts or ":" in file:
+            raise InputError(
+                f"{TABLE}.{name}.{part} is {shorten(file)}; the file must lie in the folder of the machine file or "
+                "below: write its name from there."
+            )
+        try:
+            lines = read_text(folder / file)
+        except InputError as error:
+            raise InputError(f"{TABLE}.{name}.{part}: {error}") from None
+        requirement = replace(requirement, **{part: lines if is_text(lines) else f"{lines}\n"})
+    return requirement
+
+
+def is_text(given: str) -> bool:
+    """Whether a part of a requirement is the text of a file, and not the name of one."""
+    return "\n" in given
 
 
 def _are_texts(given: Any, most: int) -> bool:
@@ -145,10 +206,25 @@ def requirements_schema() -> dict[str, Any]:
         "title": "Requirement",
         "type": "object",
     }
+    words = {
+        "fits": "name of a motor of the catalogue",
+        "motion": "that it must do: name of a CSV file beside this one, or its lines",
+        "catalogue": "of motors: name of a TOML file beside this one, or its lines; default that of kinetostat",
+        "gear": "of the catalogue; default as in [drives]",
+        "screw": "of the catalogue; default as in [drives]",
+    }
+    motor = {
+        "additionalProperties": False,
+        "description": "A motor that must do a motion at every drive.",
+        "properties": {name: {"type": "string", "description": meaning} for name, meaning in words.items()},
+        "required": ["fits", "motion"],
+        "title": "Motor",
+        "type": "object",
+    }
     return {
         "type": "object",
         "description": "what must hold, by name: at the pose of the file, over a box, or at a list of poses",
-        "additionalProperties": {"anyOf": [text, several_texts, table]},
+        "additionalProperties": {"anyOf": [text, several_texts, table, motor]},
     }
 
 
@@ -162,6 +238,8 @@ def requirement_lines(requirements: Mapping[str, Requirement]) -> Iterator[str]:
 
 
 def _text(requirement: Requirement) -> str:
+    if requirement.fits:
+        return toml_value({part: given for part in DRIVEN if (given := getattr(requirement, part))})
     demand: Any = requirement.demand if len(requirement.demand) > 1 else requirement.demand[0]
     where = {"over": requirement.over, "poses": requirement.poses}
     written = {name: entries for name, entries in where.items() if entries}

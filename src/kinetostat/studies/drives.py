@@ -7,6 +7,7 @@ Source: theory (99).
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
 from kinetostat.studies.motions import Motion, every_direction, read_motion
+from kinetostat.studies.requirements import Verdict, motor_requirements, required_motion
 from kinetostat.studies.vibration import modes
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
@@ -142,6 +144,7 @@ class DriveLoads(Immutable):
         worst: number of the point at which a drive has the greatest share of its greatest force, and that drive's name.
         frequency: lowest natural frequency at the pose of the machine, Hz; None where it is not known.
         excited: share of the motion's acceleration, of its mean square, that is faster than a third of that frequency.
+        requirements: verdicts on the motors that the machine's file requires.
     """
 
     machine: Machine
@@ -155,6 +158,7 @@ class DriveLoads(Immutable):
     worst: tuple[int, str] | None = None
     frequency: float | None = None
     excited: float = 0.0
+    requirements: tuple[Verdict, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Drives of {self.machine.name!r}: {self.message}>"
@@ -181,7 +185,8 @@ def drives(
     Args:
         machine: with masses, friction, and lead or ratio of its drives.
         motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines. None
-            for a speed and an acceleration of the platform point at the pose of the machine, in the worst directions.
+            for a speed and an acceleration of the platform point at the pose of the machine, in the worst directions;
+            without these, for the motion of the file's requirements.
         points: of the motion that are looked at, about.
         speed, acceleration: without a motion: of the platform point, m/s and m/s² or texts with a unit.
 
@@ -189,20 +194,36 @@ def drives(
         InputError: the file is not a motion, or the drives do not hold the machine.
     """
     state = state_of(machine)
-    form = rigid_form_of(state)
-    if not _weighs(state, form):
-        raise InputError(
-            f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
-            'drives; give it one, e.g. --set tool.mass="5 kg".'
-        )
     if points < 2:
         raise InputError(f"points is {points}; a motion is looked at two points or more.")
+    if motion is None and speed is None and acceleration is None:
+        motion = required_motion(state.machine, points)
+    form = rigid_form_of(state)
     if motion is None:
         moved = every_direction(form, _amount("speed", speed), _amount("acceleration", acceleration))
     elif speed is not None or acceleration is not None:
         raise InputError("a motion says its speed and acceleration itself; give either a motion or these.")
     else:
         moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
+    return replace(drive_loads(state, form, moved), requirements=motor_requirements(state))
+
+
+def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoads:
+    """Compute what a motion asks of the drives of a machine; `drives` without the requirements of its file.
+
+    Args:
+        state: of the machine.
+        form: of its equations.
+        moved: the motion.
+
+    Raises:
+        InputError: nothing of the machine has a mass, friction or a load.
+    """
+    if not _weighs(state, form):
+        raise InputError(
+            f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
+            'drives; give it one, e.g. --set tool.mass="5 kg".'
+        )
     columns = {POSE + name: np.asarray(rows, dtype=float) for name, rows in moved.path.pose.items()}
     codes = evaluate(state.machine, PointTable(columns), ["singularity_margin"]).status
     lost = np.flatnonzero(~np.isin(codes, PASSABLE))

@@ -134,7 +134,7 @@ def _spread(size: int) -> Array:
     return np.column_stack([across * np.cos(angle), across * np.sin(angle), height])
 
 
-def read_motion(machine: Machine, path: Path, points: int = 400) -> Motion:
+def read_motion(machine: Machine, path: Path, points: int = 400, text: str | None = None) -> Motion:
     """Read a motion from a CSV file, whose head says the unit of each column.
 
     Beside fields of the pose, all notations of orientation among them, there may be
@@ -148,11 +148,12 @@ def read_motion(machine: Machine, path: Path, points: int = 400) -> Motion:
         machine: whose pose moves; what no column names stays as it is.
         path: of the file.
         points: at which a motion is looked at, about.
+        text: of the file, where it is known; the path then only names it in messages.
 
     Raises:
         InputError: the file cannot be read, or is not a motion.
     """
-    columns, numbers = columns_of(path)
+    columns, numbers = columns_of(path, text=text)
     given = {column.name: column for column in columns}
     try:
         if FIELD in given:

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -24,8 +25,10 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity, quantities, table
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.drives import DriveLoads, drives, root_mean_square
+from kinetostat.studies.drives import DriveLoads, drive_loads, root_mean_square
+from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.motions import Motion, read_motion
+from kinetostat.studies.requirements import Verdict, motor_requirements, required_motion
 from kinetostat.units import UnitError
 
 CATALOGUE = Path(__file__).with_name("catalogue.toml")
@@ -103,16 +106,24 @@ def read_catalogue(path: Path | None = None) -> Catalogue:
         InputError: there is no such file, or an entry of it is not one: it names the entry and the field.
     """
     path = path or CATALOGUE
-    document = documents.read(path)
+    return catalogue_of(documents.read(path), path.name)
+
+
+def catalogue_of(document: documents.Document, origin: str) -> Catalogue:
+    """Read the catalogue in a document; `origin` names it in messages.
+
+    Raises:
+        InputError: an entry of it is not one: it names the entry and the field.
+    """
     for name in document:
-        choice(name, TABLES, f'the table of "{path.name}"')
+        choice(name, TABLES, f'the table of "{origin}"')
     parts: dict[str, dict[str, Any]] = {name: {} for name in TABLES}
     sources: dict[tuple[str, str], str] = {}
     for kind, entries in document.items():
         if not isinstance(entries, dict):
-            raise InputError(f'"{path.name}": {kind} is not a table; write [{kind}.NAME] with its numbers below.')
+            raise InputError(f'"{origin}": {kind} is not a table; write [{kind}.NAME] with its numbers below.')
         for name, given in entries.items():
-            parts[kind][name] = _entry(TABLES[kind], f'"{path.name}": {kind}.{documents.toml_key(name)}', given)
+            parts[kind][name] = _entry(TABLES[kind], f'"{origin}": {kind}.{documents.toml_key(name)}', given)
             sources[kind, name] = str(given.get(SOURCE, ""))
     return Catalogue(parts["motors"], parts["gears"], parts["screws"], sources)
 
@@ -168,6 +179,12 @@ class MotorFit:
         return max(self.peak, self.continuous, self.speed)
 
     @property
+    def hardest(self) -> tuple[str, float]:
+        """The limit of which the greatest share is used, in words, and that share; the speed if it leaves no torque."""
+        shares = {"speed": self.speed, "peak torque": self.peak, "continuous torque": self.continuous}
+        return max(shares.items(), key=lambda item: item[1] if math.isfinite(item[1]) else 0.0)
+
+    @property
     def fits(self) -> bool:
         """Whether the motor does what the motion asks."""
         return self.greatest_share <= 1.0
@@ -182,12 +199,14 @@ class MotorChoice(Immutable):
         status: of the first pose without an answer, else OK.
         message: the answer in a sentence.
         fits: of each motor, the smallest that fits first, then the others by what is missing; none without an answer.
+        requirements: verdicts on the motors that the machine's file requires.
     """
 
     machine: Machine
     status: Status
     message: str
     fits: tuple[MotorFit, ...] = ()
+    requirements: tuple[Verdict, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Motors for {self.machine.name!r}: {self.message}>"
@@ -196,7 +215,7 @@ class MotorChoice(Immutable):
 @checked
 def motors(
     machine: Machine,
-    motion: Path | Motion,
+    motion: Path | Motion | None = None,
     catalogue: Path | None = None,
     gear: str = "",
     screw: str = "",
@@ -206,37 +225,42 @@ def motors(
 
     Args:
         machine: with masses, friction, and lead or ratio of its drives, unless a gear or a screw is chosen.
-        motion: a motion, or the path of its CSV file.
+        motion: a motion, or the path of its CSV file; that of the requirements of the machine's file if None.
         catalogue: path of the file; that of kinetostat if None.
         gear, screw: names of a gear for rotary drives, or a screw for linear ones, of the catalogue; none if empty.
         points: of the motion that are looked at, about.
 
     Raises:
-        InputError: a mistake in a file, an unknown gear or screw, or motors of which nothing says how far they turn.
+        InputError: no motion, a mistake in a file, an unknown gear or screw, or motors of which nothing says how far
+            they turn.
     """
     known = read_catalogue(catalogue)
     if not known.motors:
         raise InputError("the catalogue has no motors; write [motors.NAME] with torques, speeds and inertia.")
-    settings, beside = _transmission(known, gear, screw)
-    fitted = with_values(machine, settings)
+    fitted, beside = with_transmission(machine, known, gear, screw)
     moved = read_motion(fitted, motion, points) if isinstance(motion, Path) else motion
+    moved = required_motion(fitted, points) if moved is None else moved
+    if moved is None:
+        raise InputError(
+            "no motion is given, and the file requires no motor for one; name its CSV file, or write the requirement "
+            f'drives = {{ fits = "{next(iter(known.motors))}", motion = "motion.csv" }}.'
+        )
     fits = []
-    for name, motor in known.motors.items():
-        loads = drives(with_values(fitted, {"drives.rotor_inertia": motor.inertia + beside}), moved, points)
+    for name in known.motors:
+        loads = loads_with(fitted, known.motors[name], beside, moved)
         if loads.curves is None or not loads.drives:
             return MotorChoice(fitted, loads.status, loads.message)
-        if any(not drive.rotary for drive in loads.drives):
-            raise InputError(
-                f"nothing says how far the motors of {machine.name} turn; give drives.lead or drives.ratio, or choose "
-                "a screw or a gear of the catalogue."
-            )
-        fits.append(_fit(name, motor, loads, known.sources["motors", name]))
+        fits.append(fit_of(known, name, loads))
     ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.greatest_share)))
-    return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
+    return MotorChoice(fitted, Status.OK, _message(ordered), ordered, motor_requirements(machine))
 
 
-def _transmission(known: Catalogue, gear: str, screw: str) -> tuple[dict[str, float], float]:
-    """The fields of [drives] that a gear or a screw gives, and the inertia that turns beside the rotor, kg·m²."""
+def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str) -> tuple[Machine, float]:
+    """The machine with a gear or a screw of a catalogue, and the inertia that turns beside its rotors, kg·m².
+
+    Raises:
+        InputError: there is no gear or screw of that name.
+    """
     settings: dict[str, float] = {}
     beside = 0.0
     for name, parts, field, what in ((gear, known.gears, "ratio", "gear"), (screw, known.screws, "lead", "screw")):
@@ -244,10 +268,40 @@ def _transmission(known: Catalogue, gear: str, screw: str) -> tuple[dict[str, fl
             part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
             settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
             beside += part.inertia
-    return settings, beside
+    return with_values(machine, settings), beside
 
 
-def _fit(name: str, motor: MotorRating, loads: DriveLoads, source: str) -> MotorFit:
+def loads_with(machine: Machine, motor: MotorRating, beside: float, motion: Motion) -> DriveLoads:
+    """The demands of a motion on the drives of a machine with the rotors of a motor.
+
+    Args:
+        machine: with lead or ratio of its drives.
+        motor: of all drives.
+        beside: inertia that turns with each rotor, kg·m².
+        motion: the motion.
+
+    Raises:
+        InputError: nothing says how far the motors turn.
+    """
+    state = state_of(with_values(machine, {"drives.rotor_inertia": motor.inertia + beside}))
+    loads = drive_loads(state, rigid_form_of(state), motion)
+    if any(not drive.rotary for drive in loads.drives):
+        raise InputError(
+            f"nothing says how far the motors of {machine.name} turn; give drives.lead or drives.ratio, or choose "
+            "a screw or a gear of the catalogue."
+        )
+    return loads
+
+
+def fit_of(known: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
+    """Compare what a motion asks with what a motor of a catalogue may give.
+
+    Args:
+        known: the catalogue.
+        name: of the motor.
+        loads: an answer with this motor's rotors.
+    """
+    motor = known.motors[name]
     if loads.curves is None or loads.motion is None:
         raise ValueError("a motion without an answer asks nothing of a motor")
     torques, speeds = np.abs(loads.curves.motor_torque), np.abs(loads.curves.motor_speed)
@@ -260,7 +314,15 @@ def _fit(name: str, motor: MotorRating, loads: DriveLoads, source: str) -> Motor
     ratios = [drive.inertia_ratio for drive in loads.drives if drive.inertia_ratio is not None]
     peak, continuous, speed = (max(column) for column in zip(*worst, strict=True))
     return MotorFit(
-        name, motor, loads, loads.drives[place].name, peak, continuous, speed, max(ratios, default=None), source
+        name,
+        motor,
+        loads,
+        loads.drives[place].name,
+        peak,
+        continuous,
+        speed,
+        max(ratios, default=None),
+        known.sources["motors", name],
     )
 
 
@@ -278,7 +340,10 @@ def _message(fits: tuple[MotorFit, ...]) -> str:
         used, count = f"{100.0 * best.greatest_share:.0f} %", f"{len(good)} of {len(fits)}"
         return f"{best.name} fits: the motion uses {used} of what it may give; {count} motors fit."
     nearest = fits[0]
-    limits = {"peak torque": nearest.peak, "continuous torque": nearest.continuous, "speed": nearest.speed}
-    missing = max(limits, key=lambda name: limits[name])
-    share = f"{100.0 * limits[missing]:.0f} %" if math.isfinite(limits[missing]) else "more than all"
-    return f"No motor fits: of {nearest.name}, the nearest, the motion asks {share} of its {missing}."
+    return f"No motor fits: of {nearest.name}, the nearest, the motion asks {share_in_words(nearest)}."
+
+
+def share_in_words(fit: MotorFit) -> str:
+    """The share of the limit that a motion comes nearest to, such as "87 % of its peak torque"."""
+    limit, share = fit.hardest
+    return f"{100.0 * share:.0f} % of its {limit}"

@@ -301,18 +301,21 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
         raise InputError(f'"{path}": {error}') from None
 
 
-def columns_of(path: Path, most: int = MOST_GIVEN_POSES) -> tuple[list[GivenColumn], list[int]]:
+def columns_of(
+    path: Path, most: int = MOST_GIVEN_POSES, text: str | None = None
+) -> tuple[list[GivenColumn], list[int]]:
     """Read the columns of a CSV file as texts with the units of their heads, and the number of each line below these.
 
     Args:
         path: of the file.
         most: lines below the heads that it may have.
+        text: of the file, where it is known; the path then only names it in messages.
 
     Raises:
         InputError: the file cannot be read or holds no lines below its heads, it has too many lines or columns, or a
             line is too short or too long.
     """
-    lines = _lines(path)
+    lines = _lines(path, _text(path) if text is None else text)
     if len(lines) < 2:
         what = "is empty" if not lines else "names columns, but has no poses below them"
         raise InputError(f'"{path}" {what}; write a line such as x [mm], y [mm], and below it a line for each pose.')
@@ -351,8 +354,7 @@ def _decimal(cell: str, separator: str) -> str:
     return cell if separator == "," else cell.replace(",", ".")
 
 
-def _lines(path: Path) -> list[tuple[int, str]]:
-    """Return the lines that hold something, each with its number in the file."""
+def _text(path: Path) -> str:
     try:
         with path.open("rb") as stream:
             data = stream.read(LARGEST_POSE_FILE + 1)
@@ -363,9 +365,13 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     if len(data) > LARGEST_POSE_FILE:
         raise InputError(f'"{path}" is larger than 1 GiB; split it into parts.')
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f'"{path}" is not text; give a CSV file of poses, saved as UTF-8.') from None
+
+
+def _lines(path: Path, text: str) -> list[tuple[int, str]]:
+    """Return the lines that hold something, each with its number in the file."""
     control = _CONTROL.search(text)
     if control is not None:
         line = text.count("\n", 0, control.start()) + 1

@@ -36,7 +36,7 @@ from kinetostat.studies.map_ranges import MOST_RANGES, coarser_ranges, usual_ran
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import stored_problem
-from kinetostat.studies.requirements import requirements
+from kinetostat.studies.requirements import motions_required, requirements
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.study_folder import holds_study
 from kinetostat.studies.tensions import tensions
@@ -170,7 +170,11 @@ REPORT_QUESTIONS = (
     ),
     ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
     ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
-    ReportQuestion("drives", lambda known: drives(known.state, known.motion), lambda known: known.motion is not None),
+    ReportQuestion(
+        "drives",
+        lambda known: drives(known.state, known.motion),
+        lambda known: known.motion is not None or len(motions_required(known.machine)) == 1,
+    ),
     ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _says_what_it_cuts(known.machine)),
     ReportQuestion(
         "maps",

@@ -5,6 +5,9 @@ A pose that has no result fails its requirement: a machine that cannot get there
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,16 +19,24 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.document import parse
+from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
-from kinetostat.spec.requirements import Requirement
+from kinetostat.spec.requirements import Requirement, is_text
 from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
+
+if TYPE_CHECKING:
+    from kinetostat.studies import motions, motors
+else:
+    motions = LateModule("kinetostat.studies.motions")
+    motors = LateModule("kinetostat.studies.motors")
 
 MOST_POSES = 5_000_000
 
@@ -54,6 +65,7 @@ class Verdict(Immutable):
         place: the worst pose in words; empty at the pose of the file.
         status: status of the worst pose, in a word.
         failed: number of poses at which it does not hold.
+        words: the case in words, where the condition is not about a quantity; else empty.
     """
 
     name: str
@@ -70,6 +82,7 @@ class Verdict(Immutable):
     place: str
     status: str
     failed: int
+    words: str = ""
 
     def sentence(self, display: Display) -> str:
         """The condition, where it must hold, what is the case, and by how much.
@@ -77,6 +90,8 @@ class Verdict(Immutable):
         Args:
             display: units and digits.
         """
+        if self.words:
+            return f"{self.condition} {self.where}: {self.words}"
         there = f" at {self.place}" if self.place else ""
         where = self.where if self.poses == 1 else f"at {self.poses:,} poses {self.where}"
         if self.worst is None:
@@ -109,7 +124,80 @@ def requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     return tuple(judged)
 
 
+@checked
+def motor_requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
+    """Judge only those requirements of a machine's file that are about motors; see `requirements`."""
+    state = state_of(machine)
+    about_motors = {name: each for name, each in state.machine.requirements.items() if each.fits}
+    return requirements(state_of(replace(state.machine, requirements=about_motors))) if about_motors else ()
+
+
+def motion_of(requirement: Requirement, machine: Machine, points: int = 400) -> "motions.Motion":
+    """Read the motion that a requirement names; `points` as in `read_motion`.
+
+    Raises:
+        InputError: the file was not read with the machine, or is not a motion.
+    """
+    _check_lines("motion", requirement.motion)
+    return motions.read_motion(machine, Path("motion"), points, requirement.motion)
+
+
+def required_motion(machine: Machine, points: int = 400) -> "motions.Motion | None":
+    """Read the motion that the requirements of a machine's file name; None without one. Arguments as of `motion_of`.
+
+    Raises:
+        InputError: they name several motions, or what `motion_of` refuses.
+    """
+    names = motions_required(machine)
+    if len(names) > 1:
+        listed = ", ".join(f"requirements.{name}" for name in names)
+        raise InputError(f"the file names several motions ({listed}); give the one that is meant.")
+    return motion_of(machine.requirements[names[0]], machine, points) if names else None
+
+
+def motions_required(machine: Machine) -> tuple[str, ...]:
+    """Names of the requirements of a machine's file that have a motion; of those with the same one, the last."""
+    return tuple({each.motion: name for name, each in machine.requirements.items() if each.motion}.values())
+
+
+def _check_lines(part: str, given: str) -> None:
+    if not is_text(given):
+        raise InputError(
+            f"{part} is {shorten(given)}, the name of a file; it is read where the machine is read from a file, beside "
+            f"that. This machine was made of a text: write the lines of the file as {part}."
+        )
+
+
+def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
+    """Judge whether a motor does a motion: the greatest share of its limits that is used is at most 1."""
+    known = motors.read_catalogue()
+    if requirement.catalogue:
+        _check_lines("catalogue", requirement.catalogue)
+        known = motors.catalogue_of(parse(requirement.catalogue, "catalogue"), "catalogue")
+    motor = choice(requirement.fits, known.motors, "fits")
+    motion = motion_of(requirement, machine)
+    geared, beside = motors.with_transmission(machine, known, requirement.gear, requirement.screw)
+    loads = motors.loads_with(geared, known.motors[motor], beside, motion)
+    worst, place, words, pose = None, "", loads.message, dict[str, float]()
+    if loads.curves is not None:
+        fit = motors.fit_of(known, motor, loads)
+        worst, place = fit.greatest_share, fit.drive
+        row = [drive.name for drive in loads.drives].index(fit.drive)
+        speeds = fit.hardest[0] == "speed"
+        curve = loads.curves.motor_speed if speeds else loads.curves.motor_torque
+        point = int(np.abs(curve[row]).argmax())
+        pose = {POSE + field: float(rows[point]) for field, rows in motion.path.pose.items()}
+        words = f"the motion uses {motors.share_in_words(fit)}, most at {fit.drive}."
+    return Verdict(
+        name, f"fits {motor}", "share of the motor's limits", "1", 1.0, motion.path.size, f"along {motion.kind}",
+        worst is not None and worst <= 1.0, worst, None if worst is None or math.isinf(worst) else 1.0 - worst, pose,
+        place, loads.status.word, int(worst is None or worst > 1.0), words,
+    )  # fmt: skip
+
+
 def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
+    if requirement.fits:
+        return [_motor_verdict(state.machine, name, requirement)]
     machine, show = state.machine, state.machine.display.show
     conditions = [parse_condition(text, machine.family.component_names) for text in requirement.demand]
     points, varied, where = _poses(machine, requirement)

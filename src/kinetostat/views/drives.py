@@ -294,6 +294,7 @@ DRIVES = Description(
         Field("worst_drive", lambda a: None if a.worst is None else a.worst[1]),
         Field("frequency", unit="Hz", long_name="lowest natural frequency"),
         Field("excited", long_name="share of accelerations faster than a third of the lowest natural frequency"),
+        Field("requirements", lambda a: a.requirements or None, optional=True),
         Field("greatest_deflection", lambda a: a.greatest_deflection and a.greatest_deflection[0], "m"),
         Records(
             "drives",
@@ -353,6 +354,7 @@ DRIVES = Description(
         Axis("component", lambda _a: np.array(["rx", "ry", "rz", "x", "y", "z"])),
     ),
     answered=lambda answer: bool(answer.drives),
+    kept=lambda answer: all(verdict.met for verdict in answer.requirements),
     files={"drives.json": "json", "drives.csv": "csv", "drives.nc": "nc", "curves.csv": curves_csv},
 )
 
@@ -364,7 +366,8 @@ DRIVES_QUESTION = Question(
         Option(
             "motion",
             "file",
-            "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md)",
+            "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md); default: the "
+            "motion of the file's requirements",
             metavar="MOTION",
             first=True,
         ),

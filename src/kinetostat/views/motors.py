@@ -103,6 +103,7 @@ MOTORS = Description(
     title="Motors along the motion",
     fields=(
         *FIRST_FIELDS,
+        Field("requirements", lambda choice: choice.requirements or None, optional=True),
         Records(
             "motors",
             "motor",
@@ -123,6 +124,7 @@ MOTORS = Description(
     tables=_tables,
     figures=_figures,
     answered=lambda answer: bool(answer.fits),
+    kept=lambda answer: all(verdict.met for verdict in answer.requirements),
     files={"motors.json": "json", "motors.csv": "csv"},
 )
 MOTORS_QUESTION = Question(
@@ -132,10 +134,9 @@ MOTORS_QUESTION = Question(
         Option(
             "motion",
             "file",
-            "a CSV file of a motion, as for drives (docs/drives.md)",
+            "a CSV file of a motion, as for drives (docs/drives.md); default: that of the file's requirements",
             metavar="MOTION",
             first=True,
-            required=True,
         ),
         Option("catalogue", "file", "TOML file of motors, gears and screws (default: that of kinetostat)"),
         Option("gear", "text", "name of a gear of the catalogue, for rotary drives", metavar="NAME", default=""),

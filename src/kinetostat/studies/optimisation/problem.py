@@ -17,6 +17,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
+from kinetostat.spec.requirements import with_files
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.studies.optimisation.space import PoseSet, Space, read_poses, read_space
@@ -169,7 +170,8 @@ def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:
     """
     named = study.machine in bundled()
     machine = load(study.machine if named else folder / study.machine, list(settings_of(study.changes)))
-    return problem_of(study, machine)
+    required = with_files(study.requirements, folder)
+    return problem_of(study.model_copy(update={"requirements": required}) if required else study, machine)
 
 
 def problem_of(study: StudyFile, machine: Machine) -> Problem:
