@@ -142,6 +142,7 @@ def with_files(requirements: Requirements, folder: Path) -> Requirements:
 
 
 def _with_files(requirement: Requirement, name: str, folder: Path) -> Requirement:
+    texts: dict[str, Any] = {}
     for part in FILES:
         file = getattr(requirement, part)
         if not file or is_text(file):
@@ -156,8 +157,8 @@ def _with_files(requirement: Requirement, name: str, folder: Path) -> Requiremen
             lines = read_text(folder / file)
         except InputError as error:
             raise InputError(f"{TABLE}.{name}.{part}: {error}") from None
-        requirement = replace(requirement, **{part: lines if is_text(lines) else f"{lines}\n"})
-    return requirement
+        texts[part] = lines if is_text(lines) else f"{lines}\n"
+    return replace(requirement, **texts)
 
 
 def is_text(given: str) -> bool:
