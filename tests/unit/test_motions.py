@@ -5,7 +5,8 @@ import pytest
 
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.motions import along_profile, profile, read_motion
+from kinetostat.studies.motions import read_motion
+from kinetostat.studies.moves import along_profile, profile
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ Source: theory (99).
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.batch import NUMPY_SLAB, evaluate
+from kinetostat.engine.batch import evaluate
 from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.drives import rotor_turns
@@ -33,15 +33,10 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
-from kinetostat.studies.motions import Motion, every_direction, read_motion
-from kinetostat.studies.requirements import Verdict, motor_requirements, required_motion
-from kinetostat.studies.vibration import modes
+from kinetostat.studies.motion_deflection import deflections, excitation
+from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
-
-SLOW = 1.0 / 3.0
-"""Share of the lowest natural frequency up to which springs follow a motion as at rest, within an eighth."""
-
 
 PASSABLE = [int(Status.OK), int(Status.JOINT_LIMIT), int(Status.UNDECIDED)]
 """Statuses of poses at which drives have forces: limits of the file are compared with, but stop no motion."""
@@ -144,7 +139,7 @@ class DriveLoads(Immutable):
         worst: number of the point at which a drive has the greatest share of its greatest force, and that drive's name.
         frequency: lowest natural frequency at the pose of the machine, Hz; None where it is not known.
         excited: share of the motion's acceleration, of its mean square, that is faster than a third of that frequency.
-        requirements: verdicts on the motors that the machine's file requires.
+        requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
 
     machine: Machine
@@ -158,7 +153,7 @@ class DriveLoads(Immutable):
     worst: tuple[int, str] | None = None
     frequency: float | None = None
     excited: float = 0.0
-    requirements: tuple[Verdict, ...] = ()
+    requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Drives of {self.machine.name!r}: {self.message}>"
@@ -205,11 +200,11 @@ def drives(
         raise InputError("a motion says its speed and acceleration itself; give either a motion or these.")
     else:
         moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
-    return replace(drive_loads(state, form, moved), requirements=motor_requirements(state))
+    return drive_loads(state, form, moved)
 
 
 def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoads:
-    """Compute what a motion asks of the drives of a machine; `drives` without the requirements of its file.
+    """Compute what a motion asks of the drives of a machine: see `drives`.
 
     Args:
         state: of the machine.
@@ -246,7 +241,7 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
     shares = np.abs(curves.force) / np.maximum(np.abs(curves.force).max(axis=1, keepdims=True), 1e-300)
     largest = max(range(len(summaries)), key=lambda k: abs(summaries[k].motor_torque))
     worst = int(np.argmax(shares[largest])), summaries[largest].name
-    frequency, excited = _excitation(state, moved)
+    frequency, excited = excitation(state, moved)
     return DriveLoads(
         state.machine,
         Status.OK,
@@ -255,7 +250,7 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
         tuple(summaries),
         tuple(joints),
         curves,
-        _deflections(state.machine, moved, forces),
+        deflections(state.machine, moved, forces),
         worst,
         frequency,
         excited,
@@ -387,47 +382,6 @@ def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: 
 
 def _size(row: Array) -> float:
     return float(np.abs(row).max())
-
-
-def _deflections(machine: Machine, motion: Motion, forces: PathForces) -> Array:
-    """Deflections of the tool point by C at each pose and the wrench there [n x 6]."""
-    result = np.full((motion.path.size, 6), np.nan)
-    for start in range(0, motion.path.size, NUMPY_SLAB):
-        part = slice(start, min(start + NUMPY_SLAB, motion.path.size))
-        columns = {POSE + name: rows[part] for name, rows in motion.path.pose.items()}
-        with np.errstate(all="ignore"):
-            response = states_at(machine, columns, part.stop - start).free
-            rows = [
-                [
-                    np.broadcast_to(np.asarray(response.compliance.entry(i, j), dtype=float), part.stop - start)
-                    for j in range(6)
-                ]
-                for i in range(6)
-            ]
-            moved = np.einsum("ijn,jn->ni", np.array(rows), forces.wrench[:, part])
-            good = np.broadcast_to(np.asarray(response.status) == Status.OK, part.stop - start)
-        result[part] = np.where(good[:, None] & np.isfinite(moved), moved, np.nan)
-    return result
-
-
-def _excitation(state: MachineState, motion: Motion) -> tuple[float | None, float]:
-    """The lowest natural frequency, Hz, and the share of the motion's accelerations above a third of it."""
-    try:
-        answer = modes(state)
-    except InputError:  # nothing has a mass, or no spring deflects
-        return None, 0.0
-    if answer.solution is None or not answer.solution.ringing or motion.timeless:
-        return None, 0.0
-    lowest = float(answer.solution.frequencies[0])
-    count = 4096
-    even = np.linspace(motion.times[0], motion.times[-1], count, endpoint=False)
-    spectrum = np.zeros(count // 2 + 1)
-    for name, rows in motion.path.accelerations.items():
-        scale = 1.0 if name in ("x", "y", "z") else float(state.configuration.length)
-        spectrum += np.abs(np.fft.rfft(scale * np.interp(even, motion.times, rows))) ** 2
-    fast = np.fft.rfftfreq(count, motion.duration / count) > SLOW * lowest
-    whole = float(spectrum.sum())
-    return lowest, float(spectrum[fast].sum()) / whole if whole > 0.0 else 0.0
 
 
 def _wrong_signs(state: MachineState, curves: DriveCurves) -> str:

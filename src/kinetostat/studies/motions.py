@@ -25,6 +25,8 @@ from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
+from kinetostat.spec.requirements import Requirement, is_text
+from kinetostat.studies.moves import along_profile, curve_between, profile
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
 
 TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
@@ -36,8 +38,6 @@ QUANTITIES = {
 }
 SHAPES = ("line", "through", "arc")
 """Words of the column `shape`: a straight line to the pose, a point through which the next arc leads, an arc to it."""
-STRAIGHT = 1e-9
-"""Sine of the angle between two chords of an arc below which it is a straight line."""
 SMOOTH = 5
 """Degree of the spline through poses at times: with it, accelerations have no corner."""
 AROUND_SINES = 256
@@ -182,6 +182,47 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         raise InputError(f'"{path}": {error}') from None
 
 
+def motion_of(requirement: Requirement, machine: Machine, points: int = 400) -> Motion:
+    """Read the motion that a requirement names; `points` as in `read_motion`.
+
+    Raises:
+        InputError: the file was not read with the machine, or is not a motion.
+    """
+    check_lines("motion", requirement.motion)
+    return read_motion(machine, Path("motion"), points, requirement.motion)
+
+
+def required_motion(machine: Machine, points: int = 400) -> Motion | None:
+    """Read the motion that the requirements of a machine's file name; None without one. Arguments as of `motion_of`.
+
+    Raises:
+        InputError: they name several motions, or what `motion_of` refuses.
+    """
+    names = motions_required(machine)
+    if len(names) > 1:
+        listed = ", ".join(f"requirements.{name}" for name in names)
+        raise InputError(f"the file names several motions ({listed}); give the one that is meant.")
+    return motion_of(machine.requirements[names[0]], machine, points) if names else None
+
+
+def motions_required(machine: Machine) -> tuple[str, ...]:
+    """Names of the requirements of a machine's file that have a motion; of those with the same one, the last."""
+    return tuple({each.motion: name for name, each in machine.requirements.items() if each.motion}.values())
+
+
+def check_lines(part: str, given: str) -> None:
+    """Check that a part of a requirement has the lines of its file.
+
+    Raises:
+        InputError: it has the name of the file, because the machine was not read from one.
+    """
+    if not is_text(given):
+        raise InputError(
+            f"{part} is {shorten(given)}, the name of a file; it is read where the machine is read from a file, beside "
+            f"that. This machine was made of a text: write the lines of the file as {part}."
+        )
+
+
 def _refuse(given: Mapping[str, GivenColumn], names: Sequence[str], what: str) -> None:
     for name in names:
         if name in given:
@@ -260,7 +301,7 @@ def _moves(
         raise InputError("it has only one pose; give the pose where the motion begins and those to which it moves.")
     lengths = float(machine.configure().length) if machine.family.chains is None else float(machine.chains().length)
     curves = [
-        _curve(table, start, end, places, lengths, shapes[end] == "arc")
+        curve_between(table, start, end, places, lengths, shapes[end] == "arc")
         for start, end in pairwise(ends)
         if np.abs(table[end] - table[start]).max() > 0.0
     ]
@@ -283,119 +324,6 @@ def _moves(
         f"{_number_of(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
     )
     return Motion(kind, np.concatenate(times), _path(names, [np.concatenate(part) for part in rows]))
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A line or an arc in the coordinates of the pose, by the length on the path.
-
-    Attributes:
-        start, end: of all coordinates.
-        length: of the path: that of P, or of turns alone, by a point at the machine's length from their axis, m.
-        arc: centre, two vectors of the size of its radius, and its angle, of the coordinates at `places`; None of a
-            line.
-        places: which coordinates are those of P.
-    """
-
-    start: Array
-    end: Array
-    length: float
-    places: tuple[int, ...]
-    arc: tuple[Array, Array, Array, float] | None = None
-
-    def at(self, lengths: Array) -> tuple[Array, Array, Array]:
-        """Coordinates with their first and second derivatives by the length [n x coordinates]."""
-        share = (lengths / self.length)[:, None]
-        slope = np.broadcast_to((self.end - self.start) / self.length, (len(lengths), len(self.start))).copy()
-        place, bend = self.start + (self.end - self.start) * share, np.zeros_like(slope)
-        if self.arc is not None:
-            centre, first, second, angle = self.arc
-            turned, rate = share * angle, angle / self.length
-            at, across = (
-                np.cos(turned) * first + np.sin(turned) * second,
-                np.cos(turned) * second - np.sin(turned) * first,
-            )
-            place[:, self.places], slope[:, self.places], bend[:, self.places] = (
-                centre + at,
-                across * rate,
-                -at * rate**2,
-            )
-        return place, slope, bend
-
-
-def _curve(table: Array, start: int, end: int, places: Sequence[int], size: float, round_: bool) -> Curve:
-    first, last = table[start], table[end]
-    chord = last[places] - first[places]
-    length = float(np.linalg.norm(chord))
-    arc = _arc(first[places], table[end - 1][places], last[places]) if round_ else None
-    if arc is not None:
-        length = float(np.linalg.norm(arc[1]) * arc[3])
-    turned = float(np.linalg.norm(np.delete(last - first, places)))
-    return Curve(first, last, length or turned * size, tuple(places), arc)
-
-
-def _arc(start: Array, middle: Array, end: Array) -> tuple[Array, Array, Array, float] | None:
-    """The circle through three points from the first to the last by way of the second; None where it is straight."""
-    along, across = middle - start, end - start
-    sizes = along @ along, across @ across
-    both = along @ across
-    square = sizes[0] * sizes[1] - both * both
-    if square <= STRAIGHT**2 * sizes[0] * sizes[1]:
-        return None
-    centre = start + (
-        (sizes[0] * sizes[1] - sizes[1] * both) * along + (sizes[0] * sizes[1] - sizes[0] * both) * across
-    ) / (2.0 * square)
-    first = start - centre
-    radius = np.linalg.norm(first)
-    side = along - (along @ first) / radius**2 * first
-    second = side / np.linalg.norm(side) * radius
-    turns = [np.arctan2((p - centre) @ second, (p - centre) @ first) % (2.0 * np.pi) for p in (middle, end)]
-    if turns[0] > turns[1]:
-        second, turns[1] = -second, 2.0 * np.pi - turns[1]
-    return centre, first, second, float(turns[1])
-
-
-def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> list[tuple[float, float, float]]:
-    """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (98).
-
-    Args:
-        length: of the path, m.
-        feed, acceleration, jerk: greatest values along it; an infinite jerk leaves three phases of seven.
-    """
-    if np.isinf(jerk):
-        speed = min(feed, np.sqrt(length * acceleration))
-        rise, cruise = speed / acceleration, length / speed - speed / acceleration
-        return [(rise, acceleration, acceleration), (cruise, 0.0, 0.0), (rise, -acceleration, -acceleration)]
-    speed = np.cbrt(length**2 * jerk / 4.0)
-    if speed * jerk > acceleration**2:
-        lag = acceleration**2 / jerk
-        speed = 0.5 * (np.sqrt(lag**2 + 4.0 * acceleration * length) - lag)
-    speed = min(feed, float(speed))
-    grows = acceleration / jerk if speed * jerk > acceleration**2 else float(np.sqrt(speed / jerk))
-    most = jerk * grows
-    holds = max(speed / most - grows, 0.0)
-    cruise = max(length / speed - (2.0 * grows + holds), 0.0)
-    rise = [(grows, 0.0, most), (holds, most, most), (grows, most, 0.0)]
-    return [*rise, (cruise, 0.0, 0.0), *((time, -a, -b) for time, a, b in rise)]
-
-
-def along_profile(
-    phases: Sequence[tuple[float, float, float]], points: int
-) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Times (s) in all phases, so many in each with both of its ends, and length, speed and acceleration then."""
-    times, lengths, speeds, gains = [], [], [], []
-    clock = at = speed = 0.0
-    for duration, first, last in phases:
-        if duration <= 0.0:
-            continue
-        time = np.linspace(0.0, duration, points)
-        jerk = (last - first) / duration
-        gains.append(first + jerk * time)
-        speeds.append(speed + first * time + jerk * time**2 / 2.0)
-        lengths.append(at + speed * time + first * time**2 / 2.0 + jerk * time**3 / 6.0)
-        times.append(clock + time)
-        clock, at, speed = clock + duration, float(lengths[-1][-1]), float(speeds[-1][-1])
-    return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(gains))
 
 
 def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:

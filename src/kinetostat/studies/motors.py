@@ -27,8 +27,7 @@ from kinetostat.spec.fields import Quantity, quantities, table
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.drives import DriveLoads, drive_loads, root_mean_square
 from kinetostat.studies.dynamics import rigid_form_of
-from kinetostat.studies.motions import Motion, read_motion
-from kinetostat.studies.requirements import Verdict, motor_requirements, required_motion
+from kinetostat.studies.motions import Motion, read_motion, required_motion
 from kinetostat.units import UnitError
 
 CATALOGUE = Path(__file__).with_name("catalogue.toml")
@@ -199,14 +198,14 @@ class MotorChoice(Immutable):
         status: of the first pose without an answer, else OK.
         message: the answer in a sentence.
         fits: of each motor, the smallest that fits first, then the others by what is missing; none without an answer.
-        requirements: verdicts on the motors that the machine's file requires.
+        requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
 
     machine: Machine
     status: Status
     message: str
     fits: tuple[MotorFit, ...] = ()
-    requirements: tuple[Verdict, ...] = ()
+    requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Motors for {self.machine.name!r}: {self.message}>"
@@ -252,7 +251,7 @@ def motors(
             return MotorChoice(fitted, loads.status, loads.message)
         fits.append(fit_of(known, name, loads))
     ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.greatest_share)))
-    return MotorChoice(fitted, Status.OK, _message(ordered), ordered, motor_requirements(machine))
+    return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
 
 
 def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str) -> tuple[Machine, float]:

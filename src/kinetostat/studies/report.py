@@ -33,10 +33,11 @@ from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.lobes import lobes
 from kinetostat.studies.map_ranges import MOST_RANGES, coarser_ranges, usual_ranges
+from kinetostat.studies.motions import motions_required
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import stored_problem
-from kinetostat.studies.requirements import motions_required, requirements
+from kinetostat.studies.requirements import requirements
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.study_folder import holds_study
 from kinetostat.studies.tensions import tensions

@@ -6,7 +6,6 @@ A pose that has no result fails its requirement: a machine that cannot get there
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,10 +23,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
-from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
-from kinetostat.spec.requirements import Requirement, is_text
+from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
@@ -132,50 +131,14 @@ def motor_requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     return requirements(state_of(replace(state.machine, requirements=about_motors))) if about_motors else ()
 
 
-def motion_of(requirement: Requirement, machine: Machine, points: int = 400) -> "motions.Motion":
-    """Read the motion that a requirement names; `points` as in `read_motion`.
-
-    Raises:
-        InputError: the file was not read with the machine, or is not a motion.
-    """
-    _check_lines("motion", requirement.motion)
-    return motions.read_motion(machine, Path("motion"), points, requirement.motion)
-
-
-def required_motion(machine: Machine, points: int = 400) -> "motions.Motion | None":
-    """Read the motion that the requirements of a machine's file name; None without one. Arguments as of `motion_of`.
-
-    Raises:
-        InputError: they name several motions, or what `motion_of` refuses.
-    """
-    names = motions_required(machine)
-    if len(names) > 1:
-        listed = ", ".join(f"requirements.{name}" for name in names)
-        raise InputError(f"the file names several motions ({listed}); give the one that is meant.")
-    return motion_of(machine.requirements[names[0]], machine, points) if names else None
-
-
-def motions_required(machine: Machine) -> tuple[str, ...]:
-    """Names of the requirements of a machine's file that have a motion; of those with the same one, the last."""
-    return tuple({each.motion: name for name, each in machine.requirements.items() if each.motion}.values())
-
-
-def _check_lines(part: str, given: str) -> None:
-    if not is_text(given):
-        raise InputError(
-            f"{part} is {shorten(given)}, the name of a file; it is read where the machine is read from a file, beside "
-            f"that. This machine was made of a text: write the lines of the file as {part}."
-        )
-
-
 def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
     """Judge whether a motor does a motion: the greatest share of its limits that is used is at most 1."""
     known = motors.read_catalogue()
     if requirement.catalogue:
-        _check_lines("catalogue", requirement.catalogue)
+        motions.check_lines("catalogue", requirement.catalogue)
         known = motors.catalogue_of(parse(requirement.catalogue, "catalogue"), "catalogue")
     motor = choice(requirement.fits, known.motors, "fits")
-    motion = motion_of(requirement, machine)
+    motion = motions.motion_of(requirement, machine)
     geared, beside = motors.with_transmission(machine, known, requirement.gear, requirement.screw)
     loads = motors.loads_with(geared, known.motors[motor], beside, motion)
     worst, place, words, pose = None, "", loads.message, dict[str, float]()

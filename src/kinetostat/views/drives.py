@@ -1,7 +1,9 @@
 """Drives along a motion: the question, and the description of its answer. Nothing is computed here."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -11,10 +13,12 @@ from matplotlib.figure import Figure
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.closing import POINT
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
 from kinetostat.studies.plain_data import columns_csv
+from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
 from kinetostat.views.fitted_table import FittedTable
@@ -284,6 +288,11 @@ def _over_time(name: str, unit: str, meaning: str) -> Field:
     return Field(f"{name}_over_time", take, unit, meaning, ("drive", "time"))
 
 
+def drives_with_verdicts(machine: Machine, **options: Any) -> DriveLoads:
+    """Answer as `drives` does, and judge the motors that the machine's file requires."""
+    return replace(drives(machine, **options), requirements=motor_requirements(machine))
+
+
 DRIVES = Description(
     title="Drives along the motion",
     fields=(
@@ -361,7 +370,7 @@ DRIVES = Description(
 
 DRIVES_QUESTION = Question(
     example='kinetostat drives hexapod motion.csv --set drives.lead="10 mm" --set tool.mass="12 kg" -o drives',
-    answer=drives,
+    answer=drives_with_verdicts,
     options=(
         Option(
             "motion",

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -10,8 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.display import DASH, number
+from kinetostat.machine.machine import Machine
 from kinetostat.studies.drives import root_mean_square
 from kinetostat.studies.motors import MotorChoice, MotorFit, motors
+from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
 from kinetostat.views.fitted_table import FittedTable
@@ -99,6 +103,11 @@ def _finite(share: float) -> float | None:
     return share if math.isfinite(share) else None
 
 
+def motors_with_verdicts(machine: Machine, **options: Any) -> MotorChoice:
+    """Answer as `motors` does, and judge the motors that the machine's file requires."""
+    return replace(motors(machine, **options), requirements=motor_requirements(machine))
+
+
 MOTORS = Description(
     title="Motors along the motion",
     fields=(
@@ -129,7 +138,7 @@ MOTORS = Description(
 )
 MOTORS_QUESTION = Question(
     example='kinetostat motors hexapod motion.csv --set drives.lead="10 mm" --set tool.mass="12 kg" -o motors',
-    answer=motors,
+    answer=motors_with_verdicts,
     options=(
         Option(
             "motion",
