@@ -1,13 +1,17 @@
 """Drives along a motion: by hand where a hexapod moves upright, and what holds of every answer."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from kinetostat.engine.moving import Path
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import build, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.drives import drives
+from kinetostat.studies.motion_deflection import swings_under
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.report import REPORT_PARTS, gather
 from kinetostat.views.data_forms import json_of
@@ -89,6 +93,76 @@ def test_the_tool_deflects_as_under_the_same_wrench(tmp_path):
     wrench = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -12.0 * 9.81])
     assert answer.motion.path.pose["z"][middle] == pytest.approx(0.135)
     assert answer.deflection[middle] == pytest.approx(compliance @ wrench, abs=1e-12)
+
+
+STAGE = """
+schema = 1
+name   = "Stage"
+family = "legs"
+[platform]
+point = [0, 0, 0]
+[pose]
+x = 0
+[tool]
+mass = "2 kg"
+[damping]
+ratio = {}
+[[legs]]
+name = "drive"
+joints = [{{ name = "slide", type = "prismatic", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], stiffness = "2e5 N/m", actuated = true }}]
+"""  # noqa: E501
+
+
+@pytest.mark.parametrize("ratio", [0.03, 1.0, 2.5])
+@pytest.mark.parametrize("share", [0.02, 0.4, 0.97])
+def test_a_shaken_stage_swings_as_the_formula_says(tmp_path, share, ratio):
+    """A spring whose foot moves as X sin(w t) stretches by X r² / sqrt((1 - r²)² + (2 zeta r)²), r = w / w_0."""
+    lowest = np.sqrt(2e5 / 2.0) / (2.0 * np.pi)
+    (tmp_path / "motion.csv").write_text(f"field, amplitude, frequency [Hz]\nx, 2 mm, {share * lowest}\n", "utf-8")
+    answer = drives(build(STAGE.format(ratio)), tmp_path / "motion.csv")
+    assert answer.along_modes.frequency == pytest.approx(lowest)
+    stretched = 2e-3 * share**2 / np.hypot(1.0 - share**2, 2.0 * ratio * share)
+    if answer.along_modes.modes:
+        # The motion has 400 points, and its loads are taken for straight between them.
+        assert answer.greatest_with_modes[0] == pytest.approx(stretched, rel=5e-5)
+    else:
+        assert (share, ratio) == (0.02, 0.03)
+    assert answer.greatest_deflection[0] == pytest.approx(2e-3 * share**2, rel=1e-9)
+
+
+def test_a_swing_under_loads_between_times_is_exact():
+    """Against a fine solver of differential equations, for loads that change evenly between the times."""
+    times, rng = np.linspace(0.0, 2.0, 21), np.random.default_rng(3)
+    loads, rates, ratios = rng.normal(size=(3, 21)), np.array([3.0, 20.0, 5.0]), np.array([0.02, 0.3, 1.7])
+    amounts, ends = swings_under(loads, rates, ratios, times[1], loads[:, 0])
+    for load_, rate, ratio, amount, end in zip(loads, rates, ratios, amounts, ends, strict=True):
+
+        def pull(t, y, load_=load_, rate=rate, ratio=ratio):
+            return [y[1], rate**2 * (np.interp(t, times, load_) - y[0]) - 2.0 * ratio * rate * y[1]]
+
+        state, known = [load_[0], 0.0], [load_[0]]
+        for first, last in pairwise(times):
+            state = solve_ivp(pull, (first, last), state, rtol=1e-11, atol=1e-13).y[:, -1]
+            known.append(state[0])
+        assert amount == pytest.approx(known, abs=1e-8)
+        assert end == pytest.approx(state[1], abs=1e-7)
+
+
+def test_after_a_move_the_stage_swings_on(tmp_path):
+    """Accelerations a and -a for a time t each: jumps by a, -2 a and a, of which each excites a swing of a / w².
+
+    With t a period of the stage they cancel; with t half of it they add up to four times that.
+    """
+    rate, acceleration = np.sqrt(2e5 / 2.0), 5.0
+    period = 2.0 * np.pi / rate
+    left = []
+    for phase in (period, 0.5 * period):
+        head, ends = "feed [m/s], acceleration [m/s**2], x [m]", (0.0, acceleration * phase**2)
+        text = "\n".join([head, *(f"9, {acceleration}, {end}" for end in ends)])
+        (tmp_path / "motion.csv").write_text(text, "utf-8")
+        left.append(drives(build(STAGE.format(1e-9)), tmp_path / "motion.csv").along_modes.after)
+    assert left[0] < 1e-3 * left[1]
+    assert left[1] == pytest.approx(4.0 * acceleration / rate**2, rel=1e-3)
 
 
 def test_no_direction_asks_for_more_than_the_worst_ones():

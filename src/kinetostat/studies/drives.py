@@ -33,7 +33,7 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
-from kinetostat.studies.motion_deflection import deflections, excitation
+from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
@@ -137,8 +137,7 @@ class DriveLoads(Immutable):
         curves: all of it over time; None without an answer.
         deflection: of the tool point [n x 6], rad and m, quasi-static; NaN where K does not hold it.
         worst: number of the point at which a drive has the greatest share of its greatest force, and that drive's name.
-        frequency: lowest natural frequency at the pose of the machine, Hz; None where it is not known.
-        excited: share of the motion's acceleration, of its mean square, that is faster than a third of that frequency.
+        along_modes: the modes of the machine at its pose along the motion; None where they are not known.
         requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
 
@@ -151,8 +150,7 @@ class DriveLoads(Immutable):
     curves: DriveCurves | None = None
     deflection: Array | None = None
     worst: tuple[int, str] | None = None
-    frequency: float | None = None
-    excited: float = 0.0
+    along_modes: ModesAlong | None = None
     requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
@@ -160,11 +158,23 @@ class DriveLoads(Immutable):
 
     @property
     def greatest_deflection(self) -> tuple[float, int] | None:
-        """The greatest displacement of the tool point, m, and the number of its point; None where it is not known."""
+        """The greatest displacement of the tool point at rest under the same forces, m, and the number of its point.
+
+        None where it is not known.
+        """
         if self.deflection is None or np.isnan(self.deflection).all():
             return None
         sizes = np.linalg.norm(self.deflection[:, 3:], axis=1)
         return float(np.nanmax(sizes)), int(np.nanargmax(sizes))
+
+    @property
+    def greatest_with_modes(self) -> tuple[float, float] | None:
+        """The greatest displacement of the tool point with the excited modes, m, and its time, s; None if not known."""
+        if self.along_modes is None or self.deflection is None or np.isnan(self.deflection).any():
+            return None
+        at_rest = [np.interp(self.along_modes.times, self.motion.times, row) for row in self.deflection[:, 3:].T]
+        sizes = np.linalg.norm(np.transpose(at_rest) + self.along_modes.surplus[:, 3:], axis=1)
+        return float(sizes.max()), float(self.along_modes.times[sizes.argmax()])
 
 
 @checked
@@ -241,7 +251,6 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
     shares = np.abs(curves.force) / np.maximum(np.abs(curves.force).max(axis=1, keepdims=True), 1e-300)
     largest = max(range(len(summaries)), key=lambda k: abs(summaries[k].motor_torque))
     worst = int(np.argmax(shares[largest])), summaries[largest].name
-    frequency, excited = excitation(state, moved)
     return DriveLoads(
         state.machine,
         Status.OK,
@@ -252,8 +261,7 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
         curves,
         deflections(state.machine, moved, forces),
         worst,
-        frequency,
-        excited,
+        modes_along(state, form, moved, forces.wrench),
     )
 
 

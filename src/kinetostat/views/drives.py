@@ -1,6 +1,6 @@
 """Drives along a motion: the question, and the description of its answer. Nothing is computed here."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,6 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
+from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
@@ -27,8 +28,8 @@ from kinetostat.views.tables import numeric_table
 
 PER_MINUTE = 30.0 / np.pi
 """Turns per minute of 1 rad/s."""
-LEAST_SHARE = 1e-5
-"""Share that is still written as a number."""
+MOST_MODES = 6
+"""Excited modes that are named."""
 MOST_LEGEND = 8
 """Drives that a legend names."""
 
@@ -62,14 +63,8 @@ def _lines(answer: DriveLoads) -> Lines:
             "Deflection",
             f"The tool deflects by up to {shown}, at {moment}, as it would at rest under the same forces.",
         )
-    if answer.frequency is not None:
-        slow = answer.excited < 1e-3
-        ending = "springs follow it as at rest." if slow else "the machine rings, and the tool deflects further."
-        yield (
-            "Vibration",
-            f"The lowest natural frequency is {number(answer.frequency)} Hz; {_percent_text(answer.excited)} of the "
-            f"motion's accelerations are faster than a third of it, so that {ending}",
-        )
+    if answer.along_modes is not None:
+        yield "Vibration", _modes_text(answer, answer.along_modes)
     if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
         example = show(0.01, "m")
         yield (
@@ -78,8 +73,20 @@ def _lines(answer: DriveLoads) -> Lines:
         )
 
 
-def _percent_text(share: float) -> str:
-    return f"{number(100.0 * share)} %" if share > LEAST_SHARE else "hardly any"
+def _modes_text(answer: DriveLoads, along: ModesAlong) -> str:
+    """Whether springs follow the motion as at rest, or which modes it excites, and how far the tool deflects then."""
+    if not along.modes or answer.greatest_with_modes is None:
+        return (
+            f"The motion excites no mode, of which the lowest has {number(along.frequency)} Hz with motors that "
+            "stand still: springs follow it as at rest."
+        )
+    show = answer.machine.display.show_deflection
+    known = list(dict.fromkeys(number(frequency) for frequency in along.modes))
+    listed = ", ".join(known[:MOST_MODES]) + (", ..." if len(known) > MOST_MODES else "")
+    size, moment = answer.greatest_with_modes
+    text = f"The motion excites modes at {listed} Hz: with them the tool deflects by up to {show(size, 'm')}, at "
+    text += f"{moment:.4g} s"
+    return f"{text}, and after the end it swings by up to {show(along.after, 'm')}." if along.after else f"{text}."
 
 
 def _direction(part: Mapping[str, Array], point: int) -> str:
@@ -279,6 +286,11 @@ def curves_csv(answer: DriveLoads) -> str | None:
     return columns_csv(columns)
 
 
+def _of_modes(name: str) -> Callable[[DriveLoads], Any]:
+    """A number of the modes along the motion; None where they are not known."""
+    return lambda answer: getattr(answer.along_modes, name, None)
+
+
 def _over_time(name: str, unit: str, meaning: str) -> Field:
     """A curve of all drives; empty where there is no answer."""
 
@@ -301,8 +313,10 @@ DRIVES = Description(
         Field("duration", "motion.duration", "s"),
         Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst[0]]), "s"),
         Field("worst_drive", lambda a: None if a.worst is None else a.worst[1]),
-        Field("frequency", unit="Hz", long_name="lowest natural frequency"),
-        Field("excited", long_name="share of accelerations faster than a third of the lowest natural frequency"),
+        Field("frequency", _of_modes("frequency"), "Hz", "lowest natural frequency with motors that stand still"),
+        Field("excited_modes", _of_modes("modes"), "Hz", "natural frequencies that the motion excites"),
+        Field("deflection_with_modes", lambda a: a.greatest_with_modes and a.greatest_with_modes[0], "m"),
+        Field("deflection_after", _of_modes("after"), "m", "greatest swing of the tool point after the end"),
         Field("requirements", lambda a: a.requirements or None, optional=True),
         Field("greatest_deflection", lambda a: a.greatest_deflection and a.greatest_deflection[0], "m"),
         Records(
