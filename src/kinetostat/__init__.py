@@ -27,6 +27,7 @@ _HOMES = {
     "dynamics": "kinetostat.studies.dynamics",
     "servo": "kinetostat.studies.servo",
     "motors": "kinetostat.studies.motors",
+    "elevation": "kinetostat.studies.elevation",
     "lobes": "kinetostat.studies.lobes",
     "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
@@ -65,6 +66,7 @@ _SHOWN = {
     "Carrying": "kinetostat.studies.carrying",
     "MotorChoice": "kinetostat.studies.motors",
     "Servo": "kinetostat.studies.servo",
+    "Elevation": "kinetostat.studies.elevation",
     "Lobes": "kinetostat.studies.lobes",
     "Capability": "kinetostat.studies.capability",
     "Budget": "kinetostat.studies.budget.budget",
@@ -74,10 +76,11 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
-    "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "evaluate", "evaluate_grid",
-    "export", "forward", "guidelines", "identify", "load", "load_problem", "lobes", "machine_picture", "modes",
-    "motors", "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity", "servo",
-    "state_of", "state_space", "tensions", "under_load", "validate", "validate_measured", "workspace",
+    "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "elevation", "evaluate",
+    "evaluate_grid", "export", "forward", "guidelines", "identify", "load", "load_problem", "lobes",
+    "machine_picture", "modes", "motors", "optimize", "plot", "register", "report", "reproduce", "requirements",
+    "save", "sensitivity", "servo", "state_of", "state_space", "tensions", "under_load", "validate",
+    "validate_measured", "workspace",
 ]  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from kinetostat.studies.corrections import correction_table as correction_table
 from kinetostat.studies.datasets import evaluate as evaluate
 from kinetostat.studies.drives import drives as drives
 from kinetostat.studies.dynamics import dynamics as dynamics
+from kinetostat.studies.elevation import elevation as elevation
 from kinetostat.studies.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines import guidelines as guidelines
 from kinetostat.studies.identification.identification import identify as identify

@@ -39,6 +39,9 @@ from kinetostat.numerics.motions import Motions, cross
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
 
+LOAD = "load."
+"""Prefix of the fields of [load], which press joints and move no leg of the drawn machine."""
+
 PLACED = (Status.OK, Status.JOINT_LIMIT)
 """Statuses at which errors have a meaning."""
 
@@ -288,18 +291,21 @@ def error_model(
 
     Args:
         machine: as drawn, or its state, as `state_of` returns it.
-        columns: coordinates of the pose that vary, by leaf path ("pose.x"), SI [n].
+        columns: coordinates of the pose and loads that vary, by leaf path ("pose.x", "load.gravity_angle"), SI [n].
         count: n.
         load: wrench at the tool point under which compliances count, base axes, N·m and N [6] or [n x 6]; that of the
             machine's file if None.
 
     Raises:
-        InputError: a column is not a coordinate of the pose, or the machine has no place at its home place.
+        InputError: a column is neither of the pose nor of the loads, or the machine has no place at its home place.
     """
     given = state_of(machine)
-    machine, others = given.machine, [path for path in columns if not path.startswith(POSE)]
+    machine, others = given.machine, [path for path in columns if not path.startswith((POSE, LOAD))]
     if others:
-        raise InputError(f'"{others[0]}" is not a coordinate of the pose of {machine.name}; errors are of one machine.')
+        raise InputError(
+            f'"{others[0]}" is neither a coordinate of the pose of {machine.name} nor a load; '
+            "errors are of one machine."
+        )
     posed = states_at(machine, columns, count) if columns else given
     with np.errstate(all="ignore"):  # poses without a place
         response, stands = posed.free, stand(posed.machine, posed.joints)

@@ -111,6 +111,10 @@ def _add_report_command(commands: "Commands") -> None:
         "--motion", metavar="FILE", type=Path,
         help="also show what a motion asks of the drives: a CSV file as `kinetostat drives` takes it",
     )  # fmt: skip
+    command.add_argument(
+        "--elevations", metavar="FROM:TO:COUNT", default="",
+        help='also show what gravity does while the machine tilts, e.g. "0 deg:90 deg:7", as `kinetostat elevation`',
+    )  # fmt: skip
     command.add_argument("--author", help="author in the title block")
     command.add_argument(
         "--date", help="date in the title block (default: none, so that equal input gives equal files)"
@@ -140,6 +144,7 @@ def _report(options: argparse.Namespace) -> int:
         options.loaded,
         options.fit,
         options.motion,
+        options.elevations,
     )
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
@@ -148,7 +153,8 @@ def _report(options: argparse.Namespace) -> int:
     result = result.in_units(options.units) if result and options.units else result
     machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:
-        answers = gather(machine, wanted.ranges, wanted.without, result, progress, wanted.fit, wanted.motion)
+        known = wanted.fit, wanted.motion, wanted.elevations
+        answers = gather(machine, wanted.ranges, wanted.without, result, progress, *known)
         if answers.analysis.status is Status.OK:
             named = [options.subject, *(word for text in options.settings for word in ("--set", text))]
             write_report(answers, wanted, named, subject.inputs, path, progress)

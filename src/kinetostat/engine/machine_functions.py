@@ -5,6 +5,7 @@ machine are part of its code. The languages are in `c_source` and `page`.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -50,7 +51,7 @@ class MachineFunctions:
     """Arguments and results of the functions of a machine, whatever language they are written in.
 
     Attributes:
-        machine: at its pose.
+        machine: at its pose; free, whatever its file says, where its states of rest have no programs.
         inputs: leaf paths of the arguments: coordinates of the pose, then parameters that were chosen.
         coordinates: number of the coordinates.
         quantities: names of the quantities.
@@ -148,6 +149,8 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
             f"{needing[0]} has no program for {machine.name}: nothing loads it, or legs that are no rods close its "
             "loops; leave it out of --outputs, or give the machine a load."
         )
+    if machine.loaded and not rests:  # what no program brings to rest is the free machine in all of them
+        machine = replace(machine, loaded=False)
     form = form_with_numbers(machine, paths)
     placement = placement_of(Specimen(machine), form, paths, closed)
     return MachineFunctions(machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests)

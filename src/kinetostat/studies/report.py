@@ -28,6 +28,7 @@ from kinetostat.studies.budget.budget import budget
 from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.drives import drives
+from kinetostat.studies.elevation import elevation
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
@@ -128,6 +129,7 @@ class Answers:
         fit: the record of an identification of the machine as built, if one is given.
         result: the result of the study whose best design the machine is.
         motion: path of the motion that its drives make; None for none.
+        elevations: over which it tilts, "0 deg:90 deg:7"; empty for a machine that does not.
         given: the answer to each question of `REPORT_QUESTIONS` that was asked, by its name.
     """
 
@@ -138,6 +140,7 @@ class Answers:
     fit: FitRecord | None = None
     result: Result | None = None
     motion: Path | None = None
+    elevations: str = ""
     given: dict[str, Any] = field(default_factory=dict)
 
     def of(self, name: str) -> Any:
@@ -165,6 +168,9 @@ class ReportQuestion:
 REPORT_QUESTIONS = (
     ReportQuestion("requirements", lambda known: requirements(known.state)),
     ReportQuestion("under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded),
+    ReportQuestion(
+        "elevation", lambda known: elevation(known.state, known.elevations), lambda known: bool(known.elevations)
+    ),
     ReportQuestion("budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances)),
     ReportQuestion(
         "capability", lambda known: capability(known.state), lambda known: bool(limits_of_drives(known.state))
@@ -206,6 +212,7 @@ def gather(
     progress: Progress = silent,
     fit: str | Path | None = None,
     motion: str | Path | None = None,
+    elevations: str = "",
 ) -> Answers:
     """Answer every question of a report on a machine.
 
@@ -217,10 +224,11 @@ def gather(
         progress: receives the number of steps done, and `REPORT_STEPS`; the last two steps are not done here.
         fit: record of an identification of the machine, or the folder in which it lies.
         motion: path of the CSV file of a motion, as `drives` takes it; None for none.
+        elevations: over which the machine tilts, as `elevation` takes them; empty for none.
 
     Raises:
-        InputError: a bad range, too many, an unknown part, loads that `under_load` or tolerances that `budget` refuses,
-            a record that is not one of this machine, or a motion that `drives` refuses.
+        InputError: a bad range, too many, an unknown part, elevations, loads, tolerances or a motion that `elevation`,
+            `under_load`, `budget` or `drives` refuses, or a record that is not one of this machine.
     """
     for part in without:
         choice(part, REPORT_PARTS, "the part of a report to leave out")
@@ -234,7 +242,8 @@ def gather(
     if analysis.status is not Status.OK:
         return Answers(machine, state, analysis, result=result)
     over = list(ranges) or usual_ranges(machine, MAP_POINTS)
-    known = Answers(machine, state, analysis, tuple(over), record, result, None if motion is None else Path(motion))
+    path = None if motion is None else Path(motion)
+    known = Answers(machine, state, analysis, tuple(over), record, result, path, elevations)
     for step, question in enumerate(REPORT_QUESTIONS, 1):
         if question.part not in without and question.when(known):
             known.given[question.name] = question.ask(known)

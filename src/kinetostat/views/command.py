@@ -93,7 +93,8 @@ COMMAND = Description(
 )
 
 
-def _correction_lines(answer: CorrectionTable) -> Lines:
+def correction_lines(answer: CorrectionTable) -> Lines:
+    """Say what corrections take away, and how short their law is."""
     yield "Corrections", answer.message
     if not answer.before:
         return
@@ -117,7 +118,8 @@ def _correction_lines(answer: CorrectionTable) -> Lines:
         yield "", "Its coefficients are printed with --json."
 
 
-def _correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTable]:
+def correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTable]:
+    """Least and largest correction of each actuator, and the coefficients of the law."""
     if not answer.before:
         return
     commands, display = answer.command, answer.machine.display
@@ -153,7 +155,8 @@ def _term_text(term: Term, fields: Sequence[Parameter]) -> str:
     return " ".join(parts) or "1"
 
 
-def _law(answer: CorrectionTable) -> dict[str, Any]:
+def law_fields(answer: CorrectionTable) -> dict[str, Any]:
+    """The law as plain data."""
     law = answer.law
     return {
         "terms": [
@@ -193,10 +196,10 @@ CORRECTIONS = Description(
         Field("error_left", "left"),
         Field("error_of_table", "error"),
         Field("cells_unknown", "unknown"),
-        Field("law", _law),
+        Field("law", law_fields),
     ),
-    lines=_correction_lines,
-    tables=_correction_tables,
+    lines=correction_lines,
+    tables=correction_tables,
     state=_grid_text,
     makers={"csv": corrections_csv},
 )

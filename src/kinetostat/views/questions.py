@@ -56,6 +56,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute where actuators must stand to bring a loaded tool to its pose",
         "views.command.COMMAND_QUESTION",
     ),
+    "elevation": (
+        "compute what gravity does to a tilting machine over its elevation",
+        "views.elevation.ELEVATION_QUESTION",
+    ),
     "identify": (
         "find the errors of a machine as built that explain what was measured of it",
         "views.identification.IDENTIFY_QUESTION",
@@ -80,6 +84,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.guidelines.Guidelines": "views.guidelines.GUIDELINES",
     "studies.commanding.Command": "views.command.COMMAND",
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
+    "studies.elevation.Elevation": "views.elevation.ELEVATION",
     "studies.motors.MotorChoice": "views.motors.MOTORS",
     "studies.servo.Servo": "views.servo.SERVO",
     "studies.lobes.Lobes": "views.lobes.LOBES",

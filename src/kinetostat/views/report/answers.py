@@ -44,7 +44,9 @@ from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 
-ANSWERS_WITH_SECTIONS = ("under_load", "tensions", "capability", "vibration", "drives", "lobes", "budget")
+ANSWERS_WITH_SECTIONS = (
+    "under_load", "elevation", "tensions", "capability", "vibration", "drives", "lobes", "budget"
+)  # fmt: skip
 """Answers of `studies.report.REPORT_QUESTIONS` with a section, in the order of a report."""
 LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
 SAID_BEFORE = "Pose"

@@ -58,6 +58,7 @@ class ReportOptions:
         loaded: whether the machine is to be shown under its loads, whatever its file says.
         fit: record of an identification of the machine, or its folder.
         motion: path of the CSV file of a motion of its drives.
+        elevations: over which the machine tilts, as `elevation` takes them; empty for none.
     """
 
     ranges: Sequence[str] = ()
@@ -68,6 +69,7 @@ class ReportOptions:
     loaded: bool = False
     fit: str | Path | None = None
     motion: str | Path | None = None
+    elevations: str = ""
 
     def words(self) -> list[str]:
         """Words of the command line that give the same options."""
@@ -77,6 +79,7 @@ class ReportOptions:
             "date": self.date,
             "fit": self.fit,
             "motion": self.motion,
+            "elevations": self.elevations,
         }
         pairs = [("--over", self.ranges), ("--without", self.without)]
         pairs += [(f"--{name}", [str(value)]) for name, value in single.items() if value]
@@ -96,6 +99,7 @@ def report(
     date: str | None = None,
     fit: str | Path | None = None,
     motion: str | Path | None = None,
+    elevations: str = "",
     progress: Progress = silent,
 ) -> Path:
     """Write a report for a design review into one file: on a machine, or on a study and its best design.
@@ -109,6 +113,7 @@ def report(
         author, date: for the title block. Without a date, the same input gives the same bytes.
         fit: record of an identification of the machine (fit.json), or the folder in which it lies.
         motion: path of the CSV file of a motion, as `drives` takes it: what it asks of the drives.
+        elevations: over which the machine tilts, as `elevation` takes them, "0 deg:90 deg:7"; empty for none.
         progress: called with the number of steps done and of all steps.
 
     Returns:
@@ -118,12 +123,13 @@ def report(
         InputError: the pose has no answer, no design meets the constraints, a range or part is not valid, the file is
             neither .html nor .pdf or cannot be written, or a library is missing.
     """
-    place, options = report_path(path), ReportOptions(ranges, without, engine, author, date, fit=fit, motion=motion)
+    place = report_path(path)
+    options = ReportOptions(ranges, without, engine, author, date, fit=fit, motion=motion, elevations=elevations)
     result = about if isinstance(about, Result) else None
     if result is not None and not result.solved:
         raise InputError(result.message)
     machine = about.machine if isinstance(about, Result) else about
-    answers = gather(machine, ranges, without, result, progress, fit, motion)
+    answers = gather(machine, ranges, without, result, progress, fit, motion, elevations)
     if answers.analysis.status is not Status.OK:
         raise InputError(answers.analysis.message)
     inputs = texts_of(result.problem) if result else (("machine.toml", as_file(machine)),)

@@ -1,0 +1,340 @@
+"""Everything about a tilting machine over its elevation: sag, frequency, forces, reversals, errors, corrections.
+
+A telescope or a rotary table tilts, and gravity turns in its base. At an elevation of 90 degrees gravity acts as the
+file says; at any other, `load.gravity_angle` is 90 degrees minus the elevation. The states at rest, the error budget
+and the corrections are those of their own questions; what is here are the reversals and the answer that holds all.
+
+A load reverses where gravity turns the force between two parts around, so that they cross the clearance or the backlash
+between them. To first order the reaction of a joint or a drive is what the load does per unit of its free motion
+(virtual work), and over the angle of gravity it is a + b cos + c sin, exactly: the load is so, and the drawn machine
+stays where it is. So three angles or more give the whole curve, and with it the angle at which it passes zero.
+
+Source: theory (46) and (51), and theory section 12.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.numbers import loaded_numbers
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.frozen import dataclass
+from kinetostat.kinematics.limits import load_checks
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.feasible import lost_motion
+from kinetostat.machine.loading import changed
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity
+from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.ranges import parse_range
+from kinetostat.studies.budget.budget import Budget, budget
+from kinetostat.studies.budget.tolerances import toleranced_parts
+from kinetostat.studies.corrections import GRAVITY_ANGLE, CorrectionTable, correction_table
+from kinetostat.studies.requirements import Verdict, requirements
+from kinetostat.tolerances import NO_REACTION, ROUND_OFF_OF_ENTRY
+
+UPRIGHT = math.pi / 2.0
+"""Elevation at which gravity acts as the file says."""
+USUAL_RANGE = "0 deg:90 deg:7"
+LEAST_POINTS, MOST_POINTS = 3, 1000
+"""Elevations: three give a curve a + b cos + c sin."""
+FREQUENCY = "loaded_frequency_1"
+CLEARANCE, ZERO = ".clearance.", ".zero"
+"""Parts of the paths of errors that are free motions of a joint, and of those that are lengths of a drive."""
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """Parts of a leg between which the load reverses at an elevation.
+
+    Attributes:
+        elevation: rad.
+        leg: its name.
+        parts: joints and drives of the leg that reverse there.
+        jump: motion of the tool point while they cross their clearances and backlash, m; None where the file gives
+            none of these.
+        turn: rotation of the platform meanwhile, rad; None likewise.
+    """
+
+    elevation: float
+    leg: str
+    parts: tuple[str, ...]
+    jump: float | None
+    turn: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Elevation(Immutable):
+    """A machine at rest under its loads over the elevation, base axes, SI.
+
+    Attributes:
+        state: of the machine as it stands upright.
+        status: worst `Status` of all elevations.
+        message: what is the case at elevations without a result; empty where all have one.
+        elevations: rad [n].
+        statuses: `Status` codes [n].
+        components: names of the components of the displacement.
+        displacement: rotation vector and displacement of the tool point [n x components]; NaN without rest.
+        frequency: first natural frequency about the state at rest, Hz [n].
+        actuators: names of what is driven.
+        turning: whether each is rotary: N·m, otherwise N.
+        loads: what each actuator carries, positive where it is pulled open [n x actuators].
+        limit_use: the greatest share that any actuator uses of its limit [n]; NaN where the file limits none.
+        reversals: of loads of drives and joints, by elevation.
+        budget: the error by tolerances at each elevation; None where the file has no tolerances.
+        corrections: of the actuators, with their law over `load.gravity_angle`.
+        requirements: verdicts on the requirements of the file, each at the elevation that is worst for it.
+    """
+
+    state: MachineState
+    status: Status
+    message: str
+    elevations: Array
+    statuses: Integers
+    components: tuple[str, ...]
+    displacement: Array
+    frequency: Array
+    actuators: tuple[str, ...]
+    turning: tuple[bool, ...]
+    loads: Array
+    limit_use: Array
+    reversals: tuple[Reversal, ...]
+    budget: Budget | None
+    corrections: CorrectionTable
+    requirements: tuple[Verdict, ...] = ()
+
+    @property
+    def machine(self) -> Machine:
+        """The machine as it stands upright, under its loads."""
+        return self.state.machine
+
+    @property
+    def sag(self) -> Array:
+        """Displacement of the tool point by the loads, m [n]."""
+        return np.asarray(np.linalg.norm(self.displacement[:, ~self._rotations], axis=1))
+
+    @property
+    def rotation(self) -> Array:
+        """Rotation of the platform by the loads, rad [n]."""
+        return np.asarray(np.linalg.norm(self.displacement[:, self._rotations], axis=1))
+
+    @property
+    def error(self) -> Array:
+        """Error of the tool point that 95 % of all machines keep within, m [n]; NaN without tolerances."""
+        none = np.full(len(self.elevations), np.nan)
+        return none if self.budget is None else self.budget.size("usual", "position")
+
+    @property
+    def _rotations(self) -> Mask:
+        return np.array([name.startswith("r") for name in self.components])
+
+
+@checked
+def elevation(
+    machine: Machine | MachineState,
+    over: str = USUAL_RANGE,
+    about: Sequence[float] = (),
+    tolerance: float | str | None = None,
+    progress: Progress = silent,
+) -> Elevation:
+    """Compute what gravity does to a machine over its elevation, and what takes it away.
+
+    The machine is at rest under all its loads, whether its file says `state = "loaded"` or not.
+
+    Args:
+        machine: with its loads, gravity and masses among them, or its state, as `state_of` returns it.
+        over: from, to and number of elevations, "0 deg:90 deg:7"; gravity acts as the file says at 90 deg.
+        about: axis of the base about which gravity turns in it as the elevation falls; `load.gravity_axis` if empty.
+        tolerance: for the error of the law of the corrections at the tool, m or text with a unit; a thousandth of the
+            error without corrections if None.
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: no gravity or nothing that weighs, a bad range or axis, or what `correction_table` and `budget`
+            refuse.
+    """
+    given = state_of(machine).machine
+    _check_gravity(given)
+    turned = {"load.gravity_axis": list(about)} if len(about) else {}
+    upright = replace(changed(given, {**turned, GRAVITY_ANGLE: 0.0}), loaded=True)
+    elevations = _elevations(over)
+    count, angles = len(elevations), UPRIGHT - elevations
+    steps = 4 + (count if upright.requirements else 0)
+    states = states_at(upright, {GRAVITY_ANGLE: angles}, count)
+    numbers, statuses = loaded_numbers(states)
+    progress(1, steps)
+    frequency = evaluate(upright, PointTable({GRAVITY_ANGLE: angles}), [FREQUENCY]).values[FREQUENCY]
+    progress(2, steps)
+    span = f"{GRAVITY_ANGLE}={float(angles[0])!r}:{float(angles[-1])!r}:{count}"
+    corrections = correction_table(upright, span, tolerance)
+    progress(3, steps)
+    tolerated = budget(upright, ranges=[span]) if upright.tolerances else None
+    progress(4, steps)
+    moved = numbers["displacement"][:, list(upright.family.components)]
+    turns = np.array([name.startswith("r") for name in upright.family.component_names])
+    for rows in (turns, ~turns):
+        most = np.nanmax(np.abs(moved[:, rows]), initial=0.0)
+        moved[:, rows] = np.where(np.abs(moved[:, rows]) < ROUND_OFF_OF_ENTRY * most, 0.0, moved[:, rows])
+    driven = states.mechanism.driven
+    loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
+    settled = np.isfinite(loads).all(axis=1)
+    return Elevation(
+        state_of(upright),
+        Status(int(statuses[np.argmax(statuses != Status.OK)])),
+        _message(statuses, elevations, upright),
+        elevations,
+        statuses,
+        upright.family.component_names,
+        np.where(settled[:, None], moved, np.nan),
+        np.where(settled, frequency, np.nan),
+        tuple(states.mechanism.actuators),
+        tuple(spring.joint.point is not None for spring in driven),
+        loads,
+        _limit_use(states, loads),
+        _reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
+        tolerated,
+        corrections,
+        _requirements(upright, angles, elevations, lambda done: progress(4 + done, steps)),
+    )
+
+
+def _check_gravity(machine: Machine) -> None:
+    load = machine.tables["load"]
+    if not any(load.gravity):
+        raise InputError(
+            f'{machine.name} has no gravity that could turn; write gravity = [0, 0, "-9.81 m/s**2"] under [load], '
+            "as it acts at an elevation of 90 deg."
+        )
+
+
+def _elevations(over: str) -> Array:
+    span = parse_range(f"elevation={over}")
+    if span.logarithmic or not LEAST_POINTS <= span.count <= MOST_POINTS:
+        raise InputError(
+            f"over is {shorten(over)}; give from, to and {LEAST_POINTS} to {MOST_POINTS:,} elevations, as "
+            f'"{USUAL_RANGE}".'
+        )
+    values = span.values(Quantity("angle", ""))
+    if values[0] == values[-1]:
+        raise InputError(f'over is {shorten(over)}, a single elevation; give two ends, as "{USUAL_RANGE}".')
+    return values
+
+
+def _message(statuses: Integers, elevations: Array, machine: Machine) -> str:
+    """Say at which elevations there is no result, or a limit is passed, and why."""
+    sentences = []
+    for code in sorted({*statuses.tolist()} - {int(Status.OK)}):
+        where = ", ".join(machine.display.show(float(e), "rad") for e in elevations[statuses == code])
+        sentences.append(f"At {where}: {Status(code).sentence}")
+    return " ".join(sentences)
+
+
+def _limit_use(states: MachineState, loads: Array) -> Array:
+    """The greatest share that any actuator uses of its limit at each elevation; NaN where nothing is limited [n]."""
+    pairs = [(spring, np.abs(load)) for spring, load in zip(states.mechanism.driven, loads.T, strict=True)]
+    checks = load_checks(states.machine, states.configuration, pairs)
+    if not checks:
+        return np.full(len(loads), np.nan)
+    return np.max([np.asarray(check.measure / check.bound, dtype=float) for check in checks], axis=0)
+
+
+def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reversal, ...]:
+    """Find where the loads of drives and joints pass zero while gravity turns."""
+    rates, count = model.rates(), len(angles)
+    if not np.isfinite(rates).all():
+        return ()
+    reactions = np.einsum("nie,ni->ne", rates, model.drawn.load)
+    most = np.abs(model.drawn.load[:, 3:]).sum() + np.abs(model.drawn.load[:, :3]).sum() / model.length
+    waves = np.stack([np.ones(count), np.cos(angles), np.sin(angles)], axis=1)
+    gaps = _gaps(model, machine)
+    passed: dict[tuple[str, float], list[tuple[str, Array | None]]] = {}
+    for (leg, part), places in _free_motions(model).items():
+        curve = np.linalg.lstsq(waves, reactions[:, places], rcond=None)[0]
+        pressed = np.flatnonzero(np.linalg.norm(reactions[:, places], axis=1) > NO_REACTION * most)
+        for before, after in pairwise(pressed.tolist()):
+            ends = reactions[before, places], reactions[after, places]
+            if ends[0] @ ends[1] >= 0.0:
+                continue
+            way = (ends[0] - ends[1]) / np.linalg.norm(ends[0] - ends[1])
+            angle = _zero(curve @ way, angles[before], angles[after])
+            gap = gaps.get((leg, part))
+            moved = None if gap is None else rates[0][:, places] @ (way * gap)
+            passed.setdefault((leg, round(UPRIGHT - angle, 9)), []).append((part, moved))
+    answers = [_reversal(leg, height, parts) for (leg, height), parts in passed.items()]
+    return tuple(sorted(answers, key=lambda each: each.elevation))
+
+
+def _free_motions(model: ErrorModel) -> dict[tuple[str, str], list[int]]:
+    """Places of the errors along which each joint and each drive could move, by leg and name."""
+    motions: dict[tuple[str, str], list[int]] = {}
+    for place, error in enumerate(model.errors):
+        name = error.path.removeprefix(f"legs.{error.leg}.")
+        if error.group == "clearances":
+            motions.setdefault((error.leg, name.rpartition(CLEARANCE)[0]), []).append(place)
+        elif error.group == "zeros":
+            motions[error.leg, name.removesuffix(ZERO)] = [place]
+    return motions
+
+
+def _gaps(model: ErrorModel, machine: Machine) -> dict[tuple[str, str], float]:
+    """From one end to the other of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
+    gaps: dict[tuple[str, str], float] = {}
+    for error in model.errors:
+        if error.group == "zeros":
+            lost = float(lost_motion(machine, slides=error.kind == "length"))
+            if lost:
+                gaps[error.leg, error.path.removeprefix(f"legs.{error.leg}.").removesuffix(ZERO)] = lost
+    if machine.tolerances:
+        for part in toleranced_parts(machine, model.errors, machine.tolerances):
+            if part.free:
+                name = part.path.removeprefix(f"legs.{part.leg}.").removesuffix(CLEARANCE.rstrip("."))
+                gaps[part.leg, name] = 2.0 * part.limit
+    return gaps
+
+
+def _zero(curve: Array, start: float, end: float) -> float:
+    """The angle between two others at which a + b cos + c sin is zero."""
+    mean, cosine, sine = curve.tolist()
+    middle = math.atan2(sine, cosine)
+    reach = math.acos(min(1.0, max(-1.0, -mean / math.hypot(cosine, sine))))
+    between, half = 0.5 * (start + end), 0.5 * abs(end - start)
+    roots = [middle + side * reach for side in (1.0, -1.0)]
+    nearest = [root + math.tau * round((between - root) / math.tau) for root in roots]
+    return min(max(min(nearest, key=lambda root: abs(root - between)), between - half), between + half)
+
+
+def _reversal(leg: str, height: float, parts: Sequence[tuple[str, Array | None]]) -> Reversal:
+    motions = [moved for _, moved in parts if moved is not None]
+    twist = np.sum(motions, axis=0) if motions else None
+    jump, turn = (None, None) if twist is None else (
+        float(np.linalg.norm(twist[3:])), float(np.linalg.norm(twist[:3]))
+    )  # fmt: skip
+    return Reversal(height, leg, tuple(name for name, _ in parts), jump, turn)
+
+
+def _requirements(
+    upright: Machine, angles: Array, elevations: Array, done: Callable[[int], None]
+) -> tuple[Verdict, ...]:
+    """The requirements at every elevation: of each condition the verdict at its worst one, which its place names."""
+    if not upright.requirements:
+        return ()
+    worst: Mapping[int, tuple[float, Verdict]] = {}
+    for number, (angle, height) in enumerate(zip(angles.tolist(), elevations.tolist(), strict=True), 1):
+        for place, verdict in enumerate(requirements(with_values(upright, {GRAVITY_ANGLE: angle}))):
+            where = f"elevation {upright.display.show(height, 'rad')}"
+            there = f"{verdict.place}, {where}" if verdict.place else where
+            rank = -math.inf if verdict.margin is None and not verdict.met else verdict.margin or 0.0
+            if place not in worst or rank < worst[place][0]:
+                worst = {**worst, place: (rank, replace(verdict, place=there))}
+        done(number)
+    return tuple(verdict for _, verdict in (worst[place] for place in sorted(worst)))

@@ -1,0 +1,328 @@
+"""A tilting machine over its elevation: the question, the description of its answer, and its picture.
+
+Nothing is computed here.
+"""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.arrays import Array
+from kinetostat.display import DASH, number
+from kinetostat.kinematics.status import Status
+from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
+from kinetostat.studies.plain_data import columns_csv
+from kinetostat.studies.setting import pose_of, setting_of
+from kinetostat.views.command import correction_lines, correction_tables, law_fields
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    Axis,
+    Description,
+    Drawing,
+    Field,
+    Lines,
+    Option,
+    Question,
+    Records,
+)
+from kinetostat.views.requirement_lines import headline, requirement_lines
+from kinetostat.views.tables import numeric_table, text_table
+
+
+def _lines(answer: Elevation) -> Lines:
+    display = answer.machine.display
+    show, small = display.show, display.show_deflection
+    ends = [show(float(answer.elevations[i]), "rad") for i in (0, -1)]
+    yield "Pose", f"{pose_of(answer.machine)}, at {len(answer.elevations)} elevations from {ends[0]} to {ends[1]}."
+    if answer.message:
+        yield "Elevation", answer.message
+    if not np.isfinite(answer.sag).any():
+        return
+    sag, turn = (_at_most(answer, values, unit) for values, unit in ((answer.sag, "m"), (answer.rotation, "rad")))
+    yield "Sag", f"The loads move the tool point by at most {sag} and turn the platform by at most {turn}."
+    if np.isfinite(answer.frequency).any():
+        place = int(np.nanargmin(answer.frequency))
+        least = f"{show(float(answer.frequency[place]), 'Hz')} {_elevation_text(answer, place)}"
+        yield "Frequency", f"The first natural frequency is at least {least}."
+    yield "Actuators", _forces_sentence(answer)
+    yield "Reversals", _reversals_sentence(answer)
+    if answer.budget is not None:
+        place = int(np.nanargmax(answer.error))
+        size = f"{small(float(answer.error[place]), 'm')} {_elevation_text(answer, place)}"
+        yield "As built", f"95 % of all machines are off by at most {size}; kinetostat budget says by what."
+    yield from correction_lines(answer.corrections)
+    if answer.corrections.before:
+        yield "", "gravity_angle is 90 deg - elevation."
+    if answer.requirements:
+        verdicts = " ".join(sentence for _, _, sentence in requirement_lines(answer.requirements, display))
+        yield "Required", f"{headline(answer.requirements)} {verdicts}"
+
+
+def _elevation_text(answer: Elevation, place: int) -> str:
+    return f"at {answer.machine.display.show(float(answer.elevations[place]), 'rad')}"
+
+
+def _at_most(answer: Elevation, sizes: Array, unit: str) -> str:
+    place = int(np.nanargmax(sizes))
+    return f"{answer.machine.display.show_deflection(float(sizes[place]), unit)} ({_elevation_text(answer, place)})"
+
+
+def _forces_sentence(answer: Elevation) -> str:
+    """The greatest load of each kind, and how much of the limits is used."""
+    parts = []
+    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
+        columns = [i for i, turning in enumerate(answer.turning) if turning is turns]
+        if columns:
+            sizes = np.nan_to_num(np.abs(answer.loads[:, columns]))
+            place, column = np.unravel_index(int(sizes.argmax()), sizes.shape)
+            size = answer.machine.display.show(float(sizes[place, column]), unit)
+            name = answer.actuators[columns[int(column)]]
+            parts.append(f"the greatest {what} is {size}, of {name} {_elevation_text(answer, int(place))}")
+    text = f"{'; '.join(parts)}."
+    text = f"{text[0].upper()}{text[1:]}"
+    if not np.isfinite(answer.limit_use).any():
+        return f"{text} The file limits no load of actuators."
+    use = float(np.nanmax(answer.limit_use))
+    passed = " of its limit, which it passes" if use > 1.0 else " of its limit at most"
+    return f"{text} An actuator uses {number(100.0 * use, digits=3)} %{passed}."
+
+
+def _reversals_sentence(answer: Elevation) -> str:
+    if not answer.reversals:
+        return "No load of a drive or a joint reverses, so that no clearance is crossed."
+    show, small = answer.machine.display.show, answer.machine.display.show_deflection
+    where = ", ".join(f"{each.leg} at {show(each.elevation, 'rad', digits=3)}" for each in answer.reversals)
+    jumps = [each.jump for each in answer.reversals if each.jump is not None]
+    text = f"Loads reverse in {where}."
+    if jumps:
+        return f"{text} The tool point jumps by up to {small(max(jumps), 'm')} as clearances are crossed."
+    return f"{text} Clearances in [tolerances], or backlash in [drives], say how far the tool point jumps there."
+
+
+def _tables(answer: Elevation, full: bool) -> Iterator[FittedTable]:
+    if not np.isfinite(answer.sag).any():
+        return
+    yield _elevation_table(answer, full)
+    yield _loads_table(answer)
+    if answer.reversals:
+        yield _reversals_table(answer)
+    yield from correction_tables(answer.corrections, full)
+
+
+def _columns(answer: Elevation, full: bool = False) -> dict[str, tuple[str, Array]]:
+    """Columns of the main table: head, unit and values."""
+    columns = {"sag": ("m", answer.sag), "rotation": ("rad", answer.rotation)}
+    if full:
+        units = ("rad" if name.startswith("r") else "m" for name in answer.components)
+        columns |= {n: (u, v) for n, u, v in zip(answer.components, units, answer.displacement.T, strict=True)}
+    columns["first frequency"] = ("Hz", answer.frequency)
+    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
+        chosen = [turning is turns for turning in answer.turning]
+        if any(chosen):
+            columns[f"greatest {what}"] = (unit, np.abs(answer.loads[:, chosen]).max(axis=1))
+    if answer.budget is not None:
+        columns["error, 95 %"] = ("m", answer.error)
+    return columns
+
+
+def _elevation_table(answer: Elevation, full: bool) -> FittedTable:
+    display, columns = answer.machine.display, _columns(answer, full)
+    scales = {unit: display.fitting(unit, np.concatenate([v for u, v in columns.values() if u == unit]))
+              for unit, _ in columns.values()}  # fmt: skip
+    heads = [f"{name}\n{scales[unit].head}" for name, (unit, _) in columns.items()]
+    table = numeric_table("Over elevation", f"elevation\n{display.scale('rad').head}", heads)
+    for i, height in enumerate(answer.elevations):
+        cells = (float(values[i]) * scales[unit].factor for unit, values in columns.values())
+        table.add_row(display.number(float(height), "rad"), *(DASH if math.isnan(c) else number(c) for c in cells))
+    return table
+
+
+def _loads_table(answer: Elevation) -> FittedTable:
+    display = answer.machine.display
+    scales = [display.scale("N·m" if turning else "N") for turning in answer.turning]
+    heads = [f"{name}\n{scale.head}" for name, scale in zip(answer.actuators, scales, strict=True)]
+    title = "Loads of actuators, positive where they are pulled"
+    table = numeric_table(title, f"elevation\n{display.scale('rad').head}", heads)
+    for height, row in zip(answer.elevations, answer.loads, strict=True):
+        cells = (display.number(float(load), "N·m" if t else "N") if math.isfinite(load) else DASH
+                 for load, t in zip(row, answer.turning, strict=True))  # fmt: skip
+        table.add_row(display.number(float(height), "rad"), *cells)
+    return table
+
+
+def _reversals_table(answer: Elevation) -> FittedTable:
+    display = answer.machine.display
+    table = text_table("Loads that reverse", "elevation", "leg", "between the parts of")
+    for head in ("tool point jumps", "platform turns"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for each in answer.reversals:
+        sizes = ((each.jump, "m"), (each.turn, "rad"))
+        shown = (DASH if size is None else display.show_deflection(size, unit) for size, unit in sizes)
+        table.add_row(display.show(each.elevation, "rad", digits=3), each.leg, ", ".join(each.parts), *shown)
+    return table
+
+
+def elevation_csv(answer: Elevation) -> str:
+    """Write all numbers over the elevation as CSV in SI: a row for each, with loads and corrections of actuators."""
+    columns: dict[str, Any] = {"elevation [rad]": answer.elevations}
+    columns["status"] = [Status(code).word for code in answer.statuses.tolist()]
+    columns |= {f"{name} [{unit}]": values for name, (unit, values) in _columns(answer, full=True).items()}
+    for name, turning, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True):
+        columns[f"{name} load [{'N m' if turning else 'N'}]"] = values
+    commands = answer.corrections.command
+    for name, unit, values in zip(commands.actuators, commands.units, commands.corrections.T, strict=True):
+        columns[f"{name} correction [{unit}]"] = values
+    return columns_csv(columns)
+
+
+def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
+    """The drawing over the elevation; none where the machine comes to no rest."""
+    if not np.isfinite(answer.sag).any():
+        return {}
+    caption = "Sag, first frequency, loads and corrections of the actuators over the elevation; dotted: loads reverse."
+    return {"elevation": Drawing(caption, partial(elevation_figure, answer))}
+
+
+def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Figure:
+    """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each.
+
+    Args:
+        answer: of a machine that comes to rest.
+        title: over the figure, with braces for the name of the machine.
+    """
+    display, commands = answer.machine.display, answer.corrections.command
+    parts = [(name, "rad" if name.startswith("r") else "m") for name in answer.components]
+    units = zip(commands.actuators, commands.units, commands.corrections.T, strict=True)
+    corrections = [(name, unit, values) for name, unit, values in units]
+    moved = [(name, unit, values) for (name, unit), values in zip(parts, answer.displacement.T, strict=True)]
+    loads = [(name, "N·m" if t else "N", values)
+             for name, t, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True)]  # fmt: skip
+    panels = [
+        ("displacement", "m", [row for row in moved if row[1] == "m"]),
+        ("rotation", "rad", [row for row in moved if row[1] == "rad"]),
+        ("first frequency", "Hz", [("", "Hz", answer.frequency)]),
+        ("force, pulling", "N", [row for row in loads if row[1] == "N"]),
+        ("moment", "N·m", [row for row in loads if row[1] == "N·m"]),
+        ("error, 95 %", "m", [] if answer.budget is None else [("", "m", answer.error)]),
+        *(("correction", unit, [row for row in corrections if row[1] == unit]) for unit in ("m", "rad")),
+    ]  # fmt: skip
+    panels = [panel for panel in panels if any(np.isfinite(values).any() for _, _, values in panel[2])]
+    rows = -(-len(panels) // 2)
+    heights = display.scale("rad")
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.0, 0.7 + 2.0 * rows), layout="constrained")
+        axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
+        for panel, (what, unit, curves) in zip(axes, panels, strict=False):
+            small = what.startswith(("displacement", "rotation", "error", "correction"))
+            scale = (display.fitting if small else lambda u, _: display.scale(u))(
+                unit, np.concatenate([values for _, _, values in curves])
+            )
+            for place, (name, _, values) in enumerate(curves):
+                panel.plot(answer.elevations * heights.factor, values * scale.factor, label=name, **look_of(place))
+            _finish(panel, answer, scale.label(what), heights.factor, reverses=unit in ("N", "N·m"))
+            if len(curves) == 1 and not curves[0][0]:
+                panel.set_ylim(0.0, 1.15 * float(np.nanmax(curves[0][2])) * scale.factor)
+        for unused in list(figure.axes)[len(panels) :]:
+            unused.set_visible(False)
+        for panel in list(figure.axes)[max(0, len(panels) - 2) : len(panels)]:
+            panel.set_xlabel(heights.label("elevation"))
+            panel.tick_params(labelbottom=True)
+        set_title(figure, title.format(answer.machine.name))
+        note_setting(figure, setting_of(answer.machine))
+        fix_layout(figure)
+    return figure
+
+
+def _finish(panel: Axes, answer: Elevation, label: str, factor: float, reverses: bool) -> None:
+    panel.set_ylabel(label)
+    panel.margins(x=0.0)
+    if reverses:
+        panel.axhline(0.0, color="#444444", linewidth=0.8)
+        for each in answer.reversals:
+            panel.axvline(each.elevation * factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
+    if any(line.get_label() and not str(line.get_label()).startswith("_") for line in panel.get_lines()):
+        panel.legend(ncols=2, fontsize=6.5)
+
+
+ELEVATION = Description(
+    title="Over elevation",
+    fields=(
+        *FIRST_FIELDS,
+        Field("components"),
+        Field("elevation", "elevations", "rad", forms=("json",)),
+        Field("statuses", lambda answer: [Status(code).word for code in answer.statuses.tolist()], forms=("json",)),
+        Field("displacement", unit="rad, m", long_name="rotation vector and displacement of the tool point",
+              axes=("elevation", "component")),
+        Field("sag", unit="m", long_name="displacement of the tool point by the loads", axes=("elevation",)),
+        Field("rotation", unit="rad", long_name="rotation of the platform by the loads", axes=("elevation",)),
+        Field("frequency", unit="Hz", long_name="first natural frequency", axes=("elevation",)),
+        Field("actuators"),
+        Field("load", "loads", "N, N m", "load of each actuator, positive where it is pulled",
+              axes=("elevation", "actuator")),
+        Field("limit_use", unit="1", long_name="greatest share of a limit of the loads", axes=("elevation",)),
+        Field("error", unit="m", long_name="error of the tool point that 95 % of all machines keep within",
+              axes=("elevation",)),
+        Records("reversals", "reversal", (
+            Field("elevation", unit="rad", column="at_elevation"),
+            Field("leg"),
+            Field("parts", lambda each: ", ".join(each.parts)),
+            Field("jump", unit="m"),
+            Field("turn", unit="rad"),
+        ), forms=("json",)),
+        Field("correction", lambda answer: answer.corrections.command.corrections, "m, rad",
+              "what is added to each actuator", axes=("elevation", "driven")),
+        Field("law", lambda answer: law_fields(answer.corrections), forms=("json",)),
+        Field("requirements", lambda answer: answer.requirements or None, optional=True, forms=("json",)),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures=elevation_figures,
+    axes=(
+        Axis("elevation", "elevations", "rad", "elevation"),
+        Axis("component", "components"),
+        Axis("actuator", "actuators"),
+        Axis("driven", "corrections.command.actuators"),
+    ),
+    makers={"csv": elevation_csv},
+    state=lambda answer: f"over elevation: {answer.status.word}",
+    answered=lambda answer: bool(np.isfinite(answer.sag).any()),
+    kept=lambda answer: answer.status is Status.OK and all(verdict.met for verdict in answer.requirements),
+    files={"elevation.json": "json", "elevation.csv": elevation_csv, "elevation.nc": "nc"},
+)  # fmt: skip
+ELEVATION_QUESTION = Question(
+    example='kinetostat elevation telescope.toml --over "20 deg:90 deg:8" --about 1,0,0 -o elevation',
+    answer=elevation,
+    options=(
+        Option(
+            "over",
+            "text",
+            f"from, to and number of elevations; at 90 deg gravity acts as the file says (default: {USUAL_RANGE})",
+            metavar="FROM:TO:COUNT",
+            default=USUAL_RANGE,
+        ),
+        Option(
+            "about",
+            "direction",
+            "axis of the base about which gravity turns in it as the elevation falls (default: load.gravity_axis)",
+            default=(),
+        ),
+        Option(
+            "tolerance",
+            "quantity",
+            'error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the '
+            "error without corrections)",
+            metavar="LENGTH",
+        ),
+    ),
+    output="elevation.json, elevation.csv, elevation.nc and the figure",
+    reports_progress=True,
+    full="also show the components of the displacement",
+)
