@@ -1,6 +1,6 @@
 """Symmetric matrices: K and C by their 21 upper entries, and the eigenvalues of small ones, without branches.
 
-Factorisations are in `solve`. K and C are in the axes and at the point of the screws whose dyads add up to them.
+Factorisations are in `solve`. K and C refer to the axes and the point of the screws whose dyads add up to them.
 
 Source: theory (10); for the eigenvalue, Jacobi's rotations in cyclic order, Golub and Van Loan, Matrix Computations,
 4th ed., section 8.5. The closed trigonometric form is shorter, but loses half of its digits where two eigenvalues are
@@ -56,9 +56,9 @@ class Symmetric6:
 
 
 SWEEPS = 4
-"""Sweeps of three rotations each. Each sweep cubes the entries off the diagonal, so that four leave only round-off."""
+"""Sweeps of a 3x3 matrix. Each sweep cubes the entries off the diagonal, so that four leave only round-off."""
 SWEEPS_OF_LARGER = 7
-"""Sweeps of all rotations of larger matrices, which need a few more before they converge as fast."""
+"""Sweeps of larger matrices, which need a few more before they converge as fast."""
 
 
 def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:
@@ -73,14 +73,14 @@ def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:
 def eigenvalues(rows: Sequence[Sequence[Scalar]], sloped: bool = False) -> list[Scalar]:
     """Return the eigenvalues of a symmetric matrix [n x n], in no order.
 
-    Accurate to some units of round-off of the greatest, also where eigenvalues are equal. NaN where an entry is
+    They are accurate to some units of round-off of the greatest, also if eigenvalues are equal, and NaN if an entry is
     infinite.
 
     Args:
-        rows: of the matrix.
-        sloped: whether derivatives will be taken where eigenvalues may be equal. Each is then v^T A v with its
-            eigenvector v kept: its derivative is v^T dA v, so that the mean of equal ones has the derivative that it
-            should have. That of the rotations themselves is lost in the round-off of their angles.
+        rows: the rows of the matrix.
+        sloped: whether derivatives will be taken where eigenvalues may be equal. Each eigenvalue is then computed as
+            v^T A v with its eigenvector v held constant: its derivative is v^T dA v, and the mean of equal ones has
+            the right derivative. The derivative of the rotations themselves is lost in the round-off of their angles.
     """
     size = len(rows)
     at = {(i, j): rows[i][j] for i in range(size) for j in range(i, size)}
@@ -94,11 +94,11 @@ def eigenvalues(rows: Sequence[Sequence[Scalar]], sloped: bool = False) -> list[
     if not sloped:
         return [at[i, i] for i in range(size)]
     vectors = [[steady(axis[k]) for axis in axes] for k in range(size)]
-    return [_form(rows, vector) for vector in vectors]
+    return [_rayleigh_quotient(rows, vector) for vector in vectors]
 
 
-def _form(rows: Sequence[Sequence[Scalar]], vector: Sequence[Scalar]) -> Scalar:
-    """v^T A v / v^T v; of A only the upper triangle is read."""
+def _rayleigh_quotient(rows: Sequence[Sequence[Scalar]], vector: Sequence[Scalar]) -> Scalar:
+    """The quotient v^T A v / v^T v; only the upper triangle of A is read."""
     size = range(len(rows))
     diagonal = total([rows[i][i] * (vector[i] * vector[i]) for i in size])
     beside = total([rows[i][j] * (vector[i] * vector[j]) for i in size for j in range(i + 1, len(rows))])
@@ -109,7 +109,7 @@ def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[
     """Turn rows and columns p and q so that their common entry vanishes, by the smaller of the two angles.
 
     Returns:
-        Its cosine and sine.
+        The cosine and the sine of the angle.
     """
     apart, coupling = at[q, q] - at[p, p], at[p, q]
     square = apart * apart + 4.0 * (coupling * coupling)

@@ -1,10 +1,10 @@
 """Descend to a state of rest where Newton's steps do not end: a trust region on the potential, with all legs closed.
 
 A cable that goes slack changes the stiffness at once, and Newton's steps then go back and forth, or out of reach. The
-potential itself has a continuous slope, because a slack spring has the energy 0 with the slope 0. So a step is taken
-only if it lowers the potential by a share of what a model foresees that knows which springs go slack or become taut on
-the way; else the next step is shorter. Such steps end where the slope is zero, from wherever they begin, unless the
-potential falls without end.
+potential itself has a continuous slope, because a slack spring has the energy 0 with the slope 0. A model of it knows
+which springs go slack or become taut within a step. A step is taken only if it lowers the potential by a good share of
+the fall that the model foresees; else the next step is shorter. Such steps end where the slope is zero, from wherever
+they begin, unless the potential falls without end.
 
 Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
@@ -30,15 +30,15 @@ from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 
 MOST_DESCENT_STEPS = 200
-"""Number of steps of a descent: nine in ten end within 30; a machine that falls has then fallen by 40 lengths."""
+"""Greatest number of steps: nine descents in ten need at most 30, and a machine that falls has fallen by 40 lengths."""
 LARGEST_RADIUS = 0.2
-"""Radius of the trust region at most, rad and in units of the machine's length."""
+"""Greatest radius of the trust region, rad and in units of the machine's length."""
 MOST_CLOSINGS = 6
-"""Corrections that close the legs after a step: where they need more, the step is too long."""
+"""Greatest number of corrections that close the legs after a step; a step that needs more is too long."""
 BISECTIONS = 50
-"""Number of halvings of the shift of the stiffness with which a step is as long as the radius."""
+"""Number of halvings in the search for the shift of the stiffness with which a step is as long as the radius."""
 MOST_SWITCHES = 8
-"""Number of switches of one-sided springs between carrying and slack within a step."""
+"""Greatest number of times that one-sided springs switch between carrying and slack within a step."""
 LEAST_SHARE, GOOD_SHARE = 0.1, 0.75
 """Share of the foreseen fall of the potential from which a step is taken, and from which the radius may grow."""
 
@@ -51,7 +51,7 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         start: the state to begin with; its legs need not be closed.
 
     Returns:
-        The states that were reached; Newton's method from there tells whether they are at rest.
+        The states that were reached; Newton's method, started there, decides whether they are states of rest.
     """
     state, closed = _closed_state(mechanism, start)
     radius = np.full(len(mechanism.length), LARGEST_RADIUS)
@@ -74,7 +74,7 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
 
 
 def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
-    """Close the legs by small motions, and say where that was done [n]."""
+    """The state with its legs closed by small motions, and whether they were closed [n]."""
     count = len(mechanism.length)
 
     def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
@@ -97,13 +97,13 @@ def _closing_steps(equations: Balance) -> Array:
 
 @dataclass(frozen=True)
 class _Step:
-    """A step that a model of the potential foresees at closed states.
+    """A step from states with closed legs to a low point of the model of the potential.
 
     Attributes:
-        equations: there, with wrenches that balance all but the admissible motions.
+        equations: the equations at these states, with wrenches that balance everything but the admissible motions.
         unknowns: the step of the unknowns [n x unknowns].
         size: size of the admissible motion; NaN where it is not known [n].
-        fall: fall of the potential as the model foresees it [n].
+        fall: fall of the potential that the model foresees [n].
     """
 
     equations: Balance
@@ -113,7 +113,7 @@ class _Step:
 
 
 def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
-    """The step within a radius [n] to a low value of the model at closed states."""
+    """The step within a radius [n] to the lowest point that the model has there."""
     equations = balance(mechanism, state)
     moving, carried = places_of(equations)
     unknowns = np.zeros_like(equations.left)
@@ -127,22 +127,24 @@ def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     for part in parts:
         model = _model(equations, part)
         step, fall[part.rows] = model.lowest_point(radius[part.rows])
-        known = np.linalg.norm(step, axis=1)
-        size[part.rows] = np.where(fall[part.rows] > 0.0, known, radius[part.rows])
+        # A step without a fall counts as long as the radius, which then becomes smaller.
+        size[part.rows] = np.where(fall[part.rows] > 0.0, np.linalg.norm(step, axis=1), radius[part.rows])
         unknowns[part.rows[:, None], moving] = (part.motions @ step[:, :, None])[:, :, 0]
     return _Step(equations, unknowns, size, fall)
 
 
 @dataclass(frozen=True)
 class _Model:
-    """The potential near closed states over the admissible motions y: -f y + y K y / 2 and the one-sided springs.
+    """The potential near closed states over the admissible motions y: -f y + y K y / 2, and one-sided springs.
+
+    A one-sided spring adds the square of its load over twice its stiffness while its load is positive, else nothing.
 
     Attributes:
-        stiffness: K, of everything but one-sided springs [n x m x m].
-        force: f, of everything but these springs [n x m].
-        lines: the stretching of each by a unit of each motion [n x springs x m].
-        loads: the loads that they would carry if they carried both ways, positive where they carry [n x springs].
-        springs: stiffness of them [n x springs].
+        stiffness: K without one-sided springs [n x m x m].
+        force: f without one-sided springs [n x m].
+        lines: elongation of each one-sided spring per unit of each motion [n x springs x m].
+        loads: the load of each, as if it carried both ways; it carries where that is positive [n x springs].
+        springs: the stiffness of each [n x springs].
     """
 
     stiffness: Array
@@ -152,7 +154,7 @@ class _Model:
     springs: Array
 
     def change(self, step: Array) -> Array:
-        """Rise of the model by a step [n x m], negative where it falls [n]."""
+        """Change of the potential by a step [n x m], negative if it falls [n]."""
         smooth = -(self.force * step).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj->n", step, self.stiffness, step)
         before, after = (np.maximum(loads, 0.0) for loads in (self.loads, self.loads_after(step)))
         return np.asarray(smooth + (0.5 * (after - before) * (after + before) / self.springs).sum(axis=1))
@@ -162,9 +164,9 @@ class _Model:
         return np.asarray(self.loads + self.springs * np.einsum("nsm,nm->ns", self.lines, step))
 
     def lowest_point(self, radius: Array) -> tuple[Array, Array]:
-        """The lowest point that was met within a radius [n]: the step there [n x m], and the fall to it [n].
+        """The lowest point found within a radius [n]: the step to it [n x m], and the fall of the potential [n].
 
-        Each point is the least value for springs that carry or not as at the point before.
+        Each point tried is the lowest one if the springs carry that carried at the point before.
         """
         carries = self.loads >= 0.0
         best, fall = np.zeros_like(self.force), np.zeros(len(radius))
@@ -182,7 +184,7 @@ class _Model:
 
 
 def _model(equations: Balance, part: Admissible) -> _Model:
-    """The model over the admissible motions of some poses."""
+    """The model of the potential at those poses whose admissible motions these are."""
     legs, starts = equations.mechanism.legs, starts_of(equations)
     elastic, geometric, _ = (matrix[part.rows] for matrix in tangent_matrices(equations))
     left = equations.left[part.rows][:, places_of(equations)[0]]
@@ -202,15 +204,15 @@ def _model(equations: Balance, part: Admissible) -> _Model:
 
 
 def least_within(stiffness: Array, force: Array, radius: Array) -> Array:
-    """Find the least value of -f y + y K y / 2 within a radius; return its place y [n x m].
+    """Find the y within a radius at which -f y + y K y / 2 is least [n x m].
 
-    That is (K + s) y = f with the least shift s that leaves no negative eigenvalue and no longer y. Where the force is
-    at right angles to a direction in which the potential falls to both sides, y does not choose one.
+    It solves (K + s) y = f with the least shift s >= 0 that leaves no negative eigenvalue and no y beyond the radius.
+    If the potential falls to both sides of a direction in which there is no force, y goes to neither side.
 
     Args:
-        stiffness: symmetric, of any sign [n x m x m].
-        force: [n x m].
-        radius: [n].
+        stiffness: K, symmetric, with eigenvalues of any sign [n x m x m].
+        force: f [n x m].
+        radius: greatest size of y [n].
 
     Source: J. Moré and D. Sorensen, "Computing a trust region step", SIAM J. Sci. Stat. Comput. 4, 1983.
     """
@@ -219,13 +221,13 @@ def least_within(stiffness: Array, force: Array, radius: Array) -> Array:
     lower = np.maximum(0.0, -values[:, 0])
     upper = lower + np.linalg.norm(parts, axis=1) / radius
 
-    def amounts(shift: Array) -> Array:
+    def solution(shift: Array) -> Array:
         return parts / np.maximum(values + shift[:, None], ZERO_PIVOT)
 
-    inside = np.linalg.norm(amounts(lower), axis=1) <= radius
+    inside = np.linalg.norm(solution(lower), axis=1) <= radius
     upper = np.where(inside, lower, upper)
     for _ in range(BISECTIONS):
         middle = 0.5 * (lower + upper)
-        short = np.linalg.norm(amounts(middle), axis=1) <= radius
+        short = np.linalg.norm(solution(middle), axis=1) <= radius
         lower, upper = np.where(short, lower, middle), np.where(short, middle, upper)
-    return np.einsum("nij,nj->ni", vectors, amounts(upper))
+    return np.einsum("nij,nj->ni", vectors, solution(upper))

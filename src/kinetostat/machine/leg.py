@@ -358,14 +358,14 @@ class Leg:
         if any(along):
             return tuple(1.0 if same else wrench.work(twist) for same, wrench in zip(along, wrenches, strict=True))
         if is_zero(spring.stiffness):
-            return tuple(felt(wrench, twist) for wrench in wrenches)
+            return tuple(work_on_free(wrench, twist) for wrench in wrenches)
         return tuple(wrench.work(twist) for wrench in wrenches)
 
 
-def felt(wrench: Wrench, twist: Twist) -> Scalar:
-    """The work of a wrench on the twist of a free spring, exactly 0 where it is only round-off.
+def work_on_free(wrench: Wrench, twist: Twist) -> Scalar:
+    """The work of a wrench on the twist of a free spring, exactly 0 if it is only round-off.
 
-    A free spring gives way to any load at all, so that round-off would move it without end. Both are at one point.
+    A free spring gives way to the least load, so that round-off would move it without end. Both are at one point.
     """
     turning = wrench.rotational.norm() * twist.rotational.norm()
     size = turning + wrench.translational.norm() * twist.translational.norm()

@@ -1,6 +1,6 @@
 """Tolerance classes of two standards by nominal size: grades IT1 to IT14 of ISO 286-1, classes of ISO 2768-1.
 
-Tables of numbers as the standards print them; what a machine file writes about them is read in `spec.tolerance_table`.
+The numbers are those that the standards print. `spec.tolerance_table` reads what a machine file says about tolerances.
 """
 
 import math

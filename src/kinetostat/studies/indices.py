@@ -1,4 +1,4 @@
-"""Indices of one pose, read off K and C: principal stiffnesses, centres, eigenscrews.
+"""Indices of one pose that follow from K and C: principal stiffnesses, condition number, centres, eigenscrews.
 
 The formulas are in `kinetostatics`.
 """
@@ -34,8 +34,8 @@ from kinetostat.spec.renamed import former_names
 
 Rows = Sequence[Sequence[float]]
 
-LONGEST = 1e100
-"""The greatest component of a direction: its square is still a number."""
+LARGEST_COMPONENT = 1e100
+"""Greatest component of a direction, whose square is still a finite number."""
 
 
 @former_names(principal="principal_compliances", condition="stiffness_condition")
@@ -44,12 +44,12 @@ class Indices(Immutable):
     """Indices of a pose, at T and in the axes of K and C.
 
     Attributes:
-        principal_compliances: by block, None where a direction is free.
-        free, guided: principal stiffnesses by block, the other block free or held (`kinetostatics.indices`).
-        stiffness_condition: condition number of K, rotations made comparable by the characteristic length;
-            infinite where rigid or free.
-        centres: of stiffness, compliance and elasticity, from T, m; None where there is none.
-        eigenscrews: of K, or of C where K is not finite; empty for a planar machine.
+        principal_compliances: principal compliances by block; None if a direction is free.
+        free, guided: principal stiffnesses by block, with the other block free or held (`kinetostatics.indices`).
+        stiffness_condition: condition number of K, with rotations times the characteristic length; infinite if the
+            machine is rigid or free in a direction.
+        centres: centres of stiffness, compliance and elasticity, from T, m; None for a centre that does not exist.
+        eigenscrews: eigenscrews of K, or of C if K is not finite; empty for a planar machine.
     """
 
     principal_compliances: dict[str, Principal] | None
@@ -65,9 +65,10 @@ class Along:
     """Stiffness along one direction, in the axes of K and C.
 
     Attributes:
-        direction: as given [3].
-        force, force_held: N/m, rotations free to follow, and held; None where there is no such direction or number.
-        moment, moment_held: N·m/rad, about it, the point free to follow, and held.
+        direction: the direction as it was given [3].
+        force, force_held: force per displacement along it, N/m, with rotations free and with rotations held; None if
+            the machine has no such direction, or the stiffness no finite value.
+        moment, moment_held: moment per angle about it, N·m/rad, with the tool point free and with it held.
     """
 
     direction: tuple[float, ...]
@@ -83,12 +84,12 @@ def stiffness_along(
     """Compute the stiffness of the tool point along and about a direction.
 
     Args:
-        direction: of any length, in the axes of K and C [3].
-        stiffness, compliance: None where not finite.
-        components: their rows, of rx ry rz x y z = 0 ... 5.
+        direction: a vector of any length, in the axes of K and C [3].
+        stiffness, compliance: K and C [n x n]; None for one that is not finite.
+        components: the components of their rows, from rx ry rz x y z = 0 ... 5.
 
     Raises:
-        InputError: if the direction has no length, or none in the plane of a planar machine.
+        InputError: the direction has no length, or none in the plane of a planar machine.
     """
     values: dict[str, float | None] = {}
     direction = three_numbers(direction)
@@ -111,11 +112,11 @@ def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
     """A direction as three finite floats of a size that can be squared.
 
     Raises:
-        InputError: it is something else.
+        InputError: it is not three finite numbers.
     """
     given = [] if isinstance(direction, str) or not isinstance(direction, Iterable) else list(direction)
     numbers = [float(c) for c in given if isinstance(c, Real) and not isinstance(c, bool)]
-    if len(given) != 3 or len(numbers) != 3 or not all(abs(c) <= LONGEST for c in numbers):
+    if len(given) != 3 or len(numbers) != 3 or not all(abs(c) <= LARGEST_COMPONENT for c in numbers):
         raise InputError(
             f"The direction is {shorten(direction)}; give three finite numbers, e.g. (0, 0, 1), on the command line "
             "--along 0,0,1; its length does not matter."
@@ -128,10 +129,10 @@ def unit_direction(direction: Sequence[float], name: str) -> tuple[float, ...]:
 
     Args:
         direction: three numbers of any size.
-        name: of the argument, for messages.
+        name: name of the argument, for messages.
 
     Raises:
-        InputError: it is something else, or zero.
+        InputError: it is not three finite numbers, or zero.
     """
     numbers = three_numbers(direction)
     size = math.hypot(*numbers)
@@ -144,9 +145,9 @@ def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, c
     """Compute every index that K [n x n] and C [n x n] give; either matrix may be missing.
 
     Args:
-        stiffness, compliance: None where not finite.
+        stiffness, compliance: K and C [n x n]; None for one that is not finite.
         length: characteristic length, m.
-        components: their rows, of rx ry rz x y z = 0 ... 5.
+        components: the components of their rows, from rx ry rz x y z = 0 ... 5.
     """
     screws: list[Eigenscrew] = []
     if components == SPATIAL:
@@ -166,7 +167,7 @@ def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, c
 
 
 def indices_json(indices: Indices | None) -> dict[str, Any]:
-    """The indices as the part of an analysis's plain data that they are."""
+    """The indices as plain data, for the JSON of an analysis."""
     if indices is None:
         return {"principal_compliances": None}
     compliances = (indices.principal_compliances or {}).items()

@@ -12,18 +12,18 @@ from kinetostat.machine.parameters import Parameter, entry_name
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
 
-DIGITS = 6
-"""Significant digits of a value that may be typed over."""
+FIELD_DIGITS = 6
+"""Significant digits of a value in a field that may be typed over."""
 MINUS = "\u2212"
-LEAST_GAIN = 1e-3
-"""Logarithm of the gain that fills a whole bar when no gain is greater, so that tiny ones look tiny."""
+LEAST_FULL_BAR = 1e-3
+"""Least logarithm of a gain that fills a whole bar, so that bars stay short if all gains are tiny."""
 
 
 def shown_value(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return a value as a field shows it, e.g. "220 mm", "30 deg", "20 N/µm"; `units.parse` reads it back."""
     if value == quantity.unset or math.isinf(value):
         return quantity.show(value)
-    return display.show(value, KINDS[quantity.kind].unit, digits=DIGITS)
+    return display.show(value, KINDS[quantity.kind].unit, digits=FIELD_DIGITS)
 
 
 def unit_shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
@@ -67,9 +67,9 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind
     """Return an HTML table whose first column names the rows.
 
     Args:
-        caption: read aloud by screen readers, not shown.
-        head: of the columns; no head is shown where all of it is empty.
-        rows: of texts.
+        caption: text for screen readers, not shown.
+        head: heads of the columns; no head is shown if all are empty.
+        rows: rows of texts.
         kind: further class for the style sheet.
     """
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
@@ -85,9 +85,9 @@ def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str
     """Return horizontal bars.
 
     Args:
-        caption: read aloud by screen readers, not shown.
-        rows: of each bar its name, its length as a share of the track (coloured if negative), and a text.
-        legs: legs by the name of a bar; the picture lights them with the bar under the pointer.
+        caption: text for screen readers, not shown.
+        rows: name of each bar, its length as a share of the track (in another colour if negative), and a text.
+        legs: name of a leg by the name of a bar; the picture lights the leg while the pointer is over the bar.
     """
     if not rows:
         return paragraph("There is nothing to show.")
@@ -103,9 +103,9 @@ def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str
 
 
 def gains(caption: str, rows: Sequence[tuple[str, float]]) -> str:
-    """Return bars of factors by which something has become better: logarithmic, losses in another colour."""
+    """Return bars of factors of improvement on a logarithmic scale, with losses in another colour."""
     sizes = {name: math.log(gain) if 0.0 < gain < math.inf else 0.0 for name, gain in rows}
-    longest = max([LEAST_GAIN, *map(abs, sizes.values())])
+    longest = max([LEAST_FULL_BAR, *map(abs, sizes.values())])
     return bars(caption, [(name, sizes[name] / longest, f"× {gain:.4g}") for name, gain in rows])
 
 

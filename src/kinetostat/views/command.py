@@ -18,7 +18,7 @@ from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.forward import precise
+from kinetostat.views.forward import coordinate_text
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 
@@ -39,7 +39,9 @@ def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
         table = numeric_table("Where each actuator must stand", "actuator", heads)
         rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
         for name, unit, commanded, unloaded in rows:
-            shown = (f"{precise(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded))
+            shown = (
+                f"{coordinate_text(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded)
+            )
             table.add_row(name, *shown, display.show_deflection(float(commanded - unloaded), unit))
         yield table
         return
@@ -48,7 +50,10 @@ def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Commands: where each actuator must stand", "pose", heads)
     for i, row in enumerate(answer.coordinates):
         known = bool(answer.settled[i])
-        cells = [precise(float(v), unit, display) if known else DASH for v, unit in zip(row, answer.units, strict=True)]
+        cells = [
+            coordinate_text(float(v), unit, display) if known else DASH
+            for v, unit in zip(row, answer.units, strict=True)
+        ]
         errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
         table.add_row(str(i + 1), *cells, *errors)
     yield table

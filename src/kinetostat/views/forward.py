@@ -12,24 +12,25 @@ from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
 
-DIGITS = 7
-"""Digits of coordinates: a micrometre of a metre, as a machine's controller takes them."""
-OTHER_LEGS = "* [pose] with these coordinates gives another assembly mode of the legs, that of the home pose."
+COORDINATE_DIGITS = 7
+"""Significant digits of a coordinate: enough for a micrometre of a metre, as controllers take them."""
+OTHER_LEG_MODE = "* [pose] with these coordinates gives another assembly mode of the legs, that of the home pose."
+"""Sentence below a table in which a mode is marked with an asterisk."""
 
 
 def actuator_coordinates(actuators: Sequence[Actuator], display: Display) -> FittedTable:
-    """Tabulate where actuators stand."""
+    """Tabulate the coordinates of actuators, and what they count from."""
     table = numeric_table("Actuators", "actuator", ["coordinate", "counts"])
     for actuator in actuators:
-        value = precise(float(actuator.coordinate), actuator.unit, display)
+        value = coordinate_text(float(actuator.coordinate), actuator.unit, display)
         table.add_row(actuator.name, f"{value} {display.scale(actuator.unit).unit}", actuator.meaning)
     return table
 
 
-def precise(value: float, unit: str, display: Display) -> str:
+def coordinate_text(value: float, unit: str, display: Display) -> str:
     """Return a coordinate in the unit that people read, in as many digits as a machine's controller takes."""
     scale = display.scale(unit)
-    return f"{round(value * scale.factor, 9) + 0.0:.{DIGITS}g}"
+    return f"{round(value * scale.factor, 9) + 0.0:.{COORDINATE_DIGITS}g}"
 
 
 def mode_table(machine: Machine, poses: Sequence[ForwardPose]) -> FittedTable:
@@ -39,7 +40,7 @@ def mode_table(machine: Machine, poses: Sequence[ForwardPose]) -> FittedTable:
     heads = [display.scale(unit).label(name) for name, unit in units.items()]
     table = numeric_table("Assembly modes", "mode", [*heads, "status", "residual"])
     for number, pose in enumerate(poses, 1):
-        values = [precise(pose.pose[name], unit, display) for name, unit in units.items()]
+        values = [coordinate_text(pose.pose[name], unit, display) for name, unit in units.items()]
         mark = f"{number} (present)" if pose.present else f"{number}{'' if pose.by_pose else ' *'}"
         table.add_row(mark, *values, pose.status.word.replace("_", " "), f"{pose.residual:.0e}")
     return table
@@ -48,7 +49,7 @@ def mode_table(machine: Machine, poses: Sequence[ForwardPose]) -> FittedTable:
 def _lines(answer: Forward) -> Lines:
     yield "Modes", answer.message
     if not all(pose.by_pose for pose in answer.poses):
-        yield "Legs", OTHER_LEGS
+        yield "Legs", OTHER_LEG_MODE
 
 
 def _tables(answer: Forward, _full: bool) -> Iterator[FittedTable]:
@@ -58,10 +59,10 @@ def _tables(answer: Forward, _full: bool) -> Iterator[FittedTable]:
 
 
 def coordinates_by_name(texts: Sequence[str]) -> Mapping[str, str]:
-    """Read coordinates of actuators, "leg 1=31 cm, leg 2=17 cm", by the name of the actuator or of its leg.
+    """Read coordinates of actuators such as "leg 1=31 cm, leg 2=17 cm", by the name of the actuator or of its leg.
 
     Raises:
-        InputError: an entry is not of that form, or a name is there twice.
+        InputError: an entry is not of that form, or a name is given twice.
     """
     given: dict[str, str] = {}
     for entry in (entry for text in texts for entry in text.split(",")):

@@ -22,12 +22,12 @@ from kinetostat.views.answers import kind_of
 from kinetostat.views.page import Markup, table
 from kinetostat.views.picture import machine_picture
 
-WIDTH = 200
-"""Characters of a line: a notebook scrolls."""
+LINE_LENGTH = 200
+"""Greatest number of characters in a line: a notebook scrolls."""
 PICTURE_PIXELS = (640, 480)
-"""Pixels of a picture, which is shown at half of that."""
-DOTS = 110
-"""Pixels per inch of a figure."""
+"""Pixels of a picture, which is shown at half this size to be sharp."""
+PIXELS_PER_INCH = 110
+"""Resolution of a figure."""
 CSS = """
 .kinetostat{font-size:13px;line-height:1.45;max-width:72em;display:flow-root}
 .kinetostat p{margin:.2em 0}
@@ -47,14 +47,15 @@ CSS = """
 .kinetostat img.figure{background:#fff;border-radius:6px;padding:4px}
 .kinetostat summary{cursor:pointer;opacity:.75;margin:.4em 0}
 """.strip()
-COLOURS = {"green": "good", "red": "bad", "yellow": "warn"}
+CLASSES = {"green": "good", "red": "bad", "yellow": "warn"}
+"""Classes of the style sheet by the terminal's colours."""
 
 
 def html_of(answer: object) -> str:
     """A machine or an answer as a piece of HTML: a picture where there is one, and the tables of the terminal."""
-    page = _Page()
-    kind_of(answer).tell(page, answer)
-    tables = "".join(page.parts)
+    console = _HtmlConsole()
+    kind_of(answer).tell(console, answer)
+    tables = "".join(console.parts)
     if isinstance(answer, Machine):
         about = f"<p><b>{escape(answer.name)}</b> <span class='dim'>{escape(answer.family.summary)}</span></p>"
         tables = f"{about}{_picture(answer)}<details><summary>all fields</summary>{tables}</details>"
@@ -68,17 +69,17 @@ def html_of(answer: object) -> str:
 def png_of(figure: Figure) -> bytes:
     """A figure as a PNG."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=DOTS, metadata={"Software": None})
+    figure.savefig(stream, format="png", dpi=PIXELS_PER_INCH, metadata={"Software": None})
     return stream.getvalue()
 
 
 def _figures(answer: object) -> str:
-    drawn = kind_of(answer).figures(answer)
-    return "".join(_image(png_of(draw()), name, "figure") for name, draw in drawn.items())
+    figures = kind_of(answer).figures(answer)
+    return "".join(_image(png_of(draw()), name, "figure") for name, draw in figures.items())
 
 
 def _picture(machine: Machine, kind: str = "machine") -> str:
-    """The machine from the corner, or why it cannot be drawn."""
+    """A picture of the machine, or a sentence that says why it cannot be drawn."""
     try:
         data = machine_picture(machine, PICTURE_PIXELS, transparent=True)
     except InputError as error:
@@ -86,61 +87,61 @@ def _picture(machine: Machine, kind: str = "machine") -> str:
     return _image(data, machine.name, kind, PICTURE_PIXELS[0] // 2)
 
 
-def _image(data: bytes, what: str, kind: str, width: int | None = None) -> str:
+def _image(data: bytes, text: str, kind: str, width: int | None = None) -> str:
     source = "data:image/png;base64," + base64.b64encode(data).decode()
-    wide = f' width="{width}"' if width else ""
-    return f'<img class="{kind}" alt="{escape(what)}"{wide} src="{source}">'
+    size = f' width="{width}"' if width else ""
+    return f'<img class="{kind}" alt="{escape(text)}"{size} src="{source}">'
 
 
-class _Page(Console):
-    """A console whose lines and tables become HTML."""
+class _HtmlConsole(Console):
+    """A console that keeps what is printed as parts of HTML: a paragraph for a line, and a table for a table."""
 
     def __init__(self) -> None:
-        super().__init__(file=io.StringIO(), width=WIDTH)
+        super().__init__(file=io.StringIO(), width=LINE_LENGTH)
         self.parts: list[str] = []
         self._line = ""
 
     def print(self, *objects: Any, end: str = "\n", style: str | Style | None = None, **_: Any) -> None:
-        """Take what would be printed."""
-        for thing in objects:
-            whole = thing.renderable if isinstance(thing, Padding) else thing
-            if isinstance(whole, Table):
-                self.parts.append(_table(whole))
+        """Keep what `Console` would print; texts without `end` are parts of the line that follows."""
+        for printed in objects:
+            content = printed.renderable if isinstance(printed, Padding) else printed
+            if isinstance(content, Table):
+                self.parts.append(_table(content))
             else:
-                self._line += _html_with_style(_text(whole), style)
+                self._line += _html_with_style(_text(content), style)
         if end == "\n" and self._line.strip():
             self.parts += [f"<p>{line}</p>" for line in self._line.split("\n") if line.strip()]
             self._line = ""
 
 
-def _text(thing: object) -> Text:
-    return thing if isinstance(thing, Text) else Text(str(thing))
+def _text(content: object) -> Text:
+    return content if isinstance(content, Text) else Text(str(content))
 
 
 def _html_with_style(text: Text, style: str | Style | None = None) -> str:
-    """Text with its styles as HTML, inside a style for all of it."""
-    plain = Console(file=io.StringIO(), width=WIDTH)
-    parts = [_within(escape(part.text), part.style) for part in text.render(plain)]
-    return _within("".join(parts), Style.parse(style) if isinstance(style, str) else style)
+    """A text as HTML: each part in its own style, and all of it in a further one."""
+    plain = Console(file=io.StringIO(), width=LINE_LENGTH)
+    parts = [_styled_html(escape(part.text), part.style) for part in text.render(plain)]
+    return _styled_html("".join(parts), Style.parse(style) if isinstance(style, str) else style)
 
 
-def _within(content: str, style: Style | None) -> str:
-    """HTML in a style: what of it a page shows."""
+def _styled_html(content: str, style: Style | None) -> str:
+    """HTML in the colour, weight and dimness of a style; its other properties are not shown."""
     if style is None or not content:
         return content
-    named = [COLOURS[style.color.name]] if style.color and style.color.name in COLOURS else []
-    classes = " ".join([*named, *(["dim"] if style.dim else [])])
+    colour = [CLASSES[style.color.name]] if style.color and style.color.name in CLASSES else []
+    classes = " ".join([*colour, *(["dim"] if style.dim else [])])
     content = f"<b>{content}</b>" if style.bold else content
     return f'<span class="{classes}">{content}</span>' if classes else content
 
 
-def _table(shown: Table) -> str:
-    """Return a table of the terminal as one of HTML."""
-    rows = zip(*(column.cells for column in shown.columns), strict=True)
-    cells = [[_markup(cell, row.style) for cell in content] for row, content in zip(shown.rows, rows, strict=True)]
-    caption = _markup(shown.title) if shown.title else ""
-    heads = [_markup(column.header) for column in shown.columns]
-    return table(caption, heads, cells, [column.justify == "right" for column in shown.columns])
+def _table(terminal: Table) -> str:
+    """A table of the terminal as a table of HTML."""
+    texts = zip(*(column.cells for column in terminal.columns), strict=True)
+    rows = [[_markup(cell, row.style) for cell in cells] for row, cells in zip(terminal.rows, texts, strict=True)]
+    caption = _markup(terminal.title) if terminal.title else ""
+    heads = [_markup(column.header) for column in terminal.columns]
+    return table(caption, heads, rows, [column.justify == "right" for column in terminal.columns])
 
 
 def _markup(content: object, style: str | Style | None = None) -> Markup:

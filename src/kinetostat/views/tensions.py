@@ -15,39 +15,40 @@ from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
 
-BAR = 0.28
-"""Inches of a cable's bar."""
+BAR_HEIGHT = 0.28
+"""Height of the figure for each cable, inches."""
+FARTHEST_BOUND = 3.0
+"""Bound, in multiples of the greatest tension, from which it is not drawn, so that bars are not too short."""
 
 
 def _lines(answer: Tensions) -> Lines:
     show = answer.machine.display.show
     yield "Tensions", answer.message
-    about = "the load" if answer.required == 1 else f"the {answer.required} required loads"
+    loads = "the load" if answer.required == 1 else f"the {answer.required} required loads"
     if math.isinf(answer.capacity):
         sentence = "No bound limits what the cables can hold."
     elif answer.capacity >= 0.0:
-        sentence = f"{show(answer.capacity, 'N')} in any direction may come to {about} before a bound is passed."
+        sentence = f"{show(answer.capacity, 'N')} in any direction may come to {loads} before a bound is passed."
     else:
-        sentence = f"What the cables can hold ends {show(-answer.capacity, 'N')} before {about}."
+        sentence = f"What the cables can hold ends {show(-answer.capacity, 'N')} before {loads}."
     yield "Capacity", sentence
-    closed = answer.wrench_closure > 0.0
     yield (
         "Closure",
         "Cables without an upper bound hold any wrench here."
-        if closed
+        if answer.wrench_closure > 0.0
         else "Cables alone cannot hold every wrench here, however hard they pull: they need the load.",
     )
     yield "Sag", answer.sag_message
 
 
 def _tables(answer: Tensions, _full: bool) -> Iterator[FittedTable]:
-    show, hangs = answer.machine.display.show, any(cable.sag for cable in answer.cables)
-    heads = ["tension", "reserve", "length", *(["at the base", "sag", "stiffness kept"] if hangs else [])]
+    show, sags = answer.machine.display.show, any(cable.sag for cable in answer.cables)
+    heads = ["tension", "reserve", "length", *(["at the base", "sag", "stiffness kept"] if sags else [])]
     table = numeric_table("Cables", "cable", heads)
     for cable in answer.cables:
         forces = [("-" if value is None else show(value, "N")) for value in (cable.tension, cable.reserve)]
         row = [*forces, show(cable.length, "m")]
-        if hangs:
+        if sags:
             base = "-" if cable.base_tension is None else show(cable.base_tension, "N")
             row += [base, show(cable.sag, "m"), f"{number(100.0 * cable.stiffness_share)} %"]
         table.add_row(cable.name, *row)
@@ -55,12 +56,12 @@ def _tables(answer: Tensions, _full: bool) -> Iterator[FittedTable]:
 
 
 def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figure:
-    """Draw the tension of each cable as a bar between the bounds."""
+    """Draw the tension of each cable as a bar, and the bounds that are near."""
     scale = answer.machine.display.scale("N")
     sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
     least, most = (bound * scale.factor for bound in answer.bounds)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 1.3 + BAR * len(sizes)), layout="constrained")
+        figure = Figure(figsize=(6.0, 1.3 + BAR_HEIGHT * len(sizes)), layout="constrained")
         panel = figure.add_subplot()
         names = [cable.name for cable in answer.cables]
         bars = panel.barh(names, sizes, height=0.7, color=COLOURS[0])
@@ -70,10 +71,10 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figu
         panel.set_xlabel(scale.label("tension"))
         panel.grid(visible=False, axis="y")
         panel.set_axisbelow(True)
-        within = [bound for bound in (least, most) if 0.0 < bound < 3.0 * max(sizes)]
-        for bound in within:
-            panel.axvline(bound, color=COLOURS[1], linewidth=1.2, label="bound" if bound == within[0] else None)
-        if within:
+        near = [bound for bound in (least, most) if 0.0 < bound < FARTHEST_BOUND * max(sizes)]
+        for bound in near:
+            panel.axvline(bound, color=COLOURS[1], linewidth=1.2, label="bound" if bound == near[0] else None)
+        if near:
             panel.legend(loc="upper right", frameon=False, fontsize="small", bbox_to_anchor=(1.0, 1.12))
         set_title(figure, title.format(answer.machine.name))
         note_setting(figure, setting_of(answer.machine))

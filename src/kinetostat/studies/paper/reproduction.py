@@ -1,9 +1,8 @@
 """Reproduce the whole paper in one call: numbers, equations, statements, the optimisation and the data of the figures.
 
-Numbers and equations are computed in `printed`. Here the design guidelines (i)-(vii), the three further facts and what
-the paper says about its optimisation are put to the test instead of quoted. Statements are in our words. Where one
-holds only in part, `limits` says what it holds for and what it fails for, with figures. Where a statement leaves a
-threshold open, the one that is taken here is named as such.
+Numbers and equations are computed in `printed`. This file tests the design guidelines (i)-(vii), the three further
+facts and the statements about the optimisation. Statements are in our words. If one holds only in part, `limits` says
+for what it holds and for what it fails, with figures. If the paper leaves a threshold open, ours is named as such.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -53,10 +52,10 @@ LATER_STEPS = 3
 """Steps of progress after the parts: the data of Fig. 4, that of Fig. 5, and the optimisation."""
 STUDY_NAME = "zhang-gosselin-2002"
 """Name of the bundled study with the optimisation of section 4.3."""
-SETTLED_AFTER = 60
+CONVERGED_AT = 60
 """Generation by which, according to the paper, the population has converged."""
 UNSEEN_GAP = 1e-4
-"""Distance of the population's mean from the final optimum, relative to it, that cannot be seen in Fig. 6."""
+"""Distance from the final optimum, relative to it, that cannot be seen in Fig. 6."""
 
 FREE_AXES = (0, 1, 3, 5)
 """Components that the passive leg leaves free at the reference configuration: rx, ry, x, z."""
@@ -83,11 +82,11 @@ class Claim:
     """A statement of the paper and its test.
 
     Attributes:
-        place: e.g. "Guideline (i)".
-        statement: what it says, in our words.
+        place: its place in the paper, e.g. "Guideline (i)".
+        statement: the statement in our words.
         measured: the figures of the test.
-        finding: verdict.
-        limits: what it holds for and what it fails for, and thresholds that are ours.
+        finding: the result of the test.
+        limits: the cases for which it holds and those for which it fails, and thresholds that are ours.
     """
 
     place: str
@@ -146,21 +145,22 @@ def reproduce(progress: Progress = silent) -> Reproduction:
         "claims": claims,
     }
     results: dict[str, tuple[Any, ...]] = {}
+    steps = len(parts) + LATER_STEPS
     for name, part in parts.items():
         results[name] = tuple(part())
-        progress(len(results), len(parts) + LATER_STEPS)
+        progress(len(results), steps)
     curves = evaluate_grid(machine, FIGURE_4_RANGES, ["stiffness"])
-    progress(len(parts) + 1, len(parts) + LATER_STEPS)
+    progress(steps - 2, steps)
     maps = evaluate_grid(machine, FIGURE_5_RANGES, ["compliance"])
-    progress(len(parts) + 2, len(parts) + LATER_STEPS)
+    progress(steps - 1, steps)
     search, search_claims = search_again()
-    progress(len(parts) + 3, len(parts) + LATER_STEPS)
+    progress(steps, steps)
     numbers = results["table_3"] + results["table_4"] + results["equations"] + results["designs"]
     return Reproduction(machine, numbers, results["checks"], results["claims"], curves, maps, search, search_claims)
 
 
 def claims() -> Iterator[Claim]:
-    """All ten, in the paper's order."""
+    """The tests of all ten statements about stiffness, in the paper's order."""
     yield _nearly_rigid()
     yield _proportional()
     yield _only_held_directions()
@@ -180,16 +180,9 @@ def _judge(fully: bool, partly: bool = False) -> Finding:
 
 
 def _nearly_rigid() -> Claim:
-    rigid = np.array(at("stiffness.passive_links=rigid").compliance.diagonal())[list(FREE_AXES)]
+    rigid = _free_compliances("rigid")
     ratios = [10.0**n for n in range(8)]
-    gaps = [
-        float(
-            np.max(
-                np.array(at(f"stiffness.passive_links={1e3 * r}").compliance.diagonal())[list(FREE_AXES)] / rigid - 1
-            )
-        )
-        for r in ratios
-    ]
+    gaps = [float(np.max(_free_compliances(1e3 * ratio) / rigid - 1)) for ratio in ratios]
     response = respond(load(printed.MACHINE))
     links = with_links_together(elements(response.configuration))[-1]
     within = float(np.max(1.0 / rigid_from(response, links, 0.01)[list(FREE_AXES)]))
@@ -204,6 +197,11 @@ def _nearly_rigid() -> Claim:
         f'Holds for the convergence; fails for the "only": in the free directions a ratio of {within:.4g} suffices to '
         f"be within 1 % (our threshold), and at 1e7 the excess is {gaps[7]:.0e}.",
     )
+
+
+def _free_compliances(passive_links: float | str) -> Array:
+    """Compliances in the free directions with passive links of a stiffness, N·m/rad or "rigid"."""
+    return np.array(at(f"stiffness.passive_links={passive_links}").compliance.diagonal())[list(FREE_AXES)]
 
 
 def _proportional() -> Claim:
@@ -223,13 +221,13 @@ def _proportional() -> Claim:
 
 def _only_held_directions() -> Claim:
     here = coefficients()
-    touched = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if here[k][i] > NEGLIGIBLE_COEFFICIENT}
+    depending = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if here[k][i] > NEGLIGIBLE_COEFFICIENT}
     return Claim(
         "Guideline (iii)",
         "The stiffness of the passive leg does not enter every direction; its part is to keep the platform to the "
         "desired motions.",
-        f"Directions with a coefficient of k52 or k54: {', '.join(sorted(touched))}.",
-        _judge(touched == {COMPONENTS[i] for i in HELD_AXES}),
+        f"Directions with a coefficient of k52 or k54: {', '.join(sorted(depending))}.",
+        _judge(depending == {COMPONENTS[i] for i in HELD_AXES}),
     )
 
 
@@ -324,7 +322,7 @@ def _link_length() -> Claim:
 
 
 def _stiffness_course(component: int, stiffness: Array) -> str:
-    """One stiffness at each length of the links, in words."""
+    """The name of a stiffness, and its value at each length of the links."""
     return f"K_{COMPONENTS[component]} ({' to '.join(f'{k:.4g}' for k in stiffness[:, component])})"
 
 
@@ -390,12 +388,12 @@ def _search_claims(genetic: Result, gradient: Result) -> Iterator[Claim]:
     )
     best, mean = (np.array([step[key] for step in genetic.log.steps]) for key in ("best", "mean"))
     # Generations are counted from 1, and the last best design is the end to which all is compared.
-    above = [float(values[SETTLED_AFTER - 1] / best[-1] - 1.0) for values in (best, mean)]
+    above = [float(values[CONVERGED_AT - 1] / best[-1] - 1.0) for values in (best, mean)]
     first = int(np.argmax(mean / best[-1] - 1.0 < UNSEEN_GAP)) + 1
     yield Claim(
         "Section 4.3, Fig. 6",
-        f"After around {SETTLED_AFTER} generations the best design and the mean of the population have converged.",
-        f"At generation {SETTLED_AFTER} the best is {above[0]:.0e} and the mean {above[1]:.0e} above the last best; "
+        f"After around {CONVERGED_AT} generations the best design and the mean of the population have converged.",
+        f"At generation {CONVERGED_AT} the best is {above[0]:.0e} and the mean {above[1]:.0e} above the last best; "
         f"the mean comes within {UNSEEN_GAP:.0e} at generation {first}.",
         Finding.HOLDS if max(above) < UNSEEN_GAP else Finding.FAILS,
     )

@@ -9,8 +9,8 @@ from kinetostat.arrays import Array
 from kinetostat.views.scene.shapes import CORNER_POINTS, HALF_CIRCLE_POINTS
 from kinetostat.views.scene.solids import Point2
 
-SHARPEST = 0.1
-"""Least share of an edge's normal in the bisector of a corner: the tip of a needle is not drawn back without end."""
+LEAST_BISECTOR_SHARE = 0.1
+"""Least component of a corner's bisector along an edge's normal: a sharp tip would otherwise move far back."""
 
 
 def edge_normals(outline: Array) -> Array:
@@ -22,10 +22,10 @@ def edge_normals(outline: Array) -> Array:
 
 def inset_outline(outline: Array, margin: float) -> Array:
     """Move all edges of an outline inwards by `margin` (the outline's unit), and return the corners [n x 2]."""
-    after = edge_normals(outline)
-    both = after + np.roll(after, 1, axis=0)
-    shares = np.einsum("ij,ij->i", both, after)
-    return outline - margin * both / np.maximum(shares, SHARPEST)[:, None]
+    normals = edge_normals(outline)
+    bisectors = normals + np.roll(normals, 1, axis=0)
+    shares = np.einsum("ij,ij->i", bisectors, normals)
+    return outline - margin * bisectors / np.maximum(shares, LEAST_BISECTOR_SHARE)[:, None]
 
 
 def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
@@ -37,15 +37,15 @@ def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
     left = list(range(len(points)))
     triangles = []
     while len(left) > 3:
-        at = next((i for i in range(len(left)) if _is_ear(points, left, i)), _widest(points, left))
-        triangles.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
-        del left[at]
+        tip = next((i for i in range(len(left)) if _is_ear(points, left, i)), _most_turning(points, left))
+        triangles.append((left[tip - 1], left[tip], left[(tip + 1) % len(left)]))
+        del left[tip]
     return [*triangles, (left[0], left[1], left[2])]
 
 
-def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], at: int) -> bool:
+def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], tip: int) -> bool:
     """Whether the triangle at a corner lies inside and holds no other corner."""
-    corners = left[at - 1], left[at], left[(at + 1) % len(left)]
+    corners = left[tip - 1], left[tip], left[(tip + 1) % len(left)]
     a, b, c = (points[i] for i in corners)
     if _turn(a, b, c) <= 0.0:
         return False
@@ -53,7 +53,7 @@ def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], at: int)
     return not any(min(_turn(a, b, p), _turn(b, c, p), _turn(c, a, p)) >= 0.0 for p in others)
 
 
-def _widest(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
+def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
     """The corner that turns most to the left: the best choice where round-off has hidden every ear."""
     turns = [_turn(points[left[i - 1]], points[left[i]], points[left[(i + 1) % len(left)]]) for i in range(len(left))]
     return max(range(len(left)), key=turns.__getitem__)
