@@ -1,6 +1,7 @@
-"""Prints a traced graph as straight-line source code of another language: no loop, no call but those of the table.
+"""Writes a traced graph for other programs: as straight-line C, or packed into a text.
 
-`pack_graph` writes it as a short text that fits into an address: data, no code, which the reader checks.
+`print_graph` writes C without a loop and without a call but those of the table. `pack_graph` writes a short text that
+fits into an address: data, no code, which the reader checks and makes functions of.
 
 Each operation is a row of `NOTATION`. An operation that is used once stands inside of the expression that uses it, as
 long as a line stays short; everything else has a line and a name of its own. Nothing is rounded: numbers are printed
@@ -33,35 +34,12 @@ NOTATION: dict[str, str] = {
     "sqrt": "{sqrt}({0})",
     "atan2": "{atan2}({0}, {1})",
 }
-"""Every operation of a graph, in the notation that C and JavaScript share."""
+"""Every operation of a graph, in the notation that C and JavaScript share but for the names of functions."""
 ATOM = re.compile(r"(\w+(\[\d+\])?|\d+(\.\d+)?(e[+-]?\d+)?)$")
 """A name, an element or a positive number."""
 CALL = re.compile(r"[\w.]+\(")
-CALLS = ("abs", "sqrt", "atan2")
-"""Operations that are functions: their operands need no brackets."""
-
-
-@dataclass(frozen=True)
-class Language:
-    """A language whose expressions are those of `NOTATION`.
-
-    Attributes:
-        functions: its names of `CALLS`.
-        number, condition: words that begin the declaration of a constant, by what it is.
-        infinity, undefined: its words for infinity and for what is not a number.
-    """
-
-    functions: dict[str, str]
-    number: str
-    condition: str
-    infinity: str
-    undefined: str
-
-
-C = Language({"abs": "fabs", "sqrt": "sqrt", "atan2": "atan2"}, "const double", "const int", "INFINITY", "NAN")
-JAVASCRIPT = Language(
-    {"abs": "Math.abs", "sqrt": "Math.sqrt", "atan2": "Math.atan2"}, "const", "const", "Infinity", "NaN"
-)
+CALLS = {"abs": "fabs", "sqrt": "sqrt", "atan2": "atan2"}
+"""Operations that are functions, whose operands need no brackets, and their names in C."""
 
 
 @dataclass(frozen=True)
@@ -79,16 +57,13 @@ class Printed:
     operations: int
 
 
-def print_graph(
-    inputs: Sequence[Traced], names: Sequence[str], results: Sequence[Operand], language: Language
-) -> Printed:
-    """Print what some results need.
+def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequence[Operand]) -> Printed:
+    """Print what some results need, in C.
 
     Args:
         inputs: all inputs of the graph.
         names: how they are written.
         results: nodes of the graph, or numbers.
-        language: of the source code.
 
     Raises:
         ValueError: a result needs another input.
@@ -103,22 +78,22 @@ def print_graph(
             continue
         if node.operation == "input":
             raise ValueError("a result depends on an input that has no name")
-        text = _expression(node, written, language)
+        text = _expression(node, written)
         if uses[node.number] > 1 or len(text) > LONGEST_EXPRESSION:
             name = f"v{len(lines)}"
-            kind = language.condition if isinstance(node, Condition) else language.number
+            kind = "const int" if isinstance(node, Condition) else "const double"
             lines.append(f"{kind} {name} = {text};")
             text = name
         written[node.number] = text
-    values = tuple(_operand(result, written, language) for result in results)
+    values = tuple(_operand(result, written) for result in results)
     return Printed(tuple(lines), values, sum(node.operation != "input" for node in used))
 
 
-def _expression(node: Node, written: dict[int, str], language: Language) -> str:
-    operands = [_operand(operand, written, language) for operand in node.operands]
+def _expression(node: Node, written: dict[int, str]) -> str:
+    operands = [_operand(operand, written) for operand in node.operands]
     if node.operation not in CALLS:
         operands = [operand if _is_plain(operand) else f"({operand})" for operand in operands]
-    return NOTATION[node.operation].format(*operands, **language.functions)
+    return NOTATION[node.operation].format(*operands, **CALLS)
 
 
 def _is_plain(text: str) -> bool:
@@ -137,16 +112,16 @@ def _closes_at_end(text: str, start: int) -> bool:
     return False
 
 
-def _operand(operand: Operand, written: dict[int, str], language: Language) -> str:
-    return written[operand.number] if isinstance(operand, Node) else literal(operand, language)
+def _operand(operand: Operand, written: dict[int, str]) -> str:
+    return written[operand.number] if isinstance(operand, Node) else literal(operand)
 
 
-def literal(number: float, language: Language) -> str:
-    """Write a number with all its digits."""
+def literal(number: float) -> str:
+    """Write a number in C with all its digits."""
     if math.isnan(number):
-        return language.undefined
+        return "NAN"
     if math.isinf(number):
-        return language.infinity if number > 0.0 else f"-{language.infinity}"
+        return "INFINITY" if number > 0.0 else "-INFINITY"
     return repr(float(number))
 
 

@@ -32,7 +32,7 @@ from kinetostat.engine.machine_functions import (
     sample_points,
 )
 from kinetostat.engine.points import PointTable
-from kinetostat.engine.printed import C, literal, print_graph
+from kinetostat.engine.printed import literal, print_graph
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.exchange.formats import ascii_line
@@ -158,7 +158,7 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
     """Print a body as a function that returns its code; columns after the inputs are the coordinates of a state."""
     given = len(functions.inputs)
     names = [f"in[{k}]" if k < given else f"state[{k - given}]" for k in range(len(body.columns))]
-    printed = print_graph(body.columns, names, [*body.results, body.code], C)
+    printed = print_graph(body.columns, names, [*body.results, body.code])
     lines = [*printed.lines, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results[:-1]))]
     lines.append(f"return (int)({printed.results[-1]});")
     state = "const double *state, " if len(body.columns) > given else ""
@@ -300,5 +300,5 @@ def _command_coordinates(functions: MachineFunctions, columns: dict[str, Array],
 
 def _array(name: str, rows: Array) -> str:
     """A table of numbers as a constant of C."""
-    lines = ",\n".join(f"    {{{', '.join(literal(float(number), C) for number in row)}}}" for row in rows)
+    lines = ",\n".join(f"    {{{', '.join(literal(float(number)) for number in row)}}}" for row in rows)
     return f"static const double {name}[{rows.shape[0]}][{rows.shape[1]}] = {{\n{lines}\n}};"

@@ -31,7 +31,7 @@ from kinetostat.engine.machine_functions import (
     functions_of,
     sample_points,
 )
-from kinetostat.engine.printed import JAVASCRIPT, NOTATION, pack_graph
+from kinetostat.engine.printed import CALLS, NOTATION, pack_graph
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -137,7 +137,8 @@ def _compressed_text(content: object) -> str:
 
 
 def _page(name: str, content: object) -> str:
-    operations = [form.format("{0}", "{1}", "{2}", **JAVASCRIPT.functions) for form in NOTATION.values()]
+    functions = {operation: f"Math.{operation}" for operation in CALLS}
+    operations = [form.format("{0}", "{1}", "{2}", **functions) for form in NOTATION.values()]
     words = {
         "name": escape(name),
         "version": version("kinetostat"),
