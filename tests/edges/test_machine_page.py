@@ -216,16 +216,16 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path):
         ready(watched, page.as_uri())
         found = watched.tab.evaluate(
             """rows => rows.map(row => {
-                const { data, programs } = opened, free = new Float64Array(43), loaded = new Float64Array(8);
-                const status = programs.answers(row, free);
+                const { data, programs } = opened, free = new Float64Array(1), loaded = new Float64Array(8);
+                const status = programs.quantities(row, free);
                 programs.loaded(row, loaded, restOf(row, data.rest, programs));
-                return [status, free[42], loaded[6], loaded[7]];
+                return [status, free[0], loaded[6], loaded[7]];
             })""",
             rows.tolist(),
         )
         shares = watched.tab.evaluate(
             """() => {
-                const out = new Float64Array(6 * opened.data.parts.length), C = new Float64Array(43);
+                const out = new Float64Array(6 * opened.data.parts.length), C = new Float64Array(42);
                 const home = opened.data.inputs.map(({ home }) => home);
                 opened.programs.shares(home, out); opened.programs.answers(home, C);
                 return opened.data.parts.map((name, n) => [name, out[6 * n + 5] / C[20]]);

@@ -53,6 +53,15 @@ TEMPLATES = Path(__file__).with_name("live")
 SPAN, TURN, SHARE = 0.4, math.radians(30.0), 0.5
 """Ranges of sliders about the value in the file: of lengths, in units of the machine's length; of angles, rad; of other
 numbers, as a share of themselves."""
+INDICES = (
+    "singularity_margin",
+    "frobenius_condition",
+    "least_translational_stiffness",
+    "greatest_translational_stiffness",
+    "least_rotational_stiffness",
+    "greatest_rotational_stiffness",
+)
+"""Quantities that a page shows where none is named."""
 FORMAT, VIEWER = 1, "viewer.html"
 """Version of what an address holds, and the page that the documentation has for it."""
 LONGEST_ADDRESS = 8000
@@ -70,13 +79,12 @@ def write(
         analysis: the analysis of the machine at its pose.
         path: the path of the page.
         inputs: leaf paths of parameters that get a slider beside the coordinates of the pose, as "tool.offset.2".
-        outputs: names of quantities that the page shows beside K and C, as "frequency_1".
+        outputs: names of quantities that the page shows beside K and C, as "frequency_1"; None for the usual indices.
 
     Raises:
         InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
     """
-    functions = functions_of(analysis.machine, inputs or (), outputs or ())
-    write_text(path, page_of(functions, path.stem))
+    write_text(path, page_of(page_functions(analysis.machine, inputs, outputs), path.stem))
     return [path]
 
 
@@ -96,6 +104,21 @@ def write_link(
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
     write_text(path, f"{VIEWER}#m={address_of(functions, path.stem)}\n")
     return [path]
+
+
+def page_functions(
+    machine: Machine, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+) -> MachineFunctions:
+    """Return the functions of a machine for a page, which shows the usual indices where no quantity is named.
+
+    Args:
+        machine: at its pose.
+        inputs, outputs: as for `write`.
+
+    Raises:
+        InputError: as `write`.
+    """
+    return functions_of(machine, inputs or (), INDICES if outputs is None else outputs)
 
 
 def page_of(functions: MachineFunctions, stem: str) -> str:
@@ -161,10 +184,12 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     placement = functions.placement.formula
     driven = placement.body.results[: len(functions.actuators)]
     bodies = {
-        "answers": objectives_of(kind, form, [((name, 1.0),) for name in (*ENTRIES, *free)], closed=closed).body,
+        "answers": objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed).body,
         "places": placement.body,
         "shares": functions.shares.formula.body,
     }
+    if free:
+        bodies["quantities"] = objectives_of(kind, form, [((name, 1.0),) for name in free], closed=closed).body
     if functions.square:
         body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
         bodies["slopes"] = with_gradients(body, placement.inputs)

@@ -6,11 +6,11 @@ function openMachine(data, programs) {
   const NAMES = ["rx", "ry", "rz", "x", "y", "z"];
   const at = inputs.map((input) => input.home);
   const free = quantities.filter((quantity) => !quantity.loaded);
-  const answers = new Float64Array(42 + free.length), loaded = new Float64Array(6 + quantities.length - free.length);
+  const answers = new Float64Array(42), numbers = new Float64Array(free.length), loaded = new Float64Array(6 + quantities.length - free.length);
   const places = new Float64Array(actuators.length + 12 + 3 * data.drawing.points), shares = new Float64Array(6 * (parts?.length ?? 0));
 
   // Units that people read: a factor from SI and a word, by kind of quantity.
-  const UNITS = { m: [1e3, "mm"], rad: [180 / Math.PI, "°"] };
+  const UNITS = { m: [1e3, "mm"], rad: [180 / Math.PI, "°"], "N/m": [1e-6, "N/µm"], "N·m/rad": [1e-3, "kN·m/rad"] };
   const unit = (si) => UNITS[si] ?? [1, si];
   const BLOCKS = {
     K: [[1e-3, "kN·m/rad"], [1e-3, "kN/rad"], [1e-6, "N/µm"]],
@@ -27,12 +27,14 @@ function openMachine(data, programs) {
       : String(Number(value.toPrecision(digits)));
     return text.replace("-", "−");
   }
+  const spaced = (name) => name.replaceAll("_", " ");
   const escaped = (text) => text.replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
   const raised = (text) => [...text].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
 
   const angle = (value) => (Math.abs(value) > 1e6 ? Math.atan2(Math.sin(value), Math.cos(value)) : value);
   const prepared = (values) => values.map((value, k) => (inputs[k].si === "rad" ? angle(value) : value));
   const answer = (values) => programs.answers(prepared(values), answers);
+  const number = (values) => (free.length ? programs.quantities(prepared(values), numbers) : 0);
   const answerAtRest = (values) => {
     const point = prepared(values);
     return programs.loaded(point, loaded, restOf(point, rest, programs));
@@ -153,8 +155,9 @@ function openMachine(data, programs) {
   const MOTIONS = NAMES.map((name, k) => (k < 3 ? [`rotation ${name}`, 1e6, "µrad"] : [`displacement ${name}`, 1e6, "µm"]));
   function showQuantities() {
     const line = (name, value, word) => `<tr><td>${escaped(name)}</td><td class="n">${shown(value, 5)}</td><td>${escaped(word)}</td></tr>`;
-    const named = ({ name, si }, value) => line(name, value * unit(si)[0], si === "1" ? "" : unit(si)[1]);
-    $("quantities").innerHTML = free.map((quantity, k) => named(quantity, answers[42 + k])).join("");
+    const named = ({ name, si }, value) => line(spaced(name), value * unit(si)[0], si === "1" ? "" : unit(si)[1]);
+    number(at);
+    $("quantities").innerHTML = free.map((quantity, k) => named(quantity, numbers[k])).join("");
     $("rest").hidden = !rest;
     if (!rest) return;
     const status = answerAtRest(at);
@@ -192,9 +195,9 @@ function openMachine(data, programs) {
     const [factor, word] = BLOCKS[name][block(k, k)];
     return { label: `${name} ${NAMES[k]}`, unit: word, value: (point) => (answer(point) === 0 ? entry(name, k, k) * factor : NaN) };
   }));
-  free.forEach(({ name, si }, k) => mapped.push({ label: name, unit: si === "1" ? "" : unit(si)[1], value: (point) => (answer(point) === 0 ? answers[42 + k] * unit(si)[0] : NaN) }));
+  free.forEach(({ name, si }, k) => mapped.push({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], value: (point) => (number(point) === 0 ? numbers[k] * unit(si)[0] : NaN) }));
   quantities.filter((quantity) => quantity.loaded).forEach(({ name, si }, k) =>
-    mapped.push({ label: name, unit: si === "1" ? "" : unit(si)[1], value: (point) => (answerAtRest(point) === 0 ? loaded[6 + k] * unit(si)[0] : NaN) }));
+    mapped.push({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], value: (point) => (answerAtRest(point) === 0 ? loaded[6 + k] * unit(si)[0] : NaN) }));
   const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const CELLS = 41;
   function paint(share) {

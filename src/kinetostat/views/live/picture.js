@@ -163,7 +163,7 @@ function pictureOf(canvas, { drawing, planar, length }, first) {
     }
     pen.font = "12px system-ui, sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle";
     const corner = [38, box.height - 38];
-    [["x", -sa, -ca * se, "#d1495b"], ["y", ca, -sa * se, "#3b8a4b"], ["z", 0, ce, "#2f6fb0"]].forEach(([name, right, up, paint]) => {
+    [["x", -sa, -ca * se, "#d1495b"], ["y", ca, -sa * se, "#3b8a4b"], ["z", 0, ce, "#2f6fb0"]].slice(0, planar ? 2 : 3).forEach(([name, right, up, paint]) => {
       pen.strokeStyle = pen.fillStyle = paint; pen.lineWidth = 2;
       pen.beginPath(); pen.moveTo(...corner); pen.lineTo(corner[0] + 22 * right, corner[1] - 22 * up); pen.stroke();
       pen.fillText(name, corner[0] + 30 * right, corner[1] - 30 * up);

@@ -12,7 +12,6 @@ from typing import Any
 
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.kernel import closes_inside
-from kinetostat.engine.machine_functions import functions_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -26,7 +25,7 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.answers import plain_of
-from kinetostat.views.live_page import page_of
+from kinetostat.views.live_page import page_functions, page_of
 from kinetostat.views.report.answers import (
     ANSWERS_WITH_SECTIONS,
     answer_sections,
@@ -255,7 +254,7 @@ def moving_sections(analysis: Analysis) -> list[Section]:
     if machine.family.chains is not None and not closes_inside(machine):
         return []
     words = Paragraph("Sliders move the machine, and all numbers follow: they are computed here, by its own formulas.")
-    page = page_of(functions_of(machine, (), ()), "machine")
+    page = page_of(page_functions(machine), "machine")
     return [Section("The machine to move", (words, InnerPage(f"{machine.name} to move", page)))]
 
 
