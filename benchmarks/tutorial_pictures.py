@@ -12,11 +12,12 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 from kinetostat import build, evaluate_grid, load, load_problem, machine_picture, optimize, plot
+from kinetostat.cli import main
 from kinetostat.machine.machine import Machine
 
 ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / "tests"))
-from pages import blocks  # noqa: E402  (of the tests)
+from pages import blocks, dialogues  # noqa: E402  (of the tests)
 
 SIZE = (760, 440)
 SWEEPS = 20
@@ -68,6 +69,22 @@ def keep_fit(name: str) -> None:
     write(name, Image.open(drawn).convert("RGB"))
 
 
+def keep_mill(lobes_name: str, designs_name: str) -> None:
+    """Write small PNGs of the lobes with a tool, and of the designs, of the tutorial on a machine tool."""
+    page = ROOT / "docs" / "tutorials" / "machine-tool.md"
+    with TemporaryDirectory() as folder, chdir(folder):
+        for block in blocks(page):
+            if block.kind in ("toml", "csv"):
+                Path(block.words[0]).write_text(block.text, "utf-8")
+            elif block.kind == "python":
+                exec(block.text, {})
+        lines = [words for block in blocks(page) if block.kind == "console" for words, _ in dialogues(block.text)]
+        for name, word in ((lobes_name, "--tool-receptance"), (designs_name, "compare")):
+            main(next(words for words in lines if word in words)[1:])
+            picture = "compare" if word == "compare" else "lobes"
+            write(name, Image.open(next(Path().glob(f"*/{picture}.png"))).convert("RGB").reduce(2))
+
+
 def write(name: str, image: Image.Image) -> None:
     """Write a small PNG into docs/images."""
     path = ROOT / "docs" / "images" / f"{name}.png"
@@ -78,6 +95,7 @@ def write(name: str, image: Image.Image) -> None:
 if __name__ == "__main__":
     keep("delta-printer", load("delta-linear"))
     keep_resonance("delta-printer-resonance")
+    keep_mill("mill-lobes", "five-mills")
     keep("real-hexapod", load("hexapod-hardware"))
     keep("five-bar", five_bar())
     keep("paper-machine", load(PAPER))

@@ -8,6 +8,8 @@ Source: theory (106) and (107).
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -24,10 +26,11 @@ from kinetostat.spec.fields import Quantity, positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.poses import chosen_axes, grid_of
+from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.studies.vibration import Vibration, modes
 from kinetostat.units import UnitError
-from kinetostat.vibration.cutting import Borders, Engagement, borders, milling, tried_frequencies, turning
-from kinetostat.vibration.receptance import receptance
+from kinetostat.vibration.coupling import FreeTool
+from kinetostat.vibration.cutting import Borders, Engagement, borders, milling, turning
 
 SPEEDS = 1200
 """Speeds of the curve."""
@@ -58,6 +61,7 @@ class Lobes(Immutable):
         assumed: whether nothing is said of the machine's damping, so that it is a usual one.
         poses: number of poses with an answer.
         worst: coordinates of the pose that allows least, by leaf path; empty for one pose.
+        tool: coupled to the machine; None where there is none.
     """
 
     state: MachineState
@@ -73,6 +77,7 @@ class Lobes(Immutable):
     assumed: bool = False
     poses: int = 1
     worst: tuple[tuple[str, float], ...] = ()
+    tool: FreeTool | None = None
 
     @property
     def machine(self) -> Machine:
@@ -93,6 +98,7 @@ def lobes(
     lowest: float | str | None = None,
     highest: float | str | None = None,
     over: str | Sequence[str] = (),
+    tool_receptance: str | Path | None = None,
     progress: Progress = silent,
 ) -> Lobes:
     """Find the widths of cut that stay stable over the speed of the spindle.
@@ -112,6 +118,7 @@ def lobes(
         cutting_pressure: tangential force per area of the chip, N/m² or with a unit; that of [cutting] if None.
         lowest, highest: ends of the range of speeds, turns per second or with a unit, "12000 1/min".
         over: ranges of coordinates of the pose, as "x=-10 cm:10 cm:5": widths are then stable at all of these poses.
+        tool_receptance: CSV file with the receptance of a free tool and holder, which are coupled to the tool point.
         progress: receives how far the work is.
 
     Raises:
@@ -125,16 +132,18 @@ def lobes(
     if ends[0] is not None and ends[1] is not None and ends[0] >= ends[1]:
         raise InputError("lowest is not below highest; exchange them.")
     if not over:
-        return _answer(state, [(modes(state), ())], engagement, ends)
+        return _answer(state, [(modes(state, tool_receptance=tool_receptance), ())], engagement, ends)
     pairs = chosen_axes(state.machine, over)
     grid = grid_of(pairs)
     if grid.size > MOST_POSES:
         raise InputError(f"over has {grid.size:,} poses; at most {MOST_POSES:,} are computed: lower the counts.")
     columns = grid.columns(0, grid.size)
+    tool = read_tool(tool_receptance) if tool_receptance is not None else None
     vibrations: list[tuple[Vibration, tuple[tuple[str, float], ...]]] = []
     for place in range(grid.size):
         pose = tuple((path, float(column[place])) for path, column in columns.items())
-        vibrations.append((modes(with_values(state.machine, dict(pose))), pose))
+        there = modes(with_values(state.machine, dict(pose)))
+        vibrations.append((replace(there, tool=tool), pose))
         progress(place + 1, grid.size)
     return _answer(state, vibrations, engagement, ends)
 
@@ -228,12 +237,12 @@ def _answer(
         any(each.assumed for _, _, each in known),
         len(known),
         pose,
+        known[0][2].tool,
     )
 
 
 def _borders_of(vibration: Vibration, engagement: Engagement) -> Borders | None:
-    solution, damping = vibration.solution, vibration.damping
-    if solution is None or damping is None or not solution.ringing:
+    if vibration.solution is None or not vibration.solution.ringing:
         return None
-    tried = tried_frequencies(solution.frequencies, damping.ratios(solution))
-    return borders(receptance(solution, damping, tried)[:, 3:, 3:], tried, engagement)
+    tried = vibration.tried
+    return borders(vibration.receptance(tried.tolist())[:, 3:, 3:], tried, engagement)

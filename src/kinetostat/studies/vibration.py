@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -31,10 +32,22 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
+from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.tolerances import EQUAL_FREQUENCIES
+from kinetostat.vibration.coupling import FreeTool, coupled
+from kinetostat.vibration.cutting import tried_frequencies
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
-from kinetostat.vibration.receptance import ASSUMED_RATIO, Damper, Softest, along, damper, least_real_part, receptance
+from kinetostat.vibration.receptance import (
+    ASSUMED_RATIO,
+    Damper,
+    Softest,
+    along,
+    damper,
+    least_real_part,
+    receptance,
+    softest_of,
+)
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
 
 SMALL = 1e-6
@@ -112,6 +125,7 @@ class Vibration(Immutable):
         direction: in which the tool is pushed, base axes; empty where nothing says it.
         cutting_pressure: cutting force per area of the chip, N/m²; None where nothing says it.
         lowest, highest: ends of the range of the response, Hz; None for about the first six modes.
+        tool: coupled to the machine, so that responses are those of its tip; None where there is none.
     """
 
     state: MachineState
@@ -129,6 +143,7 @@ class Vibration(Immutable):
     cutting_pressure: float | None = None
     lowest: float | None = None
     highest: float | None = None
+    tool: FreeTool | None = None
 
     @property
     def machine(self) -> Machine:
@@ -142,17 +157,26 @@ class Vibration(Immutable):
     def receptance(self, frequencies: Sequence[float]) -> Complex:
         """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
 
+        With a coupled tool it is that of its tip.
+
         Args:
             frequencies: Hz.
 
         Raises:
-            InputError: the pose has no answer, or a frequency is not a number up to `HIGHEST`.
+            InputError: the pose has no answer, or a frequency is not a number up to `HIGHEST` or not one of the tool.
         """
         solution, damping = self._solution()
         for place, frequency in enumerate(frequencies):
             if not abs(frequency) <= HIGHEST:
                 raise InputError(f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST:g}.")
-        return receptance(solution, damping, np.asarray(frequencies, dtype=float).reshape(-1))
+        given = np.asarray(frequencies, dtype=float).reshape(-1)
+        whole = receptance(solution, damping, given)
+        if self.tool is None:
+            return whole
+        first, last = self.tool.frequencies[[0, -1]]
+        for frequency in given[(given < first) | (given > last)]:
+            raise InputError(f"{frequency:g} Hz is beyond what the tool tells, {first:g} to {last:g} Hz.")
+        return coupled(whole, self.tool, given)
 
     @checked
     def along(self, direction: Sequence[float], frequencies: Sequence[float]) -> Complex:
@@ -178,7 +202,20 @@ class Vibration(Immutable):
             InputError: the pose has no answer, or the direction is zero.
         """
         solution, damping = self._solution()
-        return least_real_part(solution, damping, np.array(unit_direction(direction, "direction")))
+        way = np.array(unit_direction(direction, "direction"))
+        if self.tool is None:
+            return least_real_part(solution, damping, way)
+        return softest_of(lambda given: along(self.receptance(given.tolist()), way), self.tried)
+
+    @property
+    def tried(self) -> Array:
+        """Frequencies at which chatter is looked for, Hz: close together about each mode, within those of a tool."""
+        solution, damping = self._solution()
+        tried = tried_frequencies(solution.frequencies, damping.ratios(solution))
+        if self.tool is None:
+            return tried
+        every = np.unique(np.concatenate([tried, self.tool.tried]))
+        return every[(every >= self.tool.frequencies[0]) & (every <= self.tool.frequencies[-1])]
 
     def _solution(self) -> tuple[Modes, Damper]:
         if self.solution is None or self.damping is None:
@@ -193,6 +230,7 @@ def modes(
     cutting_pressure: float | str | None = None,
     lowest: float | str | None = None,
     highest: float | str | None = None,
+    tool_receptance: str | Path | None = None,
 ) -> Vibration:
     """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
 
@@ -202,12 +240,14 @@ def modes(
         along: direction in which the tool is pushed, base axes; that of [cutting] if empty.
         cutting_pressure: cutting force per area of the chip, N/m² or with a unit; that of [cutting] if None.
         lowest, highest: ends of the range of the response, Hz or with a unit; about the first six modes if None.
+        tool_receptance: CSV file with the receptance of a free tool and holder, which are then coupled to the tool
+            point; modes stay those of the machine.
 
     Raises:
         InputError: nothing says a mass, rotors have an inertia and nothing says how far they turn, a direction is zero,
-            a pressure has no direction, or the range is empty.
+            a pressure has no direction, the range is empty, or the file of the tool has a mistake.
     """
-    state = state_of(machine)
+    state, tool = state_of(machine), read_tool(tool_receptance) if tool_receptance is not None else None
     cutting = state.machine.tables["cutting"]
     if along:
         unit_direction(along, "along")
@@ -230,6 +270,7 @@ def modes(
         cutting_pressure=pressure or cutting.pressure or None,
         lowest=low,
         highest=high,
+        tool=tool,
     )
 
 
@@ -374,6 +415,11 @@ def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -
     """
     shown = answer.modes[:DRAWN]
     ends = (answer.lowest or BELOW * shown[0].frequency, answer.highest or ABOVE * shown[-1].frequency)
+    if answer.tool is not None:
+        ends = (max(ends[0], float(answer.tool.frequencies[0])), min(ends[1], float(answer.tool.frequencies[-1])))
+        if ends[0] >= ends[1]:
+            raise InputError("the range of the response and the frequencies of the tool have nothing in common.")
     about = [m.frequency * (1.0 + max(m.ratio, 1e-4) * np.linspace(-WIDE, WIDE, near)) for m in shown]
-    every = np.concatenate([np.geomspace(*ends, points), *about])
+    of_tool = [] if answer.tool is None else [answer.tool.tried]
+    every = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
     return np.unique(every[(every >= ends[0]) & (every <= ends[1])])

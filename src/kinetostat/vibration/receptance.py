@@ -6,6 +6,8 @@ compliance.
 Source: theory (59) and (60); the limit of a cut, J. Tlusty and M. Polacek (1963). At the tool point, base axes, SI.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
@@ -114,16 +116,22 @@ def least_real_part(modes: Modes, damping: Damper, direction: Array) -> Softest:
     spread = np.linspace(-BANDWIDTHS, BANDWIDTHS, TRIED)
     for frequency, ratio in zip(modes.frequencies, damping.ratios(modes), strict=True):
         tried.append(frequency * np.abs(1.0 + max(float(ratio), LEAST_RATIO) * spread))
-    coarse = np.unique(np.concatenate(tried))
-    near = _lowest(modes, damping, direction, coarse)
-    fine = np.linspace(coarse[max(near - 1, 0)], coarse[min(near + 1, len(coarse) - 1)], TRIED)
-    lowest = _lowest(modes, damping, direction, fine)
-    part = along(receptance(modes, damping, fine[lowest : lowest + 1]), direction).real
-    return Softest(float(fine[lowest]), float(part[0]))
+    return softest_of(
+        lambda given: along(receptance(modes, damping, given), direction), np.unique(np.concatenate(tried))
+    )
 
 
-def _lowest(modes: Modes, damping: Damper, direction: Array, frequencies: Array) -> int:
-    return int(np.argmin(along(receptance(modes, damping, frequencies), direction).real))
+def softest_of(response: Callable[[Array], Complex], tried: Array) -> Softest:
+    """Find where a response has its least real part: at the frequencies that are tried, then closer about the best.
+
+    Args:
+        response: motion per force at frequencies, m/N [n].
+        tried: frequencies, Hz, ascending.
+    """
+    near = int(np.argmin(response(tried).real))
+    fine = np.linspace(tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)], TRIED)
+    lowest = int(np.argmin(response(fine).real))
+    return Softest(float(fine[lowest]), float(response(fine[lowest : lowest + 1]).real[0]))
 
 
 def cut_receptances(state: MachineState) -> Array:

@@ -16,6 +16,7 @@ from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, s
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
+from kinetostat.views.vibration import tool_of
 
 SHOWN = 12
 """Speeds with a row of the table, at equal distances."""
@@ -48,6 +49,8 @@ def _lines(answer: Lobes) -> Lines:
         lines.append(
             ("Worst", f"The least width is that at {pose_of(with_values(answer.machine, dict(answer.worst)))}.")
         )
+    if answer.tool is not None:
+        lines.append(("Tool", tool_of(answer.tool, answer.machine.display)))
     if answer.assumed:
         lines.append(("Damping", "Damping is assumed: 2 % of critical in every mode; give a table [damping]."))
     return lines
@@ -153,6 +156,11 @@ LOBES_QUESTION = Question(
         Option("highest", "quantity", 'fastest speed, e.g. "20000 1/min"', "SPEED"),
         Option(
             "over", "text", 'a range of poses, all of which must be stable: "x=-10 cm:10 cm:5"', "RANGE", (), many=True
+        ),
+        Option(
+            "tool_receptance",
+            "file",
+            "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
         ),
     ),
     loaded="vibrations about the state of rest under the loads, with tensions and weights",

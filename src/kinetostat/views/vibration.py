@@ -10,6 +10,7 @@ from kinetostat.machine.loads import loads_platform
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
+from kinetostat.vibration.coupling import FreeTool
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
@@ -45,6 +46,16 @@ def damping_of(answer: Vibration) -> str:
     ratios = [100.0 * mode.ratio for mode in answer.modes]
     ends = dict.fromkeys(number(ratio, digits=3) for ratio in (min(ratios), max(ratios)))
     return f"{' to '.join(ends)} % of critical, by the table [damping]."
+
+
+def tool_of(tool: FreeTool | None, display: Display) -> str:
+    """Say over which frequencies and in which components a tool is coupled to the machine; empty without one."""
+    if tool is None:
+        return ""
+    first, last = (display.show(float(end), "Hz") for end in tool.frequencies[[0, -1]])
+    tip, flange = (", ".join(COMPONENTS[part] for part in parts) for parts in (tool.tip, tool.flange))
+    text = f"Responses are those of the tip of the tool in {tip}, coupled at its flange in {flange}"
+    return f"{text}, from {first} to {last}; modes are those of the machine alone."
 
 
 def cut_of(answer: Vibration) -> str:
@@ -132,7 +143,11 @@ def _lines(answer: Vibration) -> Lines:
         ("Masses", masses_of(answer)),
         ("Damping", damping_of(answer)),
     ]
-    more = [("Loads", loads_of(answer)), ("Cutting", cut_of(answer))]
+    more = [
+        ("Loads", loads_of(answer)),
+        ("Tool", tool_of(answer.tool, answer.machine.display)),
+        ("Cutting", cut_of(answer)),
+    ]
     return [*lines, *((word, sentence) for word, sentence in more if sentence)]
 
 
@@ -244,6 +259,11 @@ MODES_QUESTION = Question(
             'highest frequency of the response, e.g. "500 Hz" (default: above the sixth mode)',
             metavar="FREQUENCY",
             former=("--to",),
+        ),
+        Option(
+            "tool_receptance",
+            "file",
+            "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
         ),
     ),
     loaded="vibrations about the state of rest under the loads, with tensions and weights",
