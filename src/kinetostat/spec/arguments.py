@@ -101,6 +101,7 @@ WORDS = {
     "priors": 'a dictionary of standard deviations, e.g. {"geometry": "0.1 mm"}',
     "bounds": 'a dictionary of limits, e.g. {"zeros": "1 mm"}',
     "more": "a whole number from 0",
+    "tool_receptance": "the path of a CSV file",
     "tell": "a function of the steps done, of all steps, and of words on them",
 }
 """Words for an argument, by its name, which means the same in every function."""

@@ -244,5 +244,5 @@ def _answer(
 def _borders_of(vibration: Vibration, engagement: Engagement) -> Borders | None:
     if vibration.solution is None or not vibration.solution.ringing:
         return None
-    tried = vibration.tried
+    tried = vibration.search_frequencies
     return borders(vibration.receptance(tried.tolist())[:, 3:, 3:], tried, engagement)

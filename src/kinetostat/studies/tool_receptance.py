@@ -67,7 +67,7 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
     if falling.size or frequencies[0] <= 0.0:
         place = int(falling[0]) + 1 if falling.size else 0
         raise InputError(f"line {numbers[place]}: frequencies must rise from line to line, and be above 0; sort them.")
-    return _arranged(frequencies, _entries(parts))
+    return _free_tool(frequencies, _entries(parts))
 
 
 def _values(column: GivenColumn, moved: int, pushed: int, numbers: list[int]) -> Array:
@@ -93,14 +93,14 @@ def _entries(parts: Mapping[tuple[Key, str], Array]) -> dict[Key, Complex]:
     return {(*key[2:], *key[:2]): value for key, value in entries.items()} | entries
 
 
-def _arranged(frequencies: Array, entries: Mapping[Key, Complex]) -> FreeTool:
+def _free_tool(frequencies: Array, entries: Mapping[Key, Complex]) -> FreeTool:
     places = {place: sorted({key[1] for key in entries if key[0] == place}) for place in ("tip", "flange")}
     for place, components in places.items():
         for component in components:
             name = f"{place}.{COMPONENTS[component]}"
             if (place, component, place, component) not in entries:
                 raise InputError(f"{name}/{name} is missing; a tool that moves there must say how it does.")
-            if place == "tip" and not any((place, component, "flange", held) in entries for held in places["flange"]):
+            if place == "tip" and not any((place, component, "flange", part) in entries for part in places["flange"]):
                 raise InputError(
                     f"nothing says how {name} moves if the flange is pushed; add {name}/flange.{name[4:]}."
                 )

@@ -34,7 +34,7 @@ from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
 from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.tolerances import EQUAL_FREQUENCIES
-from kinetostat.vibration.coupling import FreeTool, coupled
+from kinetostat.vibration.coupling import FreeTool, couple
 from kinetostat.vibration.cutting import tried_frequencies
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
@@ -176,7 +176,7 @@ class Vibration(Immutable):
         first, last = self.tool.frequencies[[0, -1]]
         for frequency in given[(given < first) | (given > last)]:
             raise InputError(f"{frequency:g} Hz is beyond what the tool tells, {first:g} to {last:g} Hz.")
-        return coupled(whole, self.tool, given)
+        return couple(whole, self.tool, given)
 
     @checked
     def along(self, direction: Sequence[float], frequencies: Sequence[float]) -> Complex:
@@ -205,16 +205,16 @@ class Vibration(Immutable):
         way = np.array(unit_direction(direction, "direction"))
         if self.tool is None:
             return least_real_part(solution, damping, way)
-        return softest_of(lambda given: along(self.receptance(given.tolist()), way), self.tried)
+        return softest_of(lambda given: along(self.receptance(given.tolist()), way), self.search_frequencies)
 
     @property
-    def tried(self) -> Array:
+    def search_frequencies(self) -> Array:
         """Frequencies at which chatter is looked for, Hz: close together about each mode, within those of a tool."""
         solution, damping = self._solution()
         tried = tried_frequencies(solution.frequencies, damping.ratios(solution))
         if self.tool is None:
             return tried
-        every = np.unique(np.concatenate([tried, self.tool.tried]))
+        every = np.unique(np.concatenate([tried, self.tool.search_frequencies]))
         return every[(every >= self.tool.frequencies[0]) & (every <= self.tool.frequencies[-1])]
 
     def _solution(self) -> tuple[Modes, Damper]:
@@ -412,6 +412,9 @@ def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -
         answer: with its modes and the ends of its range.
         points: over the whole range.
         near: about each of these modes, besides.
+
+    Raises:
+        InputError: the range of the answer and the frequencies of its tool have nothing in common.
     """
     shown = answer.modes[:DRAWN]
     ends = (answer.lowest or BELOW * shown[0].frequency, answer.highest or ABOVE * shown[-1].frequency)
@@ -420,6 +423,6 @@ def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -
         if ends[0] >= ends[1]:
             raise InputError("the range of the response and the frequencies of the tool have nothing in common.")
     about = [m.frequency * (1.0 + max(m.ratio, 1e-4) * np.linspace(-WIDE, WIDE, near)) for m in shown]
-    of_tool = [] if answer.tool is None else [answer.tool.tried]
+    of_tool = [] if answer.tool is None else [answer.tool.search_frequencies]
     every = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
     return np.unique(every[(every >= ends[0]) & (every <= ends[1])])

@@ -36,13 +36,13 @@ class FreeTool:
     flange_flange: Complex
 
     @property
-    def tried(self) -> Array:
+    def search_frequencies(self) -> Array:
         """Frequencies that are close enough to follow it: its own, and some between them, Hz."""
         between = [self.frequencies[:-1] + share * np.diff(self.frequencies) for share in (0.25, 0.5, 0.75)]
         return np.unique(np.concatenate([self.frequencies, *between]))
 
 
-def coupled(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
+def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     """Couple a tool to a machine: motion of its tip per wrench on it, rad and m per N·m and N [n x 6 x 6].
 
     Components that the tool does not give for its tip are those of the flange, where a wrench then acts on the machine.
@@ -52,7 +52,7 @@ def coupled(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
         tool: between its frequencies, straight lines are followed.
         frequencies: within those of the tool, Hz [n].
     """
-    at_tip, across, at_flange = (_between(tool, values, frequencies) for values in _parts(tool))
+    at_tip, across, at_flange = (_interpolate(tool, values, frequencies) for values in _parts(tool))
     tip, flange = list(tool.tip), list(tool.flange)
     rest = [part for part in range(6) if part not in tip]
     # What each wrench would move the flange of the free tool by, and of the machine alone: the gap that forces close.
@@ -74,7 +74,7 @@ def _parts(tool: FreeTool) -> tuple[Complex, Complex, Complex]:
     return tool.tip_tip, tool.tip_flange, tool.flange_flange
 
 
-def _between(tool: FreeTool, values: Complex, frequencies: Array) -> Any:
+def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Any:
     """Values at frequencies between those of a tool, along straight lines [n x ...]."""
     place = np.clip(np.searchsorted(tool.frequencies, frequencies) - 1, 0, len(tool.frequencies) - 2)
     start, end = tool.frequencies[place], tool.frequencies[place + 1]
