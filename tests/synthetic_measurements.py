@@ -5,9 +5,9 @@ import numpy as np
 from kinetostat.accuracy.model import error_model
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.numerics.motions import Motions, exponential, logarithm
-from kinetostat.studies.identification.measurements import POSITION, TURNED, Measurements
+from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements
 
-SIGMA = dict.fromkeys(POSITION, 5e-6) | dict.fromkeys(TURNED, 3e-5)
+SIGMA = dict.fromkeys(POSITION, 5e-6) | dict.fromkeys(ROTATION, 3e-5)
 
 
 def posed(machine, count, turn=0.12, share=0.08, seed=3):
@@ -19,7 +19,7 @@ def posed(machine, count, turn=0.12, share=0.08, seed=3):
     return error_model(machine, poses, count, np.zeros(6)), poses
 
 
-def measured(model, poses, truth, names=(*POSITION, *TURNED), rng=None, frame=None):
+def measured(model, poses, truth, names=(*POSITION, *ROTATION), rng=None, frame=None):
     """What an instrument would measure, with noise."""
     rng, count = rng or np.random.default_rng(5), len(model)
     moved, _ = model.displacement(truth)
@@ -27,7 +27,7 @@ def measured(model, poses, truth, names=(*POSITION, *TURNED), rng=None, frame=No
     place = Motions(turned, model.drawn.tool + moved[:, 3:])
     place = place if frame is None else frame.inverse() @ place
     angles = logarithm(Motions(place.rotation, np.zeros((count, 3))))[:, :3]
-    true = dict(zip((*POSITION, *TURNED), (*place.translation.T, *angles.T), strict=True))
+    true = dict(zip((*POSITION, *ROTATION), (*place.translation.T, *angles.T), strict=True))
     noisy = {name: true[name] + SIGMA[name] * rng.normal(size=count) for name in names}
     sigma = {name: np.full(count, SIGMA[name]) for name in names}
     empty = np.full((count, 3), np.nan)

@@ -10,7 +10,7 @@ from kinetostat.numerics.motions import Motions
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.identification.fit import Wishes, best_fit
 from kinetostat.studies.identification.identification import identification_of, identify
-from kinetostat.studies.identification.measurements import POSITION, TURNED, Measurements
+from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
 from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, observation, place_unknown
 from kinetostat.studies.identification.unseen import sparse
@@ -52,7 +52,7 @@ def test_compliances_follow_from_deflections_under_known_loads():
     soft = np.flatnonzero(truth)
     wrenches = rng.normal(size=(count, 6)) * [20.0, 20.0, 20.0, 300.0, 300.0, 300.0]
     deflected = model.deflections(wrenches) @ (1.0 + truth[soft])
-    names = {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*TURNED, *POSITION))}
+    names = {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
     sigma = {name: np.full(count, 1e-3 * np.abs(entries).max()) for name, entries in names.items()}
     noisy = {name: entries + sigma[name] * rng.normal(size=count) for name, entries in names.items()}
     data = Measurements("data.csv", tuple(range(count)), poses, noisy, sigma, wrenches, np.full((count, 3), np.nan))

@@ -1,4 +1,4 @@
-"""Legs as rows of screw motions: what `mechanism` makes a machine of, and the units in which it is counted.
+"""Legs as rows of screw motions with springs and masses, of which `mechanism` is made, and the units of their numbers.
 
 Nothing is solved here. Units, axes and origin are those of `mechanism`.
 
@@ -32,12 +32,12 @@ class Weight:
     """A mass at a point.
 
     Attributes:
-        name: name of the part that it belongs to.
+        name: name of the part to which it belongs.
         carried: number of the leg's screw motions that carry it; not used of the platform.
-        point: where it is in the free state, m.
-        mass: kg.
-        inertia: about the point, base axes: xx, yy, zz, xy, xz, yz, kg·m²; zero where it is empty.
-        bar: whether it is half of a uniform straight bar, whose other half stands beside it in a list.
+        point: its place in the free state, m.
+        mass: its mass, kg.
+        inertia: inertia about the point, base axes: xx, yy, zz, xy, xz, yz, kg·m²; zero if empty.
+        bar: whether it is half of a uniform straight bar, whose other half is its neighbour in a list.
     """
 
     name: str
@@ -52,14 +52,14 @@ class Weight:
 class Masses:
     """Point masses that move with a body, and bars as two of them.
 
-    Both halves of a uniform bar at its ends have its weight, and its momentum; its kinetic energy is that of a third
-    of the bar at each end, and of a sixth that couples both.
+    A uniform bar is two halves at its ends, which have its weight and its momentum. Its kinetic energy is that of a
+    third of the bar at each end, and of a sixth that couples both ends.
 
     Attributes:
-        names: names of the parts that they belong to [m].
-        carried: how many of the leg's screw motions carry each [m]; not used of the platform.
-        pairs: which of them are both halves of a bar.
-        point: where they are in the free state [n x m x 3].
+        names: names of the parts to which they belong [m].
+        carried: number of the leg's screw motions that carry each [m]; not used of the platform.
+        pairs: numbers of the two halves of each bar.
+        point: their places in the free state [n x m x 3].
         mass: the mass in units of force per m/s² [n x m].
         uncoupled: the part of each mass whose kinetic energy is its own [n x m].
         inertia: about each point in the free state, in the same unit times the square of the machine's length
@@ -217,13 +217,13 @@ class Units:
 
 
 @dataclasses.dataclass
-class Given:
-    """Motions of given amounts that have been counted so far.
+class GivenMotions:
+    """Motions whose amounts are given, as they are counted leg by leg: those of actuators, then the growth of links.
 
     Attributes:
-        most: number of actuators that there will be.
-        actuators: springs of the actuators so far.
-        growth: growth of the links so far, m.
+        most: number of all actuators, so that numbers of links follow theirs.
+        actuators: springs of the actuators counted so far.
+        growth: growth of the links counted so far, m.
     """
 
     most: int
@@ -251,7 +251,7 @@ class _Row:
     """
 
     units: Units
-    amounts: Given
+    amounts: GivenMotions
     links: list[tuple[Member, Station, Station]]
     travels: Sequence[Array]
     twists: list[Array] = field(default_factory=list)
@@ -346,7 +346,7 @@ def _is_rigid(stiffness: Scalar) -> bool:
 
 
 def elastic_leg(
-    leg: Leg, units: Units, amounts: Given, members: Sequence[Member], travels: Sequence[Array] = ()
+    leg: Leg, units: Units, amounts: GivenMotions, members: Sequence[Member], travels: Sequence[Array] = ()
 ) -> ElasticLeg:
     """Read a leg as a row of motions.
 

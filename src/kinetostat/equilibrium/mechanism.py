@@ -3,8 +3,9 @@
 The free state is the machine at its pose with relaxed springs; all coordinates are zero there. Each leg is a row of
 screw motions from base to platform (a product of exponentials). Nothing is solved here.
 
-Everything is made comparable: lengths are in units of the machine's length, forces in units of a typical stiffness
-times it. Arrays have the poses first [n]. The origin is the tool point of the free state; axes are those of the base.
+Lengths are in units of the machine's length, and forces in units of a typical stiffness times that length, so that all
+numbers can be compared. Arrays have the poses first [n]. The origin is the tool point of the free state; axes are those
+of the base.
 
 Source: theory (35).
 """
@@ -17,7 +18,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import ElasticLeg, Given, Masses, Units, Weight, elastic_leg
+from kinetostat.equilibrium.chains import ElasticLeg, GivenMotions, Masses, Units, Weight, elastic_leg
 from kinetostat.equilibrium.drives import with_drives
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
@@ -32,15 +33,15 @@ class Mechanism:
     """A machine at n poses, in units of its own.
 
     Attributes:
-        legs: its legs.
+        legs: its legs as rows of screw motions.
         driven: the springs of the actuators that can be driven, in the order of the legs.
-        growth: elongation of each link that is warmer, in units of length [n x links].
+        growth: thermal elongation of each link that is warmer, in units of length [n x links].
         platform: masses of platform, tool and payload.
-        wrench: the moment of all loads, and the force at the tool point, base axes [n x 6].
+        wrench: sum of the moments of all loads, and the force at the tool point, base axes [n x 6].
         pushed: points of the platform at which further forces act, in the free state [n x forces x 3].
-        forces: forces that act there, base axes [n x forces x 3].
+        forces: the forces at these points, base axes [n x forces x 3].
         gravity: acceleration of free fall, base axes, m/s² [n x 3].
-        ways: orthonormal twists that exist, as columns [6 x 6, or 6 x 3 of a planar machine].
+        ways: basis of the twists that the platform can have, orthonormal columns [6 x 6, or 6 x 3 of a planar machine].
         length: unit of length, m [n].
         force: unit of force, N [n].
         weighs: whether any mass is known.
@@ -76,9 +77,9 @@ class Mechanism:
 
     @property
     def starts(self) -> list[int]:
-        """Places of the unknowns at which the coordinates and the wrench of each leg begin, and the end of the last.
+        """Place among the unknowns of each leg's first coordinate, and the number of all unknowns.
 
-        Before them stands the twist of the platform.
+        The twist of the platform comes first, and then, leg by leg, its coordinates and its wrench.
         """
         ways = self.ways.shape[1]
         starts = [ways]
@@ -119,57 +120,79 @@ def mechanism_of(
 
     Args:
         machine: the machine with its pose, or columns of n poses.
-        configuration: where everything is.
+        configuration: the machine placed at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
-        count: number of poses, n; None for numbers of any kind as they are, traced ones for instance: its arrays then
-            hold them as objects, for one pose.
+        count: number of poses, n; None for one pose whose numbers are of any kind, such as traced ones: the arrays then
+            hold them as objects.
         force: unit of force, N; if None, a typical stiffness times the unit of length.
         members: its links with both ends at the pose, if they are known.
     """
-    origin = machine.reference_point(configuration)
     length = of_scalars([configuration.length], count)[:, 0]
-    units = Units(origin, length, _unit_of_force(configuration, length, count, force), count)
+    force_unit = _unit_of_force(configuration, length, count, force)
+    units = Units(machine.reference_point(configuration), length, force_unit, count)
     if members is None:
         members = located_members(machine, configuration, None if joints is None else joints.coordinates)
     driven = [s for leg in configuration.legs for s in leg.springs if s.actuated and not is_zero(s.stiffness)]
-    amounts = Given(len(driven))
-    returning = joints is not None and any(not is_zero(s.returns) for leg in configuration.legs for s in leg.springs)
-    travels = _travels(machine, joints, count) if returning and joints is not None else {}
-    legs = []
-    for leg in configuration.legs:
-        here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
-        chain = elastic_leg(leg, units, amounts, here, travels.get(leg.name, ()))
-        legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
-    platform = configuration.platform
+    amounts = GivenMotions(len(driven))
+    legs = _elastic_legs(machine, configuration, joints, units, amounts, members)
+    platform, named = configuration.platform, machine.named_loads
     weights = platform_weights(machine, platform)
-    load = machine.tables["load"]
-    named = machine.named_loads
-    moment = machine.load.rotational
-    for _, other in named:
-        moment = moment + other.rotational
-    wrench = of_scalars([*moment.components(), *load.force], count) * (1.0 / _wrench_units(length, units.force))
-    ways = np.eye(6)
-    if configuration.plane is not None:
-        turn, *slides = (np.array(joint.axis.components(), dtype=float) for joint in configuration.plane.freedoms)
-        ways = np.column_stack([[*turn, 0.0, 0.0, 0.0], *([0.0, 0.0, 0.0, *axis] for axis in slides)])
     return Mechanism(
-        tuple(legs),
-        tuple(amounts.actuators),
-        of_scalars(amounts.growth, count) * units.shrink,
-        units.masses(weights),
-        wrench,
-        units.points([platform.apply(point) for point, _ in named]),
-        units.forces([other.translational for _, other in named]),
-        of_scalars(gravity_of(load).components(), count),
-        ways,
-        length,
-        units.force,
-        bool(weights) or any(leg.masses.carried for leg in legs),
+        legs=legs,
+        driven=tuple(amounts.actuators),
+        growth=of_scalars(amounts.growth, count) * units.shrink,
+        platform=units.masses(weights),
+        wrench=_sum_of_loads(machine, count) * (1.0 / _wrench_units(length, units.force)),
+        pushed=units.points([platform.apply(point) for point, _ in named]),
+        forces=units.forces([other.translational for _, other in named]),
+        gravity=of_scalars(gravity_of(machine.tables["load"]).components(), count),
+        ways=_possible_twists(configuration),
+        length=length,
+        force=units.force,
+        weighs=bool(weights) or any(leg.masses.carried for leg in legs),
     )
 
 
+def _elastic_legs(
+    machine: Machine,
+    configuration: Configuration,
+    joints: Joints | None,
+    units: Units,
+    amounts: GivenMotions,
+    members: Sequence[Member],
+) -> tuple[ElasticLeg, ...]:
+    """All legs with springs, links and drives; `amounts` counts their actuators and growing links."""
+    returning = any(not is_zero(s.returns) for leg in configuration.legs for s in leg.springs)
+    travels = _travels(machine, joints, units.count) if returning and joints is not None else {}
+    legs = []
+    for leg in configuration.legs:
+        its_members = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
+        chain = elastic_leg(leg, units, amounts, its_members, travels.get(leg.name, ()))
+        legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
+    return tuple(legs)
+
+
+def _sum_of_loads(machine: Machine, count: int | None) -> Array:
+    """The sum of the moments of all loads (N·m), and the force at the tool point (N) [n x 6].
+
+    Forces at other points of the platform are apart, because their moment changes as it moves.
+    """
+    moment = machine.load.rotational
+    for _, other in machine.named_loads:
+        moment = moment + other.rotational
+    return of_scalars([*moment.components(), *machine.tables["load"].force], count)
+
+
+def _possible_twists(configuration: Configuration) -> Array:
+    """An orthonormal basis of the twists that the platform can have [6 x 6, or 6 x 3 of a planar machine]."""
+    if configuration.plane is None:
+        return np.eye(6)
+    turn, *slides = (np.array(joint.axis.components(), dtype=float) for joint in configuration.plane.freedoms)
+    return np.column_stack([[*turn, 0.0, 0.0, 0.0], *([0.0, 0.0, 0.0, *axis] for axis in slides)])
+
+
 def platform_weights(machine: Machine, platform: Displacement) -> list[Weight]:
-    """The masses of platform with tool and of the payload at the pose, with their inertia in base axes."""
+    """The masses of the platform with its tool, and of the payload, at the pose, with their inertia in base axes."""
     return [
         Weight(part.name, 0, part.centre, part.mass, turned_tensor(platform.rotation.apply, part.inertia))
         for part in platform_masses(machine, platform)
@@ -179,12 +202,12 @@ def platform_weights(machine: Machine, platform: Displacement) -> list[Weight]:
 def _unit_of_force(configuration: Configuration, length: Array, count: int | None, given: Scalar | None) -> Array:
     if given is not None:
         return of_scalars([given], count)[:, 0]
-    known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
-    return _typical(of_scalars(known, count)) * length
+    stiffnesses = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
+    return _typical_stiffness(of_scalars(stiffnesses, count)) * length
 
 
 def _travels(machine: Machine, joints: Joints, count: int | None) -> dict[str, list[Array]]:
-    """For each leg and element, how far what moves there or last before it is from the home pose, rad or m [n]."""
+    """For each leg, element by element, the travel of the last joint up to it from the home pose, rad or m [n]."""
     remaining = iter(joints.coordinates)
     travels = {}
     for leg, steps in zip(machine.configure(joints.coordinates).legs, machine.chains().legs, strict=True):
@@ -200,14 +223,14 @@ def _travels(machine: Machine, joints: Joints, count: int | None) -> dict[str, l
 
 
 def _linear(spring: Spring, length: Scalar) -> Scalar:
-    """The stiffness of a spring as that of a slide, N/m."""
+    """The stiffness of a spring, N/m; that of a torsion spring over the square of the machine's length."""
     return spring.stiffness if spring.joint.point is None else spring.stiffness * (1.0 / (length * length))
 
 
-def _typical(stiffness: Array) -> Array:
-    """The geometric mean of those that are finite and not zero [n]; the harmonic one of any kind of numbers.
+def _typical_stiffness(stiffness: Array) -> Array:
+    """The geometric mean of the stiffnesses that are finite and not zero [n]; of traced numbers the harmonic mean.
 
-    It only decides what counts as round-off.
+    Which mean it is matters little: the unit of force only decides what counts as round-off.
     """
     if stiffness.dtype == object:
         softness = [1.0 / k for k in stiffness[0] if not is_zero(k)]

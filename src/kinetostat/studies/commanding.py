@@ -204,7 +204,11 @@ class Command(Immutable):
         actuators: names of the actuators.
         units: unit of each coordinate, "m" or "rad".
         coordinates: coordinates to command, m or rad [poses x actuators]; NaN where there is no state of rest.
-        unloaded, before, left, turned, settled: as of `ActuatorTargets`; what is left no actuator can change.
+        unloaded: coordinates of the actuators at the pose without loads, m or rad [poses x actuators].
+        before: distance of the tool point from its pose without a correction, m [poses].
+        left: distance of the tool point from its pose with the correction, m [poses]: no actuator can change it.
+        turned: angle by which the platform is still turned with the correction, rad [poses].
+        settled: whether the machine comes to rest [poses].
         message: the answer in a sentence.
     """
 

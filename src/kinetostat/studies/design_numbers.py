@@ -4,7 +4,7 @@ A design that lacks a number has None in its place. Designs themselves are in `c
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from functools import partial
 from typing import Any
@@ -32,10 +32,10 @@ from kinetostat.tolerances import EQUAL_DESIGNS
 PERCENTILE = 95.0
 """Percent of the poses that are at least as good as the value shown."""
 BUILT_ERROR = "built_error"
-"""A number beside the quantities: what 95 % of the machines within the tolerances of a file keep within."""
-MOVED = "displacement"
-"""The whole way of the tool point, of which the quantities of this group are the components."""
-USUAL = ("compliance", "singularity_margin")
+"""A number beside the quantities: the error that 95 % of the machines within the tolerances of a file do not exceed."""
+DISPLACEMENT = "displacement"
+"""A number beside the quantities: the distance that the tool point moves, whose components are this group."""
+USUAL_QUANTITIES = ("compliance", "singularity_margin")
 """Quantities over poses, if none is named."""
 
 
@@ -54,7 +54,7 @@ class DesignRow:
         group: heading under which rows stand together.
         name: name of the number.
         unit: unit of the number, SI.
-        better: whether less or more is better; None where that depends on the machine.
+        better: whether less or more is better; None if neither is.
         values: the number of each design; None if a design lacks it, infinite where the design is rigid or free.
     """
 
@@ -66,7 +66,7 @@ class DesignRow:
 
     @property
     def percents(self) -> tuple[float | None, ...]:
-        """Change against the first design, percent; None where the change is undefined."""
+        """Change against the first design, percent; None if the change is undefined."""
         first = self.values[0]
         if first is None or first == 0.0 or not math.isfinite(first):
             return (None,) * len(self.values)
@@ -74,31 +74,45 @@ class DesignRow:
 
     @property
     def best(self) -> tuple[int, ...]:
-        """Indices of the best designs; empty where all are equal, or where nothing says what is better."""
+        """Indices of the best designs; empty if all are equal, or if neither less nor more is better."""
         known = {i: v for i, v in enumerate(self.values) if v is not None}
         if len(known) < 2 or self.better is None:
             return ()
         top = (min if self.better is Better.LESS else max)(known.values())
-        places = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
-        return places if len(places) < len(known) else ()
+        best = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
+        return best if len(best) < len(known) else ()
 
 
 def rows_at_poses(analyses: Sequence[Analysis], quantities: Sequence[str] = ()) -> tuple[DesignRow, ...]:
     """Collect numbers at each design's pose; a row for which no design has a number is left out.
 
     Args:
-        analyses: of the designs.
+        analyses: the analyses of the designs.
         quantities: names of further quantities or groups.
 
     Raises:
         InputError: a quantity that none of the designs has.
     """
-    rows = []
+    rows = [
+        *_matrix_rows(analyses),
+        *_index_rows(analyses),
+        *_load_and_vibration_rows(analyses),
+        *_quantity_rows(analyses, quantities),
+    ]
+    return tuple(row for row in rows if any(value is not None for value in row.values))
+
+
+def _matrix_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
+    """The diagonals of C and K."""
     for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
         for name in COMPONENTS:
             entry = QUANTITIES[f"{group}_{name}"]
             numbers = tuple(_diagonal(analysis, group, name) for analysis in analyses)
-            rows.append(DesignRow(group, f"{letter}_{name}", entry.unit, better, numbers))
+            yield DesignRow(group, f"{letter}_{name}", entry.unit, better, numbers)
+
+
+def _index_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
+    """Least stiffnesses, condition, singularity margin and moving mass."""
     scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
         ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
         ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
@@ -108,21 +122,33 @@ def rows_at_poses(analyses: Sequence[Analysis], quantities: Sequence[str] = ()) 
     ]
     for name, unit, better, value in scalars:
         numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
-        rows.append(DesignRow("indices", name, unit, better, numbers))
-    known = [_at_pose(analysis.state) for analysis in analyses]
+        yield DesignRow("indices", name, unit, better, numbers)
+
+
+def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
+    """Numbers that only designs have whose files give masses, a cut, loads or tolerances."""
+    numbers_of_designs = [_at_pose(analysis.state) for analysis in analyses]
     for name, unit, better in (
         ("first natural frequency", "Hz", Better.MORE),
         ("stable width of cut", "m", Better.MORE),
         ("displacement under load", "m", Better.LESS),
         ("error as built, 95 %", "m", Better.LESS),
     ):
-        rows.append(DesignRow("loads and vibration", name, unit, better, tuple(each.get(name) for each in known)))
-    named = [_numbers_of(analysis.state.machine, _one_point(analysis.state.machine), names)[0]
-             for analysis, names in zip(analyses, _names(analyses, quantities), strict=True)]  # fmt: skip
-    for name in dict.fromkeys(name for numbers in named for name in numbers):
-        known_values = tuple(_number_or_none(numbers[name][0]) if name in numbers else None for numbers in named)
-        rows.append(DesignRow("quantities", name, *_about(name), known_values))
-    return tuple(row for row in rows if any(value is not None for value in row.values))
+        values_of_designs = tuple(numbers.get(name) for numbers in numbers_of_designs)
+        yield DesignRow("loads and vibration", name, unit, better, values_of_designs)
+
+
+def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> Iterator[DesignRow]:
+    """The quantities that were named."""
+    numbers_of_designs = [
+        _numbers_of(analysis.state.machine, _one_point(analysis.state.machine), names)[0]
+        for analysis, names in zip(analyses, _names_by_design(analyses, quantities), strict=True)
+    ]
+    for name in dict.fromkeys(name for numbers in numbers_of_designs for name in numbers):
+        values_of_designs = tuple(
+            _number_or_none(numbers[name][0]) if name in numbers else None for numbers in numbers_of_designs
+        )
+        yield DesignRow("quantities", name, *_unit_and_better(name), values_of_designs)
 
 
 def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
@@ -146,7 +172,7 @@ def _number_or_none(value: float) -> float | None:
 
 
 def _at_pose(state: MachineState) -> dict[str, float | None]:
-    """Vibrations, the way of the tool under the loads, and the error as built, where the file tells them."""
+    """First frequency, stable width, displacement and error as built, as far as the file gives what they need."""
     machine, result = state.machine, dict[str, float | None]()
     if state.status is not Status.OK:
         return result
@@ -154,20 +180,20 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
     frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
     wanted = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
     if loads_platform(machine):
-        wanted["displacement under load"] = MOVED
+        wanted["displacement under load"] = DISPLACEMENT
     if machine.tolerances:
         wanted["error as built, 95 %"] = BUILT_ERROR
     for row, name in wanted.items():
         try:
             refuse_absent(state, _quantities_of(machine, name))
-        except InputError:  # the file does not tell masses or the cut: the row has a dash
+        except InputError:  # the file gives no masses or no cut: the row has a dash
             continue
         result[row] = _number_or_none(_numbers_of(machine, point, [name])[0][name][0])
     return result
 
 
 def _one_point(machine: Machine) -> PointTable:
-    """The pose of a machine as a table of points: any coordinate can be the column that it must have."""
+    """The pose of a machine as a table of one point, which must have a column: its first coordinate."""
     coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
     return PointTable({coordinate.path: np.array([float(values(machine)[coordinate.path])])})
 
@@ -179,10 +205,10 @@ def _quantities_of(machine: Machine, name: str) -> list[str]:
     )
 
 
-def _names(
+def _names_by_design(
     analyses: Sequence[Analysis], given: Sequence[str], varied: Sequence[Sequence[Parameter]] = ()
 ) -> list[list[str]]:
-    """The numbers that each design has of those that are named; groups stand for their members.
+    """For each design, those of the given names that mean something for it; groups stand for their members.
 
     Raises:
         InputError: a name that means nothing for any of the designs.
@@ -203,7 +229,7 @@ def _names(
             except InputError as error:
                 refusals.append(error)
                 continue
-            result[place] += [name] if name == BUILT_ERROR else [*([MOVED] * (name == MOVED)), *members]
+            result[place] += [name] if name == BUILT_ERROR else [*([DISPLACEMENT] * (name == DISPLACEMENT)), *members]
         if len(refusals) == len(analyses):
             raise refusals[0]
     return [[*dict.fromkeys(names)] for names in result]
@@ -212,16 +238,16 @@ def _names(
 def _numbers_of(
     machine: Machine, points: Points, names: Sequence[str], progress: Progress = silent
 ) -> tuple[dict[str, Array], Array]:
-    """Numbers at points by name [points], NaN where there is none, and the points that have a result [points]."""
-    wanted = [name for name in names if name not in (MOVED, BUILT_ERROR)]
-    if MOVED in names:
-        wanted += _quantities_of(machine, MOVED)
+    """Numbers at points by name [points], NaN where there is none, and whether each point has a result [points]."""
+    wanted = [name for name in names if name not in (DISPLACEMENT, BUILT_ERROR)]
+    if DISPLACEMENT in names:
+        wanted += _quantities_of(machine, DISPLACEMENT)
     evaluation = evaluate(machine, points, [*dict.fromkeys(wanted)] or ["singularity_margin"], progress)
     answered, result = evaluation.status == Status.OK, dict[str, Array]()
     for name in names:
-        if name == MOVED:
-            ways = [evaluation.values[each] for each in _quantities_of(machine, MOVED) if not each[-2:].startswith("r")]
-            result[name] = np.linalg.norm(ways, axis=0)
+        if name == DISPLACEMENT:
+            translations = [each for each in _quantities_of(machine, DISPLACEMENT) if not each[-2:].startswith("r")]
+            result[name] = np.linalg.norm([evaluation.values[each] for each in translations], axis=0)
         elif name == BUILT_ERROR:
             result[name] = np.full(points.size, np.nan)
             if answered.any():
@@ -232,9 +258,9 @@ def _numbers_of(
     return result, answered
 
 
-def _about(name: str) -> tuple[str, Better | None]:
-    """The unit of a number, and what is better."""
-    if name in (MOVED, BUILT_ERROR):
+def _unit_and_better(name: str) -> tuple[str, Better | None]:
+    """The unit of a number, and whether less or more of it is better."""
+    if name in (DISPLACEMENT, BUILT_ERROR):
         return "m", Better.LESS
     quantity = QUANTITIES[name]
     return quantity.unit, Better(quantity.better) if quantity.better else None
@@ -246,46 +272,46 @@ def rows_over(
     """Compute the worst value, a percentile and the mean over poses; and for each design (poses answered, all poses).
 
     Args:
-        analyses: of the designs.
-        ranges: of a grid; none if the poses are given.
-        poses: as for `evaluate`, of fields that all designs have; None if there are ranges.
-        quantities: names or groups; the diagonal of C and the singularity margin if empty.
-        progress: receives how many poses are done.
+        analyses: the analyses of the designs.
+        ranges: ranges of a grid of poses; none if the poses are given.
+        poses: poses as for `evaluate`, of fields that all designs have; None if there are ranges.
+        quantities: names or groups of quantities; the diagonal of C and the singularity margin if empty.
+        progress: receives the number of poses done, and of all poses.
 
     Raises:
-        InputError: poses or a range that one of the machines does not take, or a quantity that none of them has.
+        InputError: one of the machines has no such pose or range, or none of them has a quantity.
     """
     machines = [analysis.state.machine for analysis in analyses]
-    places = [_points_of(machine, ranges, poses) for machine in machines]
-    names = _names(analyses, quantities or USUAL, [fields for _, fields in places])
+    points_and_fields = [_points_of(machine, ranges, poses) for machine in machines]
+    names = _names_by_design(analyses, quantities or USUAL_QUANTITIES, [fields for _, fields in points_and_fields])
     spreads: list[dict[str, tuple[float, ...]]] = []
     counts = []
-    every = sum(points.size for points, _ in places)
+    total = sum(points.size for points, _ in points_and_fields)
     done = 0
-    for machine, (points, _), wanted in zip(machines, places, names, strict=True):
-        share = partial(_share, progress, done, every)
-        numbers, answered = _numbers_of(machine, points, wanted, share)
+    for machine, (points, _), wanted in zip(machines, points_and_fields, names, strict=True):
+        numbers, answered = _numbers_of(machine, points, wanted, partial(_progress_after, progress, done, total))
         counts.append((int(answered.sum()), points.size))
         known = {name: row[answered & ~np.isnan(row)] for name, row in numbers.items()}
-        spreads.append({name: _spread(_about(name)[1], row) for name, row in known.items() if row.size})
+        spreads.append({name: _spread(_unit_and_better(name)[1], row) for name, row in known.items() if row.size})
         done += points.size
-        progress(done, every)
+        progress(done, total)
     rows = []
     for name in dict.fromkeys(name for wanted in names for name in wanted):
-        unit, better = _about(name)
-        shown = name.replace("compliance_", "C_") if name in GROUPS["compliance"] else name.replace("_", " ")
-        for k, what in enumerate(("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")):
-            by_design = tuple(spread[name][k] if name in spread else None for spread in spreads)
-            rows.append(DesignRow(shown, what, unit, better, by_design))
+        unit, better = _unit_and_better(name)
+        group = name.replace("compliance_", "C_") if name in GROUPS["compliance"] else name.replace("_", " ")
+        for k, statistic in enumerate(("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")):
+            values_of_designs = tuple(spread[name][k] if name in spread else None for spread in spreads)
+            rows.append(DesignRow(group, statistic, unit, better, values_of_designs))
     return tuple(rows), tuple(counts)
 
 
-def _share(progress: Progress, before: int, every: int, done: int, _total: int) -> None:
-    progress(before + done, every)
+def _progress_after(progress: Progress, before: int, total: int, done: int, _part: int) -> None:
+    """Report the progress of a part of the work as that of the whole."""
+    progress(before + done, total)
 
 
 def _points_of(machine: Machine, ranges: Sequence[str], poses: Any) -> tuple[Points, list[Parameter]]:
-    """The points over which a machine is looked at, and the fields that vary."""
+    """The points at which a machine is evaluated, and the fields that vary."""
     if poses is None:
         pairs = chosen_axes(machine, ranges)
         return grid_of(pairs), [parameter for _, parameter in pairs]
@@ -294,7 +320,7 @@ def _points_of(machine: Machine, ranges: Sequence[str], poses: Any) -> tuple[Poi
 
 
 def _spread(better: Better | None, row: Array) -> tuple[float, ...]:
-    """Return the worst value, a percentile towards it, and the mean; where nothing is better, the greatest in size."""
+    """Return the worst value, a percentile towards it, and the mean; if none is better, the greatest in size."""
     if better is None:
         return float(row[np.abs(row).argmax()]), _percentile(np.abs(row), PERCENTILE), float(row.mean())
     if better is Better.MORE:
@@ -303,7 +329,7 @@ def _spread(better: Better | None, row: Array) -> tuple[float, ...]:
 
 
 def _percentile(row: Array, percent: float) -> float:
-    """A percentile; between two values only where all are finite, since infinity has no distance."""
+    """A percentile, interpolated only if all values are finite, since infinity has no distance."""
     if np.isfinite(row).all():
         return float(np.percentile(row, percent))
     return float(np.percentile(row, percent, method="nearest"))

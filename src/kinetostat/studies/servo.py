@@ -1,7 +1,7 @@
-"""The question of how stiff and how damped the tool of a machine is with its servo loops closed.
+"""Stiffness and damping of the tool of a machine with its servo loops closed: the question and its answer.
 
-The stiffness of an actuator is then that of its transmission, between motor and joint, and [servo] says how the motor
-is held. Loops as such are in `vibration.servo`.
+The stiffness of an actuator is here that of its transmission between motor and joint, and the table [servo] gives the
+loop that holds the motor. The dynamics of the loops are in `vibration.servo`.
 
 Source: theory (101)-(104). At the tool point, base axes.
 """
@@ -28,11 +28,12 @@ from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
 from kinetostat.vibration.servo import ClosedLoops, ServoLoop, slowest_decay
 
-RANGE = (0.001, 5.0)
+CURVE_RANGE = (0.001, 5.0)
 """Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still."""
-POINTS = 1200
-GROWS = 1e-9
-"""Real part of a pole, as a share of its size, from which it grows."""
+CURVE_POINTS = 1200
+"""Number of points of each curve."""
+UNSTABLE_REAL_PART = 1e-9
+"""Real part of a pole, as a share of its size, above which the motion grows; below it is round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +41,18 @@ class Servo(Immutable):
     """The tool of a machine with its servo loops closed.
 
     Attributes:
-        state: of the machine.
-        status: of the pose.
+        state: the state of the machine.
+        status: the status of the pose.
         message: the answer in a sentence or two.
-        loops: with their machine; None without an answer.
+        loops: the machine with its servo loops; None without an answer.
         standing: free stiffness with motors that stand still, by component, N/m or N·m/rad.
-        static: free stiffness at 0 Hz with the loops closed.
-        least: least free stiffness over the frequencies of the response, and where it is, Hz.
-        poles: rad/s.
-        stable: whether all of them decay.
-        slowest: frequency (Hz) and damping ratio of the least damped one; None where none swings.
-        assumed: whether nothing is said of the machine's own damping, so that it is a usual one.
-        direction: in which the tool is pushed for the response; empty for x, y and z.
+        static: free stiffness at 0 Hz with the loops closed, by component, N/m or N·m/rad.
+        least: for each component, the least free stiffness over the frequencies of the response, and its frequency, Hz.
+        poles: poles of the closed loops, rad/s.
+        stable: whether all poles decay.
+        slowest: frequency (Hz) and damping ratio of the least damped pole; None if none oscillates.
+        assumed: whether the file says nothing of the machine's own damping, so that a usual one is assumed.
+        direction: direction in which the tool is pushed for the response; empty for x, y and z.
     """
 
     state: MachineState
@@ -86,7 +87,7 @@ class Servo(Immutable):
         if self.loops is None:
             return np.zeros(0)
         known = self.loops.modes.frequencies
-        return np.geomspace(RANGE[0] * known[0], RANGE[1] * known[min(5, len(known) - 1)], POINTS)
+        return np.geomspace(CURVE_RANGE[0] * known[0], CURVE_RANGE[1] * known[min(5, len(known) - 1)], CURVE_POINTS)
 
     @checked
     def receptance(self, frequencies: Sequence[float]) -> Complex:
@@ -115,8 +116,8 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
         along: direction in which the tool is pushed for the response, base axes; x, y and z if empty.
 
     Raises:
-        InputError: nothing says the gains, rotors have no inertia, an actuator has no stiffness of its transmission,
-            nothing says a mass, or the direction is zero.
+        InputError: a gain is zero, rotors have no inertia, a transmission is rigid, no mass is given, or the direction
+            is zero.
     """
     state = state_of(machine)
     direction = tuple(unit_direction(along, "along")) if along else ()
@@ -153,18 +154,19 @@ def _loops(state: MachineState) -> dict[str, ServoLoop]:
             )
         square = float(rotor_turns(spring, drives)) ** 2
         loops[spring.of] = ServoLoop(
-            stiffness,
-            square * drives.rotor_inertia,
-            square * drives.rotor_damping,
-            square * table.velocity_gain,
-            table.position_gain,
-            table.integral_time,
-            table.position_at_load,
+            transmission=stiffness,
+            inertia=square * drives.rotor_inertia,
+            friction=square * drives.rotor_damping,
+            velocity_gain=square * table.velocity_gain,
+            position_gain=table.position_gain,
+            integral_time=table.integral_time,
+            at_load=table.position_at_load,
         )
     return loops
 
 
 def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoop]) -> Servo:
+    """The answer for a machine whose modes with motors that stand still are known; `named`: loops by actuator."""
     solution, damping = vibration.solution, vibration.damping
     if solution is None or damping is None:
         raise ValueError("a vibration without modes has no loops")
@@ -172,7 +174,7 @@ def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoo
     parts = list(state.machine.family.components)
     still = solution.tool @ solution.tool.T
     poles = closed.poles()
-    stable = bool((poles.real <= GROWS * np.abs(poles)).all())
+    stable = bool((poles.real <= UNSTABLE_REAL_PART * np.abs(poles)).all())
     answer = Servo(
         state,
         Status.OK,
@@ -192,7 +194,7 @@ def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoo
 
 
 def _free_stiffness(compliance: Array, still: Array, parts: Sequence[int]) -> tuple[float, ...]:
-    """The reciprocals of a diagonal [6 x 6]; infinite where it is round-off beside that of motors that stand still."""
+    """Reciprocals of a diagonal [6 x 6]; infinite if it is round-off beside that with motors that stand still."""
     pairs = [(float(compliance[i, i]), float(still[i, i])) for i in parts]
     return tuple(math.inf if abs(soft) <= UNFELT * least else 1.0 / soft for soft, least in pairs)
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kinetostat.studies.identification.identification import Identification
-from kinetostat.studies.identification.measurements import EULER, TURNED
+from kinetostat.studies.identification.measurements import EULER, ROTATION
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title, slim_bar
@@ -46,7 +46,7 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
     """
     fit, seen = answer.fit, answer.observed
     names = np.array([name.removeprefix("deflection.") for name in seen.names])
-    turns = np.isin(names, (*TURNED, *EULER))
+    turns = np.isin(names, (*ROTATION, *EULER))
     parts = [(rows, unit) for rows, unit in ((~turns, "m"), (turns, "rad")) if rows.any()]
     lines = np.array(seen.data.lines)[seen.pose]
     with mpl.rc_context(STYLE):

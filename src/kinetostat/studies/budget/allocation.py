@@ -1,7 +1,7 @@
 """Tolerances of least cost for a wanted error: which lines of [tolerances] to tighten, and which to loosen.
 
-Making a number costs its cost over its tolerance, in units of what its tolerance is now: half of the tolerance costs
-twice as much. All numbers of a line change together, by one factor.
+The cost of a toleranced number is inversely proportional to its tolerance: half of the tolerance costs twice as much.
+All numbers of a line change together, by one factor.
 
 Source: theory (54).
 """
@@ -18,9 +18,9 @@ from kinetostat.studies.budget.spread import Measures
 from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart
 
 MOST_DECIDING_POSES = 40
-"""Poses that decide an allocation together: each is added because it exceeds the wanted error."""
+"""Greatest number of poses that decide an allocation together: each is added because it exceeds the wanted error."""
 ALLOWED_EXCESS = 1e-9
-"""Share of the wanted error by which a pose may exceed it: round-off of the search."""
+"""Share of the wanted error by which a pose may exceed it by round-off of the search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +28,14 @@ class Allocation(Immutable):
     """Tolerances of least cost.
 
     Attributes:
-        measure: what is kept, "position" or "along".
-        by: "rss" or "worst".
-        wanted: the error that is kept, m.
-        present: that of the present tolerances, m: at the pose where it is largest.
-        lines: what each line is about.
-        factors: by which the tolerances of each line change; infinite where they have no effect.
-        costs: of each line as it is now; with a factor f it is costs / f.
-        cost, before: sums of costs with the new and the present tolerances.
+        measure: the error that is limited, "position" or "along".
+        by: how errors add up, "rss" or "worst".
+        wanted: the error that is not exceeded, m.
+        present: the error with the present tolerances, m, at the pose where it is largest.
+        lines: the subject of each line.
+        factors: factors of the tolerances of each line; infinite if they have no effect.
+        costs: present cost of each line; with a factor f it is costs / f.
+        cost, before: sum of the costs with the new and with the present tolerances.
         evenly: cost of the same error if all tolerances change by one factor.
     """
 
@@ -52,9 +52,9 @@ class Allocation(Immutable):
 
 
 def reach_of(inputs: RandomInputs, measures: Measures, measure: str) -> dict[str, Array]:
-    """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add them up.
+    """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add errors up.
 
-    A joint that a load presses counts with its whole clearance.
+    A joint that a load presses to one side counts with its whole clearance.
     """
     rows = measures.linear(inputs.columns)[:, measures.places(measure)]
     squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[:, inputs.owner], 4.0, 1.0)
@@ -73,18 +73,18 @@ def allocation_for(
     """Find the factors of all lines that keep an error at least cost, theory (54).
 
     Args:
-        parts: what has a tolerance.
-        reach: see `reach_of`, of all poses together.
-        wanted: error, m.
+        parts: the parts that have a tolerance.
+        reach: the results of `reach_of` for all poses.
+        wanted: the error that is not to be exceeded, m.
         by: "rss", the root of the sum of squares, or "worst", the sum of all.
-        measure: which error it is.
+        measure: the error that is limited, "position" or "along".
     """
     lines = list(dict.fromkeys(part.line for part in parts))
     owner = np.array([lines.index(part.line) for part in parts])
-    each = np.concatenate([table[by] for table in reach])
+    reaches = np.concatenate([table[by] for table in reach])
     power = 2 if by == "rss" else 1
-    weights = np.zeros((len(each), len(lines)))
-    np.add.at(weights.T, owner, each.T)
+    weights = np.zeros((len(reaches), len(lines)))
+    np.add.at(weights.T, owner, reaches.T)
     weights = weights / wanted**power
     costs = np.bincount(owner, [part.cost for part in parts], len(lines)).astype(float)
     moves = weights.max(axis=0) > 0.0
@@ -94,23 +94,23 @@ def allocation_for(
         factors[moves] = _least_cost(weights[:, moves], costs[moves], power)
     even = present ** (-1.0 / power) if present else np.inf
     return Allocation(
-        measure,
-        by,
-        wanted,
-        wanted * present ** (1.0 / power),
-        tuple(lines),
-        factors,
-        costs,
-        float((costs / factors).sum()),
-        float(costs.sum()),
-        float(costs.sum() / even),
+        measure=measure,
+        by=by,
+        wanted=wanted,
+        present=wanted * present ** (1.0 / power),
+        lines=tuple(lines),
+        factors=factors,
+        costs=costs,
+        cost=float((costs / factors).sum()),
+        before=float(costs.sum()),
+        evenly=float(costs.sum() / even),
     )
 
 
 def _least_cost(weights: Array, costs: Array, power: int) -> Array:
-    """The factors f of least sum of costs / f with sum of weights f^power at most 1 at each pose [lines].
+    """The factors f with the least sum of costs / f, and sum of weights f^power at most 1 at each pose [lines].
 
-    Poses are taken in as they exceed the error: most of them decide nothing.
+    A pose is added when it exceeds the wanted error, because most poses decide nothing.
     """
     chosen = [int(weights.sum(axis=1).argmax())]
     for _ in range(MOST_DECIDING_POSES):
@@ -126,7 +126,7 @@ def _least_cost(weights: Array, costs: Array, power: int) -> Array:
 
 
 def _closed_form(weights: Array, costs: Array, power: int) -> Array:
-    """The factors at a single pose, by a multiplier of Lagrange; infinite where a line has no effect there."""
+    """The factors that suit a single pose, by a Lagrange multiplier; infinite for a line that has no effect there."""
     with np.errstate(divide="ignore"):
         shape = np.where(weights > 0.0, (costs / weights) ** (1.0 / (power + 1.0)), np.inf)
     known = weights > 0.0
@@ -134,7 +134,7 @@ def _closed_form(weights: Array, costs: Array, power: int) -> Array:
 
 
 def _search(weights: Array, costs: Array, power: int) -> Array:
-    """The factors at several poses: a convex problem in their logarithms."""
+    """The factors that suit several poses: a convex problem in their logarithms."""
 
     def cost(logarithms: Array) -> tuple[float, Array]:
         parts = costs * np.exp(-logarithms)

@@ -18,7 +18,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, positive
 from kinetostat.studies.identification.fit import Fit, Tell, Wishes, best_fit
-from kinetostat.studies.identification.measurements import EULER, TURNED, Measurements, Sigmas, read_measurements
+from kinetostat.studies.identification.measurements import EULER, ROTATION, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import (
     MOST_PROPOSED,
     NextPoses,
@@ -106,7 +106,7 @@ class Identification:
             residuals: in standard deviations [rows].
         """
         fit, off = self.fit, residuals * self.observed.sigma
-        turns = np.array([name.removeprefix("deflection.") in (*TURNED, *EULER) for name in self.observed.names])
+        turns = np.array([name.removeprefix("deflection.") in (*ROTATION, *EULER) for name in self.observed.names])
         kinds = {"length": fit.kept & ~turns, "angle": fit.kept & turns}
         return {kind: float(np.sqrt((off[rows] ** 2).mean())) for kind, rows in kinds.items() if rows.any()}
 
@@ -191,7 +191,7 @@ def identification_of(
     for name, terms in (ties or {}).items():
         tied, shares[name] = _tied_error(model, name, terms)
         unknowns.append(tied)
-    turned = any(name in (*TURNED, *EULER) for name in data.values)
+    turned = any(name in (*ROTATION, *EULER) for name in data.values)
     places = [
         *(FRAME_UNKNOWNS if frame else ()),
         *(TARGET_UNKNOWNS if target and turned else TARGET_UNKNOWNS[3:] if target else ()),

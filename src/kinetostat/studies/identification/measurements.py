@@ -1,7 +1,8 @@
 """Measured poses, distances and deflections of a machine from a CSV file: every value is checked, nothing is fitted.
 
-A line of names, then a line for each pose. Columns named like coordinates of the pose or actuators say what was
-commanded; `measured.x` and so on what was measured, `deflection.x` what a wrench moved, `sigma.x` how surely.
+The file has a line of names and then a line for each pose. Columns named after coordinates of the pose or after
+actuators have the commanded values; `measured.x` and so on have measured positions and angles, `deflection.x` measured
+deflections under a wrench, and `sigma.x` the standard deviations of all of these.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,37 +20,38 @@ from kinetostat.spec.fields import Quantity, quantities
 from kinetostat.studies.poses import GivenColumn, columns_of, read_columns
 from kinetostat.units import UnitError
 
-POSITION, TURNED, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
+POSITION, ROTATION, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
 MEASURED = {
     **dict.fromkeys((*POSITION, "distance"), "length"),
-    **dict.fromkeys((*TURNED, *EULER), "angle"),
+    **dict.fromkeys((*ROTATION, *EULER), "angle"),
 }
 """Quantities that can be measured of a pose, with their kinds: position of the target, its rotation vector or its
 roll, pitch and yaw, and its distance from a fixed point."""
-MOVED = {**dict.fromkeys(POSITION, "length"), **dict.fromkeys(TURNED, "angle")}
+DEFLECTED = {**dict.fromkeys(POSITION, "length"), **dict.fromkeys(ROTATION, "angle")}
 """Quantities that can be measured of a deflection, with their kinds."""
 WRENCH_COLUMNS = {f"moment.{name}": "moment" for name in POSITION} | {f"force.{name}": "force" for name in POSITION}
 COLUMN_GROUPS: dict[str, Mapping[str, str]] = {
     "measured": MEASURED,
-    "deflection": MOVED,
+    "deflection": DEFLECTED,
     "from": dict.fromkeys(POSITION, "length"),
-    "sigma": {**MEASURED, **{f"deflection.{name}": kind for name, kind in MOVED.items()}},
+    "sigma": {**MEASURED, **{f"deflection.{name}": kind for name, kind in DEFLECTED.items()}},
 }
 """Columns by the word before their first dot, with the kinds of their quantities."""
 HALF_TURN = np.pi * (1.0 + 1e-9)
+"""Largest angle that an orientation has, with some room for round-off, rad."""
 MOST_MEASURED_POSES = 10_000
-"""Poses that are fitted at once."""
+"""Greatest number of poses in a file."""
 FARTHEST_POSITION = 0.5
 """Share of the machine's length by which a measured position may differ from the commanded one in a known frame."""
 
 
 @dataclass(frozen=True)
 class Sigmas:
-    """Standard deviations of measured values where the file gives none.
+    """Standard deviations of measured values for which the file gives none.
 
     Attributes:
-        length: m.
-        angle: rad.
+        length: that of lengths, m.
+        angle: that of angles, rad.
         known: whether they were given; if not, only their ratio counts.
     """
 
@@ -63,13 +65,13 @@ class Measurements:
     """Commanded poses and measured values, n of them; NaN where a cell is empty.
 
     Attributes:
-        path: of the file.
-        lines: numbers of its lines [n].
+        path: path of the file.
+        lines: number of the line of each pose [n].
         pose: commanded coordinates by leaf path, SI [n].
-        values: measured ones by name, "x", "distance", "deflection.x", SI [n].
-        sigma: their standard deviations, SI [n].
-        wrenches: on the tool, base axes, N·m and N [n x 6].
-        origins: from which distances are measured, m [n x 3].
+        values: measured values by name, "x", "distance", "deflection.x", SI [n].
+        sigma: standard deviations of the measured values by the same names, SI [n].
+        wrenches: wrenches on the tool, base axes, N·m and N [n x 6].
+        origins: points from which distances are measured, m [n x 3].
         known: whether the standard deviations are known, not only their ratios.
     """
 
@@ -95,22 +97,22 @@ class Measurements:
         """Whether any wrench acts."""
         return bool(self.wrenches.any())
 
-    def refusal(self, row: int, what: str) -> InputError:
+    def refusal(self, row: int, mistake: str) -> InputError:
         """The message about a mistake at a pose, with file and line."""
-        return InputError(f'"{self.path}", line {self.lines[row]}: {what}')
+        return InputError(f'"{self.path}", line {self.lines[row]}: {mistake}')
 
 
 def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measurements:
     """Read measurements from a CSV file.
 
     Args:
-        machine: that was measured.
-        path: of the file.
-        sigmas: standard deviations where the file has no column for them.
+        machine: the machine that was measured.
+        path: path of the file.
+        sigmas: standard deviations of values for which the file gives none.
 
     Raises:
-        InputError: the file cannot be read, a column is unknown or missing, or a value is of the wrong kind or beyond
-            what it can be; the message names file, line and column.
+        InputError: the file cannot be read, a column is unknown or missing, or a value is of the wrong kind or out of
+            its range; the message names file, line and column.
     """
     columns, lines = columns_of(path, MOST_MEASURED_POSES)
 
@@ -135,7 +137,7 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
             names = ", ".join(name.removeprefix(POSE) for name in _pose_names(machine))
             raise InputError(f"no column says what was commanded; add columns of the pose ({names}) or actuator.NAME.")
         numbers = {
-            group: {_inner(column): _numbers(column, COLUMN_GROUPS[group], where) for column in entries}
+            group: {_name_in_group(column): _numbers(column, COLUMN_GROUPS[group], where) for column in entries}
             for group, entries in sorted_columns.items()
             if group in COLUMN_GROUPS
         }
@@ -150,13 +152,14 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
 
 
 def _by_group(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
-    """The columns by what they are about."""
+    """The columns by their group: a key of `COLUMN_GROUPS`, "actuator", "wrench", or "" for coordinates of the pose."""
     result: dict[str, list[GivenColumn]] = {}
     for column in columns:
         head, _, rest = column.name.partition(".")
-        group = (
-            head if rest and head in (*COLUMN_GROUPS, "actuator") else "wrench" if column.name in WRENCH_COLUMNS else ""
-        )
+        if rest and head in (*COLUMN_GROUPS, "actuator"):
+            group = head
+        else:
+            group = "wrench" if column.name in WRENCH_COLUMNS else ""
         if group in COLUMN_GROUPS and rest not in COLUMN_GROUPS[group]:
             allowed = ", ".join(f"{group}.{name}" for name in COLUMN_GROUPS[group])
             raise InputError(f"there is no column {column.name}; choose from {allowed}.")
@@ -164,7 +167,8 @@ def _by_group(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
     return result
 
 
-def _inner(column: GivenColumn) -> str:
+def _name_in_group(column: GivenColumn) -> str:
+    """The name of a column after its first dot."""
     return column.name.partition(".")[2]
 
 
@@ -173,16 +177,16 @@ def _pose_names(machine: Machine) -> list[str]:
 
 
 def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
-    """A column of measured values, SI, NaN where a cell is empty."""
-    kind, result = kinds[name or _inner(column)], np.full(len(column.entries), np.nan)
+    """The values of a column, SI, NaN where a cell is empty; `kinds` has their kinds by name."""
+    kind, result = kinds[name or _name_in_group(column)], np.full(len(column.entries), np.nan)
     bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
     for row, entry in enumerate(column.entries):
         text = str(entry).strip()
         if not text:
             continue
         try:
-            plain = (column.unit and text[-1].isdecimal()) or text.endswith(".")
-            result[row] = bounds.number(f"{text} {column.unit}" if plain else text)
+            without_unit = (column.unit and text[-1].isdecimal()) or text.endswith(".")
+            result[row] = bounds.number(f"{text} {column.unit}" if without_unit else text)
         except UnitError as error:
             raise InputError(f"{where(column.name, row)} is {shorten(text)}: {error}.") from None
         if kind == "angle" and not column.name.startswith("sigma") and abs(result[row]) > HALF_TURN:
@@ -201,6 +205,7 @@ def _measurements(
     wrench: Mapping[str, Array],
     sigmas: Sigmas,
 ) -> Measurements:
+    """The measurements by the numbers of each group of columns, checked against each other."""
     count = len(lines)
     values = dict(numbers.get("measured", {}))
     values |= {f"deflection.{name}": entries for name, entries in numbers.get("deflection", {}).items()}
@@ -209,7 +214,7 @@ def _measurements(
             "no column says what was measured; add columns such as measured.x [mm], measured.rx [deg], "
             "measured.distance [mm] or deflection.z [um]."
         )
-    if set(TURNED) & values.keys() and set(EULER) & values.keys():
+    if set(ROTATION) & values.keys() and set(EULER) & values.keys():
         raise InputError(
             "orientations are given both as rx, ry, rz and as roll, pitch, yaw; keep the ones or the others."
         )
@@ -223,7 +228,7 @@ def _measurements(
         _sigma(values, numbers.get("sigma", {}), sigmas),
         wrenches,
         origins,
-        sigmas.known or _all_sure(values, numbers.get("sigma", {})),
+        sigmas.known or _have_sigmas(values, numbers.get("sigma", {})),
     )
     for name, entries in values.items():
         rows = np.flatnonzero(np.isfinite(entries))
@@ -236,8 +241,8 @@ def _measurements(
     return result
 
 
-def _all_sure(values: Mapping[str, Array], given: Mapping[str, Array]) -> bool:
-    """Whether the file says of every measured value how sure it is."""
+def _have_sigmas(values: Mapping[str, Array], given: Mapping[str, Array]) -> bool:
+    """Whether the file gives a standard deviation for every measured value."""
     return all(name in given and np.isfinite(given[name][np.isfinite(v)]).all() for name, v in values.items())
 
 
@@ -260,7 +265,7 @@ def _from_actuators(
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
     names = {key: n for n, a in enumerate(system.actuators) for key in (a.name, a.leg)}
     for column in columns:
-        name = _inner(column)
+        name = _name_in_group(column)
         if name not in names:
             known = ", ".join(f"actuator.{actuator.leg}" for actuator in system.actuators)
             raise InputError(f"there is no column {column.name}; choose from {known}.")

@@ -16,12 +16,12 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
-from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, TURNED, Measurements
+from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, ROTATION, Measurements
 
 ANGLE_STEP = 1e-5
 """Of central differences of angles by small rotations, rad: what they leave out is its square."""
-FRAME_UNKNOWNS = tuple(f"frame.{name}" for name in (*TURNED, *POSITION))
-TARGET_UNKNOWNS = tuple(f"target.{name}" for name in (*TURNED, *POSITION))
+FRAME_UNKNOWNS = tuple(f"frame.{name}" for name in (*ROTATION, *POSITION))
+TARGET_UNKNOWNS = tuple(f"target.{name}" for name in (*ROTATION, *POSITION))
 """Unknown places of the measuring frame in the base frame, and of the target from the tool point in platform axes."""
 PLACES = {"frame": "place of the measuring frame in the base frame", "target": "place of the target on the platform"}
 
@@ -29,7 +29,7 @@ PLACES = {"frame": "place of the measuring frame in the base frame", "target": "
 def place_unknown(path: str) -> MachineError:
     """An unknown of the measuring frame or the target, described as errors are."""
     what, name = path.split(".")
-    turns = name in TURNED
+    turns = name in ROTATION
     words = f"{PLACES[what]}, {'turn about' if turns else 'shift along'} {name[-1]}"
     return MachineError(path, "angle" if turns else "length", what, words, "")
 
@@ -65,7 +65,7 @@ class Observation:
     @property
     def turns(self) -> Mask:
         """Flags of the rows that are angles [rows]."""
-        return np.isin([name.removeprefix("deflection.") for name in self.names], (*TURNED, *EULER))
+        return np.isin([name.removeprefix("deflection.") for name in self.names], (*ROTATION, *EULER))
 
     def residuals(self, values: Array) -> Array:
         """Measured values less those that the unknowns predict, over the standard deviations [rows].
@@ -137,19 +137,19 @@ class Observation:
         moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), arm[:, None]), 1, 2)
         unit = np.eye(3)
         paths = [unknown.path for unknown in self.unknowns]
-        for name, path in zip((*TURNED, *POSITION), FRAME_UNKNOWNS, strict=True):
+        for name, path in zip((*ROTATION, *POSITION), FRAME_UNKNOWNS, strict=True):
             if path in paths:
                 axis = unit["xyz".index(name[-1])]
-                if name in TURNED:
+                if name in ROTATION:
                     way = exponential(np.array([[*frame[:3], *axis]])).translation[0]
                     turning[:, :, paths.index(path)] = -way
                     moving[:, :, paths.index(path)] = -np.cross(way, at)
                 else:
                     moving[:, :, paths.index(path)] = -axis
-        for name, path in zip((*TURNED, *POSITION), TARGET_UNKNOWNS, strict=True):
+        for name, path in zip((*ROTATION, *POSITION), TARGET_UNKNOWNS, strict=True):
             if path in paths:
                 axis = unit["xyz".index(name[-1])]
-                if name in TURNED:
+                if name in ROTATION:
                     way = exponential(np.array([[*target[:3], *axis]])).translation[0]
                     turning[:, :, paths.index(path)] = turned @ way
                 else:
@@ -161,17 +161,17 @@ class Observation:
         angles = _angles(seen.rotation)
         away = np.linalg.norm(seen.translation - self.data.origins, axis=1)
         columns = {name: seen.translation[:, i] for i, name in enumerate(POSITION)}
-        columns |= {name: angles[:, i] for i, name in enumerate((*TURNED, *EULER))} | {"distance": away}
-        columns |= {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*TURNED, *POSITION))}
+        columns |= {name: angles[:, i] for i, name in enumerate((*ROTATION, *EULER))} | {"distance": away}
+        columns |= {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
         return np.array([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
 
     def _rates(self, seen: Motions, rates: Array, soft: Array) -> Array:
         """Rates of every measured value [rows x unknowns]."""
         wanted = {*self.names}
         columns: dict[str, Array] = {name: rates[:, 3 + i] for i, name in enumerate(POSITION)}
-        if wanted & {*TURNED, *EULER}:
+        if wanted & {*ROTATION, *EULER}:
             by_turn = _angle_rates(seen.rotation) @ rates[:, :3]
-            columns |= {name: by_turn[:, i] for i, name in enumerate((*TURNED, *EULER))}
+            columns |= {name: by_turn[:, i] for i, name in enumerate((*ROTATION, *EULER))}
         if "distance" in wanted:
             way = seen.translation - self.data.origins
             way = way / np.linalg.norm(way, axis=1)[:, None]
@@ -179,7 +179,7 @@ class Observation:
         if any(name.startswith("deflection") for name in wanted):
             first = len(self.model.errors) - soft.shape[2]
             by_spring = soft @ self.members[first:]
-            columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*TURNED, *POSITION))}
+            columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
         return np.stack([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
 
 
