@@ -8,6 +8,7 @@ import pytest
 
 from kinetostat import budget, build, command, elevation, load, under_load
 from kinetostat.accuracy.model import error_model
+from kinetostat.cli import main
 from kinetostat.engine.machine_functions import functions_of
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.vibration import modes
@@ -140,3 +141,35 @@ def test_its_programs_are_those_of_the_free_machine_where_bearings_close_loops(t
 def test_without_gravity_nothing_turns(telescope):
     with pytest.raises(InputError, match="no gravity"):
         elevation(telescope.with_values({"load.gravity.2": 0.0}))
+
+
+def test_the_softest_direction_at_rest_is_made_by_what_is_named(telescope):
+    """A part with a share of 29 % of the softness, one percent stiffer, takes 0.29 percent of it away."""
+    state = under_load(telescope)
+    direction = state.softest["translation"]
+    assert direction.stiffness == pytest.approx(1.0 / state.compliance[5][5], rel=1e-9)
+    kinds = dict(direction.kinds)
+    assert sum(share for _, share in direction.shares) == pytest.approx(1.0)
+    stiffer = build(Path(TELESCOPE).read_text().replace("screw 420 N/um", "screw 424.2 N/um"))
+    gain = under_load(stiffer).compliance[5][5] / state.compliance[5][5] - 1.0
+    assert kinds["drive screw ×6"] == pytest.approx(-gain * 1.01 / 0.01, rel=1e-3)
+
+
+def test_under_load_the_answer_comes_first_and_springs_by_kind(capsys):
+    assert main(["analyze", TELESCOPE]) == 0
+    answer = capsys.readouterr().out
+    heads = [line.split()[0] for line in answer.splitlines()[1:] if line[:1].isalpha()]
+    assert heads[:6] == ["Pose", "Stiffness", "Softest", "Sag", "Actuators", "Stability"]
+    assert "22.1 % of" in answer
+    assert "drive screw ×6" in answer
+    assert "leg 3 drive screw " not in answer
+    assert "A load is positive where it pulls" in answer
+    assert main(["analyze", TELESCOPE, "--full"]) == 0
+    assert "leg 3 drive screw " in capsys.readouterr().out
+
+
+def test_it_is_said_that_nothing_loads_a_machine(capsys):
+    assert main(["analyze", "hexapod", "--loaded"]) == 0
+    answer = capsys.readouterr().out
+    assert "Nothing loads the machine" in answer
+    assert "Stability" not in answer

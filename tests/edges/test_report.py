@@ -320,10 +320,13 @@ def test_a_machine_meant_under_load_has_a_section_of_it(tmp_path, capsys):
     assert f"Under load, ok: {state['message']}" in page.text
     moved = page.table("Displacement of the tool point")
     assert [number(cell) for cell in moved[1][1:]] == pytest.approx([1e6 * u for u in state["displacement"]], rel=1e-3)
-    springs = page.table("Load and deformation of every spring")[1:]
+    springs = page.table("Loads and deformations of the springs")[1:]
     assert [number(row[1].split()[0]) for row in springs] == pytest.approx(
         [spring["load"] for spring in state["springs"]], rel=1e-3
     )
+    demanded = {row[0]: row[1:] for row in page.table("The machine under its loads, and what its file demands")[1:]}
+    assert demanded["displacement of the tool"][1] == "no requirement"
+    assert demanded["greatest force of an actuator"][1].startswith("at most 500 N")
     heads, *rows = page.table("Stiffness that further loads meet")
     assert heads[1:] == ["1/C under load", "1/C free state", "K under load", "of springs", "K free state"]
     assert number(rows[5][3]) == pytest.approx(state["tangent_stiffness"][5][5] * 1e-6, rel=1e-3)
@@ -338,7 +341,7 @@ def test_loads_without_rest_are_said_in_the_report(tmp_path):
     words = ["--set", "load.force=[0, 0, -2e9]", "--set", "limits.actuator_force=none", "--loaded"]
     page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, *words))
     assert "Under load, no rest: 6-UPS hexapod (stewart-simscape) comes to no rest" in page.text
-    assert not any(caption.startswith("Load and deformation of every") for caption in page.tables)
+    assert not any(caption.startswith("Loads and deformations of") for caption in page.tables)
 
 
 def test_a_machine_with_a_heavy_platform_has_a_section_of_its_vibrations(tmp_path):

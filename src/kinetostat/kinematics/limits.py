@@ -90,6 +90,13 @@ def load_checks(
     return _checks(machine, rows, parts_of(machine, configuration, (), actuators), configuration.length)
 
 
+def limit_use(
+    machine: Machine, configuration: Configuration, actuators: Sequence[tuple[Spring, Scalar]]
+) -> list[Scalar]:
+    """What each load of an actuator is of its limit; empty where the file limits none. Arguments of `load_checks`."""
+    return [check.measure / check.bound for check in load_checks(machine, configuration, actuators)]
+
+
 def parts_of(
     machine: Machine,
     configuration: Configuration,

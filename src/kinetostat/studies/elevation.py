@@ -26,7 +26,7 @@ from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.numbers import loaded_numbers
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.limits import load_checks
+from kinetostat.kinematics.limits import limit_use
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.feasible import lost_motion
 from kinetostat.machine.loading import changed
@@ -242,10 +242,8 @@ def _message(statuses: Integers, elevations: Array, machine: Machine) -> str:
 def _limit_use(states: MachineState, loads: Array) -> Array:
     """The greatest share that any actuator uses of its limit at each elevation; NaN where nothing is limited [n]."""
     pairs = [(spring, np.abs(load)) for spring, load in zip(states.mechanism.driven, loads.T, strict=True)]
-    checks = load_checks(states.machine, states.configuration, pairs)
-    if not checks:
-        return np.full(len(loads), np.nan)
-    return np.max([np.asarray(check.measure / check.bound, dtype=float) for check in checks], axis=0)
+    shares = limit_use(states.machine, states.configuration, pairs)
+    return np.max(np.array(shares, dtype=float), axis=0) if shares else np.full(len(loads), np.nan)
 
 
 def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reversal, ...]:

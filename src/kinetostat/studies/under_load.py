@@ -5,6 +5,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,16 +22,18 @@ from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
+from kinetostat.kinematics.limits import Check, limit_use, load_checks, why_beyond, within
 from kinetostat.kinematics.mobility import describe
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
+from kinetostat.kinetostatics.indices import free_stiffnesses
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import About
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.rounding import clean_matrix, clean_screw
+from kinetostat.studies.attribution import Softest, softest
+from kinetostat.studies.rounding import clean_matrix, clean_screw, clean_statics
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
@@ -112,8 +115,44 @@ class LoadedState(Immutable):
         """The machine, at the pose that it has without loads."""
         return self.state.machine
 
+    @property
+    def loaded(self) -> bool:
+        """Whether anything loads the machine: its tool moves, or a spring carries something."""
+        return any(self.displacement) or any(spring.load for spring in self.springs)
+
+    @property
+    def limit_use(self) -> float | None:
+        """Greatest share that any actuator uses of the limit of its load; None where the file limits none."""
+        state = self.state
+        return max(map(float, limit_use(state.machine, state.configuration, state.actuator_loads)), default=None)
+
+    @property
+    def softest(self) -> dict[str, Softest]:
+        """Of "translation" and "rotation", the direction in which further loads meet the least stiffness.
+
+        What makes it soft are the shares of the parts in the compliance that springs alone have along this direction
+        at the unloaded pose; none where they do not hold the machine.
+        """
+        if self.compliance is None:
+            return {}
+        free = self.state.free
+        if int(free.status) not in (Status.OK, Status.JOINT_LIMIT):
+            known, statics = [], replace(free.statics, flexibility=(), compliance=())
+        else:
+            known, statics = springs(free.configuration), clean_statics(free.statics)
+        blocks = free_stiffnesses(self.tangent, self.compliance, self.machine.family.components) or {}
+        weakest = {name: softest(block, name, known, statics) for name, block in blocks.items()}
+        return {name: _whole_shares(direction) for name, direction in weakest.items() if direction is not None}
+
     def __repr__(self) -> str:
         return f"<{self.machine.name!r} under load: {self.rest.word}>"
+
+
+def _whole_shares(direction: Softest) -> Softest:
+    """The direction with shares that add up to 1: those of springs alone, without what tension and weight do."""
+    whole = sum(share for _, share in direction.shares) or 1.0
+    shares, kinds = (tuple((n, share / whole) for n, share in row) for row in (direction.shares, direction.kinds))
+    return replace(direction, shares=shares, kinds=kinds)
 
 
 @checked

@@ -95,18 +95,19 @@ def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
 def _loaded_lines(state: "LoadedState") -> Lines:
     yield "Pose", f"{pose_of(state.machine)}. {state.message}"
     if state.displacement:
-        yield "Stability", loaded.stability_of(state)
+        yield from loaded.loaded_lines(state)
     cables = state.machine.tables["cables"]
     if cables.linear_density or cables.pulley_radius:
         yield "Cables", "Cables are straight here, without weight and pulleys; kinetostat tensions counts both."
 
 
-def _loaded_parts(state: "LoadedState", _full: bool) -> Iterator[Table | str]:
+def _loaded_parts(state: "LoadedState", full: bool) -> Iterator[Table | str]:
     if not state.displacement:
         return
     display = state.machine.display
     yield loaded.displacement_table(state, display)
-    yield loaded.spring_table(state, display)
+    yield loaded.springs_of(state, display, full)
+    yield loaded.SIGNS if state.loaded else ""
     yield loaded.strut_table(state, display)
     yield f"Components {' '.join(state.components)} at the loaded {state.machine.reference}, base axes."
     for title, kind, rows in (
@@ -120,7 +121,7 @@ def _loaded_parts(state: "LoadedState", _full: bool) -> Iterator[Table | str]:
 
 def _filled_parts(parts: Iterator[Table | str]) -> list[Table | str]:
     """Sentences, and the tables that have a row."""
-    return [part for part in parts if isinstance(part, str) or part.row_count]
+    return [part for part in parts if part and (isinstance(part, str) or part.row_count)]
 
 
 def _pose(analysis: Analysis) -> dict[str, Any]:

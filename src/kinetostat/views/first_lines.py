@@ -4,10 +4,11 @@ Nothing is computed but 1/C and lengths of vectors; every view that begins with 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.display import Display
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import Softest, largest_contributors
 from kinetostat.studies.loads import LoadCase
@@ -21,14 +22,10 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     pose = pose_of(analysis.machine)
     lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
     if analysis.compliance_diagonal:
-        lines.append(
-            (
-                "Stiffness",
-                f"{_stiffnesses(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes).",
-            )
-        )
+        felt = stiffness_sentence(analysis.components, analysis.compliance_diagonal, analysis.machine.display)
+        lines.append(("Stiffness", f"{felt} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
     if analysis.softest:
-        lines.append(("Softest", "; ".join(_softest(analysis)) + "."))
+        lines.append(("Softest", softest_sentence(analysis.softest, analysis.machine.display)))
     if analysis.singularity_margin is not None:
         lines.append(("Margin", margins(analysis)))
     if analysis.load:
@@ -44,14 +41,19 @@ def margins(analysis: Analysis) -> str:
     return f"Singularity margin {least} (0 singular, 1 best): legs {legs}, platform {platform}."
 
 
-def _stiffnesses(analysis: Analysis) -> str:
-    """Say what stiffness a tool feels along and about each axis, with all other motions free to follow."""
-    display = analysis.machine.display
+def stiffness_sentence(components: Sequence[str], compliances: Sequence[float], display: Display) -> str:
+    """Say what stiffness a tool feels along and about each axis, with all other motions free to follow.
+
+    Args:
+        components: names of the diagonal entries of C.
+        compliances: these entries, SI.
+        display: units and digits.
+    """
     sentences = []
     for _, word, unit in BLOCKS:
         of_block = [
             (name, compliance)
-            for name, compliance in zip(analysis.components, analysis.compliance_diagonal, strict=True)
+            for name, compliance in zip(components, compliances, strict=True)
             if (name in COMPONENTS[:3]) == (word == "about")
         ]
         values = [f"{name[-1]} {display.number(reciprocal(c), unit, 'rigid')}" for name, c in of_block]
@@ -59,11 +61,14 @@ def _stiffnesses(analysis: Analysis) -> str:
     return "; ".join(sentences)
 
 
-def _softest(analysis: Analysis) -> Iterator[str]:
+def softest_sentence(softest: Mapping[str, Softest], display: Display) -> str:
     """Say for forces and for moments in which direction the machine is softest, how soft, and what makes it so."""
-    display = analysis.machine.display
+    return "; ".join(_softest(softest, display)) + "."
+
+
+def _softest(softest: Mapping[str, Softest], display: Display) -> Iterator[str]:
     for block, word, unit in BLOCKS:
-        if (direction := analysis.softest.get(block)) is not None:
+        if (direction := softest.get(block)) is not None:
             stiffness = display.show(direction.stiffness, unit, "rigid") if direction.stiffness else "free"
             yield f"{word} {_where(direction)} {stiffness}{_mainly(direction)}"
 

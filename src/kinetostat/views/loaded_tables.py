@@ -7,9 +7,21 @@ from collections.abc import Sequence
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.under_load import LoadedState, SpringState
+from kinetostat.tolerances import NO_REACTION
 from kinetostat.views.analysis_tables import entry_unit
+from kinetostat.views.first_lines import softest_sentence, stiffness_sentence
 from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Lines
 from kinetostat.views.tables import numeric_table
+
+MOST_LISTED_SPRINGS = 12
+"""Springs that have a row each."""
+NOTHING_LOADS = "[load] has no force, no moment and no preload, and no mass under gravity"
+SIGNS = (
+    "A load is positive where it pulls: of an actuator, cable or link, where it pulls its ends together. Of a bearing "
+    "or flexure it is positive along the axis that the file gives, so that mirrored copies of a leg differ in sign."
+)
+"""Meaning of the signs of loads, which stands beside their tables."""
 
 
 def stability_of(state: LoadedState) -> str:
@@ -29,6 +41,61 @@ def _stability_of_springs(factor: float | None) -> str:
     if factor < 1.0:
         return f"The springs are unstable beyond {number(factor)} times this load."
     return f"The load may grow to {number(factor)} times its size until the springs become unstable."
+
+
+def loaded_lines(state: LoadedState) -> Lines:
+    """Say what a machine at rest does under its loads: stiffness, softest direction, sag, actuators, stability.
+
+    Args:
+        state: at rest.
+    """
+    display, names = state.machine.display, state.components
+    if not state.loaded:
+        yield "Loads", f"Nothing loads the machine: {NOTHING_LOADS}."
+    if state.compliance is not None:
+        felt = stiffness_sentence(names, [row[i] for i, row in enumerate(state.compliance)], display)
+        yield "Stiffness", f"{felt} (against further loads, at the loaded {state.machine.reference}, base axes)."
+    if state.softest:
+        yield "Softest", softest_sentence(state.softest, display)
+    if state.loaded:
+        yield "Sag", sag_sentence(state)
+        yield "Actuators", actuator_sentence(state)
+        yield "Stability", stability_of(state)
+
+
+def sag_sentence(state: LoadedState) -> str:
+    """Say how far the loads move and turn the tool."""
+    show = state.machine.display.show_deflection
+    pairs = [*zip(state.components, state.displacement, strict=True)]
+    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
+    return f"The loads move the {state.machine.reference} by {show(moved, 'm')} and turn it by {show(turned, 'rad')}."
+
+
+def actuator_sentence(state: LoadedState) -> str:
+    """Say which actuators carry most, and how much of their limits they use."""
+    show, parts = state.machine.display.show, []
+    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
+        driven = [(name, load) for name, turning, load in actuator_loads(state) if turning is turns]
+        if driven:
+            name, load = max(driven, key=lambda pair: abs(pair[1]))
+            way = "" if turns or not load else ", which pulls" if load > 0.0 else ", which pushes"
+            parts.append(f"the greatest {what} of an actuator is {show(abs(load), unit)} ({name}{way})")
+    if not parts:
+        return ""
+    text, use = "; ".join(parts), state.limit_use
+    reserve = "the file limits no load of actuators" if use is None else (
+        f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
+    )  # fmt: skip
+    return f"{text[0].upper()}{text[1:]}; {reserve}."
+
+
+def actuator_loads(state: LoadedState) -> list[tuple[str, bool, float]]:
+    """Name, whether it is rotary, and load of each actuator, N or N·m; of several springs in series one counts."""
+    loads: dict[tuple[str, bool], SpringState] = {}
+    for spring in state.springs:
+        if spring.actuated:
+            loads[spring.leg, spring.turning] = loads.get((spring.leg, spring.turning), spring)
+    return [(spring.name, spring.turning, spring.load) for spring in loads.values()]
 
 
 def displacement_table(state: LoadedState, display: Display) -> FittedTable:
@@ -74,6 +141,31 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
         unit = entry_unit("stiffness", name, name)
         cells = (display.number(values[i], unit, "rigid") for values in columns.values())
         table.add_row(display.scale(unit).label(name), *cells)
+    return table
+
+
+def springs_of(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
+    """The table of the springs: each by itself where they are few or `full`, else by kind."""
+    few = len(state.springs) <= MOST_LISTED_SPRINGS
+    return spring_table(state, display) if few or full else _kinds_table(state, display)
+
+
+def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
+    """Least and greatest load and greatest deformation of the springs of each kind, and how many are slack."""
+    kinds: dict[tuple[str, bool], list[SpringState]] = {}
+    for spring in state.springs:
+        kinds.setdefault((spring.name.removeprefix(f"{spring.leg} "), spring.turning), []).append(spring)
+    table = numeric_table("Springs by kind", "spring", ["least load", "greatest load", "deformation", "slack"])
+    most_of = {turns: max((abs(s.load) for s in state.springs if s.turning is turns), default=0.0) for turns in (0, 1)}
+    for (kind, turning), members in kinds.items():
+        loads = [s.load if abs(s.load) > NO_REACTION * most_of[turning] else 0.0 for s in members]
+        ends = (display.show(end, "N·m" if turning else "N") for end in (min(loads), max(loads)))
+        most = max((spring.deformation for spring in members), key=abs)
+        name = f"{kind} ×{len(members)}" if len(members) > 1 else members[0].name
+        slack = sum(spring.slack for spring in members)
+        table.add_row(
+            name, *ends, display.show_deflection(most, "rad" if turning else "m"), str(slack) if slack else DASH
+        )
     return table
 
 

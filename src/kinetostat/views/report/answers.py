@@ -22,7 +22,14 @@ from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
 from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
-from kinetostat.views.loaded_tables import displacement_table, spring_table, stability_of, strut_table, tangent_table
+from kinetostat.views.loaded_tables import (
+    SIGNS,
+    displacement_table,
+    springs_of,
+    stability_of,
+    strut_table,
+    tangent_table,
+)
 from kinetostat.views.measurement_figures import FIT_CAPTIONS
 from kinetostat.views.optimisation import (
     aims,
@@ -137,7 +144,7 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
     yield as_table(moved, f"{moved.title}, with exact geometry and by linear equations; base axes.")
     yield figure_of(bars_figure(state), "What each leg carries.")
-    yield as_table(spring_table(state, display), "Load and deformation of every spring, and whether it carries.")
+    yield as_table(springs_of(state, display), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
         yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
     free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal]

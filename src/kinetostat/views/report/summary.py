@@ -4,10 +4,10 @@ Nothing is computed here but sums of shares.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from kinetostat.display import Display
+from kinetostat.display import Display, number
 from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.fields import NO_LIMIT
@@ -16,9 +16,11 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranking_of
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
+from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.drawing import three_views
 from kinetostat.views.first_lines import first_lines, margins
+from kinetostat.views.loaded_tables import actuator_loads, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
@@ -27,6 +29,8 @@ from kinetostat.views.requirement_lines import headline, requirement_lines
 from kinetostat.views.tables import machine_table
 from kinetostat.views.validation import verdict
 
+LINES_OF_THE_POSE = ("Pose", "Margin")
+"""Lines about the free machine that stand in the summary of a loaded one, whose stiffness is that at rest."""
 MOST_PARTS_NAMED = 2
 """Number of parts that are named in each direction, at most."""
 LEAST_NAMED_SHARE = 0.05
@@ -36,13 +40,56 @@ LEAST_NAMED_SHARE = 0.05
 def summary_section(answers: Answers, validation: Validation | str, portrait: Figure) -> Section:
     """Write the summary, with the requirements and a picture of the machine."""
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
-    answer = [Paragraph(typeset(text), f"{label}:") for label, text in first_lines(answers.analysis)]
     state = answers.of("under_load")
-    answer += [verdict_of(state)] if state else []
+    loaded = state is not None and bool(state.displacement)
+    free = [(label, text) for label, text in first_lines(answers.analysis) if not loaded or label in LINES_OF_THE_POSE]
+    at_rest = [(label, text) for label, text in loaded_lines(state) if label != "Stability"] if loaded else []
+    lines = [*free[:1], *at_rest, *free[1:]]
+    answer: list[Block] = [Paragraph(typeset(text), f"{label}:") for label, text in lines]
+    answer[1:1] = [verdict_of(state)] if state else []
+    answer += [_demands(answers, state)] if loaded else []
     for label, name in (("Vibration", "vibration"), ("As built", "budget")):
         known = answers.of(name)
         answer += [Paragraph(typeset(known.message), f"{label}:")] if known else []
     return Section("Summary", (*answer, *_requirements(answers), portrait, Bullets(points), _directions(answers)))
+
+
+def _demands(answers: Answers, state: LoadedState) -> Table:
+    """What a loaded machine does in a row each, beside what its file demands of it."""
+    display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
+    pairs = [*zip(state.components, state.displacement, strict=True)]
+    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
+    rows = [
+        (what, display.show_deflection(size, unit), _verdicts(answers, quantity, "xyz"))
+        for what, size, unit, quantity in (
+            ("displacement of the tool", moved, "m", "displacement_"),
+            ("rotation of the platform", turned, "rad", "displacement_r"),
+        )
+    ]
+    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
+        loads = [abs(load) for _, turning, load in actuator_loads(state) if turning is turns]
+        if loads:
+            judged = _verdicts(answers, f"actuator_{what}", ("",))
+            bound = getattr(answers.machine.tables["limits"], f"actuator_{what}")
+            limit = [f"at most {display.show(bound, unit)}: {number(100.0 * max(loads) / bound, digits=3)} % used"]
+            shown = [*(limit if math.isfinite(bound) else []), *([judged] if judged else [])]
+            rows.append((f"greatest {what} of an actuator", display.show(max(loads), unit), "; ".join(shown)))
+    if vibration and vibration.modes:
+        first = display.show(vibration.modes[0].frequency, "Hz")
+        rows.append(("first natural frequency", first, _verdicts(answers, "", ("frequency_1", "loaded_frequency_1"))))
+    if error:
+        usual = display.show_deflection(float(error.size("usual", "position")[0]), "m")
+        rows.append(("error of the tool by tolerances, 95 %", usual, ""))
+    cells = tuple((what, typeset(size), typeset(demand or "no requirement")) for what, size, demand in rows)
+    caption = "The machine under its loads, and what its file demands."
+    return Table(caption, ("", "at the pose", "demanded"), cells, (False, True, False))
+
+
+def _verdicts(answers: Answers, prefix: str, names: Iterable[str]) -> str:
+    """The conditions on some quantities, each with its verdict."""
+    wanted = {f"{prefix}{name}" for name in names}
+    judged = [verdict for verdict in answers.of("requirements") or () if verdict.quantity in wanted]
+    return "; ".join(f"{each.condition}: {'met' if each.met else 'not met'}" for each in judged)
 
 
 def _requirements(answers: Answers) -> tuple[Block, ...]:
