@@ -99,7 +99,7 @@ def actuator_loads(state: LoadedState) -> list[tuple[str, bool, float]]:
 
 
 def displacement_table(state: LoadedState, display: Display) -> FittedTable:
-    """How far the load moves the tool, and what linear equations say."""
+    """Displacement of the tool under its loads, beside that of linear equations."""
     units = ["rad" if name.startswith("r") else "m" for name in state.components]
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
     table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
