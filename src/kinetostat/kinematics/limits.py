@@ -93,7 +93,7 @@ def load_checks(
 def limit_use(
     machine: Machine, configuration: Configuration, actuators: Sequence[tuple[Spring, Scalar]]
 ) -> list[Scalar]:
-    """Shares that loads of actuators use of their limits, none if nothing is limited; arguments as for `load_checks`."""
+    """Shares that loads of actuators use of their limits, none if none is limited; arguments as for `load_checks`."""
     return [check.measure / check.bound for check in load_checks(machine, configuration, actuators)]
 
 
