@@ -1,7 +1,7 @@
-"""Eigenscrews: the six screws on which a twist causes a wrench on the same screw, and what they make of K and C.
+"""Eigenscrews: the six screws on which a twist causes a wrench on the same screw, and K and C as sums over them.
 
-They belong to the machine, not to the reference point. Full 6 x 6 only: in a plane all pitches are zero. Centres are in
-`centres`.
+They do not depend on the reference point. They are computed of 6 x 6 matrices only, because in a plane all pitches are
+zero. Centres of K and C are in `centres`.
 
 Sources: T. Patterson and H. Lipkin, "Structure of robot compliance", ASME J. Mechanical Design 115(3), 1993; S. Huang
 and J. M. Schimmels, "The eigenscrew decomposition of spatial stiffness matrices", IEEE Trans. Robotics and Automation
@@ -27,13 +27,14 @@ class Eigenscrew(Immutable):
     """A screw on which a twist causes a wrench on the same screw.
 
     Attributes:
-        eigenvalue: that wrench's force over that twist's rotation, N/rad: K t = eigenvalue * (t as a wrench). Zero from
-            a K, infinity from a C, that is singular.
-        pitch: m/rad, of the sign of the eigenvalue; infinity for a couple (translation).
+        eigenvalue: force of the wrench over rotation of the twist, N/rad: K t = eigenvalue * (t as a wrench). It is
+            zero for a motion that a singular K does not resist, and infinite for one that a singular C does not allow.
+        pitch: pitch with the sign of the eigenvalue, m/rad; infinite for a couple (a translation).
         direction: unit vector of the axis, base axes [3]; its largest component is positive.
         point: foot of the perpendicular from P on the axis, base axes, m [3]; None at infinite pitch.
-        weight: k in K = sum k w w^T, of a spring on the unit wrench w = [h n + r x n; n] (N/m), or [n; 0] at infinite
-            pitch (N·m/rad); from C, s in C = sum s t t^T with t = [n; h n + r x n] (rad/(N·m)), or [0; n] (m/N).
+        weight: k in K = sum k w w^T, the stiffness of a spring on the unit wrench w = [h n + r x n; n] (N/m), or [n; 0]
+            at infinite pitch (N·m/rad); from C, s in C = sum s t t^T with t = [n; h n + r x n] (rad/(N·m)), or [0; n]
+            (m/N).
     """
 
     eigenvalue: float
@@ -46,27 +47,28 @@ class Eigenscrew(Immutable):
 def eigenscrews(stiffness: Matrix) -> list[Eigenscrew]:
     """The eigenscrews of K, solutions of K t = lambda Delta t, where Delta exchanges the halves of a screw.
 
-    With K = F F^T they are the w = F y with F^T Delta F y = lambda y: a symmetric problem, hence real, and K =
-    sum k w w^T follows. Where K is regular three pitches are positive and three negative, and 2 h k = lambda.
+    With K = F F^T their wrenches are w = F y with F^T Delta F y = lambda y. This problem is symmetric, so that its
+    solutions are real, and K = sum k w w^T follows. If K is regular, three pitches are positive and three negative, and
+    2 h k = lambda.
     Patterson and Lipkin (1993); the decomposition, Huang and Schimmels (2000).
 
     Args:
         stiffness: K at P, base axes [6 x 6], finite, positive semi-definite.
 
     Returns:
-        As many as the rank of K, by increasing eigenvalue; of a repeated eigenvalue (zero, where K is singular) one of
-        many choices that all give the sum.
+        As many eigenscrews as the rank of K, by increasing eigenvalue. Those of a repeated eigenvalue (zero, if K is
+        singular) are one of many choices that all give the sum.
 
     Raises:
-        ValueError: if K is not 6 x 6 and finite.
+        ValueError: K is not 6 x 6 and finite.
     """
     return [_eigenscrew(*term, term[0]) for term in _terms(_finite(stiffness), line=FORCE, moment=MOMENT)]
 
 
 def compliance_eigenscrews(compliance: Matrix) -> list[Eigenscrew]:
-    """The eigenscrews of C: the same screws as of K = C^-1, and those that deflect where K is infinite.
+    """The eigenscrews of C: those of K = C^-1, also where K is infinite because the machine is rigid in a direction.
 
-    With C = F F^T they are the t = F y with F^T Delta F y = y / lambda. Arguments and results as for `eigenscrews`.
+    With C = F F^T their twists are t = F y with F^T Delta F y = y / lambda. Arguments and results as for `eigenscrews`.
     """
     terms = _terms(_finite(compliance), line=ROTATION, moment=TRANSLATION)
     screws = [_eigenscrew(*term, 1.0 / term[0] if term[0] else math.inf) for term in terms]
@@ -81,12 +83,13 @@ def _finite(matrix: Matrix) -> Array:
 
 
 def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array, Array]]:
-    """The matrix as a sum of squares of its eigenscrews: for each, twice line . moment, its line and its moment.
+    """The matrix as a sum of dyads of its eigenscrews: for each, twice line . moment, its line and its moment.
 
-    All in the balanced length, in which both diagonal blocks have one trace. A line that is rounding is zero.
+    They are computed in a unit of length in which both diagonal blocks have the same trace. A line that is only
+    round-off is set to zero.
     """
-    sizes = float(np.trace(matrix[moment, moment])), float(np.trace(matrix[line, line]))
-    length = math.sqrt(sizes[0] / sizes[1]) if sizes[0] > 0.0 and sizes[1] > 0.0 else 1.0
+    moments, lines = float(np.trace(matrix[moment, moment])), float(np.trace(matrix[line, line]))
+    length = math.sqrt(moments / lines) if moments > 0.0 and lines > 0.0 else 1.0
     scale = np.ones(6)
     scale[moment] = 1.0 / length
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
@@ -101,7 +104,7 @@ def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array
 
 
 def _eigenscrew(product: float, line: Array, moment: Array, eigenvalue: float) -> Eigenscrew:
-    """From a term: its pitch is line . moment over line . line."""
+    """The eigenscrew of a term of the sum: its pitch is line . moment over line . line."""
     pure = not line.any()
     axis = moment if pure else line
     size = float(np.linalg.norm(axis))

@@ -1,4 +1,7 @@
-"""Tables that any machine file may have: the tool, drives, damping and loads; limits have `limits`."""
+"""Tables that any machine file may have: tool, drives, servo loops, damping, cutting, loads and cables.
+
+The table [limits] is in `limits`. The texts are those of help, forms and the JSON Schema.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -38,13 +41,13 @@ class Tool:
     ] = (0.0,) * 6
     payload_inertia: Annotated[
         tuple[float, float, float, float, float, float],
-        Quantity("inertia", "of the payload about its centre, the same way", count=6, apart=True),
+        Quantity("inertia", "of the payload about its centre, in the same order", count=6, apart=True),
     ] = (0.0,) * 6
 
 
 @table
 class Drives:
-    """Table [drives], in any machine file: what turns in the actuators, behind the springs of their stiffness."""
+    """Table [drives], in any machine file: rotors and gears of actuators, behind the springs of their stiffness."""
 
     rotor_inertia: Annotated[
         float, Quantity("moment of inertia", "of the rotor of each actuator with all that turns with it")
@@ -64,15 +67,17 @@ class Drives:
     backlash: Annotated[float, Quantity("length", "lost motion of a linear actuator where its direction reverses")] = (
         0.0
     )
-    angular_backlash: Annotated[float, Quantity("angle", "lost motion of a rotary actuator likewise")] = 0.0
+    angular_backlash: Annotated[
+        float, Quantity("angle", "lost motion of a rotary actuator where its direction reverses")
+    ] = 0.0
 
 
 @table
 class ServoGains:
     """Table [servo], in any machine file: the loops of all drives, whose transmissions have the actuators' stiffness.
 
-    The position loop asks for a speed in proportion to the error, the velocity loop for a torque in proportion to what
-    is missing of that speed, and for its integral.
+    The position loop asks for a speed in proportion to the position error, and the velocity loop for a torque in
+    proportion to the speed error and to its integral.
     """
 
     position_gain: Annotated[float, Quantity("rate", "speed that the position loop asks for, per position error")] = 0.0
@@ -92,7 +97,7 @@ class ServoGains:
 
 @table
 class Damping:
-    """Table [damping], in any machine file: what takes energy out of vibrations, and friction of joints in motion."""
+    """Table [damping], in any machine file: damping of vibrations, and friction of joints in motion."""
 
     ratio: Annotated[float, Quantity("ratio", "damping ratio of every mode, added to all other damping")] = 0.0
     per_mass: Annotated[float, Quantity("rate", "Rayleigh damping in proportion to mass")] = 0.0
@@ -113,7 +118,7 @@ Force = Annotated[tuple[float, float, float], Quantity("force", "force along x, 
 
 @table
 class Cutting:
-    """Table [cutting], in any machine file: what the tool does to a workpiece, for the cut that stays stable."""
+    """Table [cutting], in any machine file: the force of the cut, for its stability."""
 
     pressure: Annotated[float, Quantity("cutting pressure", "cutting force per area of the chip")] = 0.0
     direction: Annotated[
@@ -144,14 +149,16 @@ class Load:
     min_tension: Annotated[
         float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
     ] = math.inf
-    max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
+    max_tension: Annotated[float, Quantity("force", "greatest load of what only pulls or pushes", unset=math.inf)] = (
+        math.inf
+    )
 
 
 @table
 class CableTable:
-    """Table [cables], in any machine file: which tensions are chosen, what they must hold, and what the cables are.
+    """Table [cables], in any machine file: how tensions are distributed, the wrenches they must hold, and the cables.
 
-    How tensions are distributed counts wherever they are chosen; the rest, where tensions and capacity are asked for.
+    The distribution counts wherever tensions are chosen; the rest counts for `tensions` and for capacity alone.
     """
 
     level: Annotated[float, Quantity("force", "tension to which all are brought as near as can be; 0: the least")] = 0.0
@@ -202,10 +209,10 @@ COMMON = {
     "cables": CableTable,
     "limits": Limits,
 }
-OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
-"""Beginnings of the fields on which nothing depends but vibrations."""
+VIBRATION_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
+"""Beginnings of the paths of fields on which only vibrations depend."""
 ROUND_OFF_OF_TENSOR = 1e-4
-"""Share of its size by which a tensor may miss what bodies have: files give a few digits."""
+"""Share of its size by which an inertia tensor may be impossible, because files give a few digits."""
 
 
 def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
@@ -213,10 +220,10 @@ def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
 
     Args:
         tables: the tables of a machine, by dotted name.
-        origin: names the machine in messages.
+        origin: name of the machine in messages.
 
     Raises:
-        InputError: names the field.
+        InputError: a tensor is impossible; the message names the field.
     """
     for path, numbers in tables.items():
         for name in ("inertia", "payload_inertia"):

@@ -18,7 +18,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.common_tables import OF_VIBRATIONS
+from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
 from kinetostat.spec.arguments import checked
@@ -240,7 +240,7 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     """Whether any of the quantities may depend on a parameter."""
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
     loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
-    if path.startswith(NEVER) or (path.startswith(OF_VIBRATIONS) and not modal):
+    if path.startswith(NEVER) or (path.startswith(VIBRATION_FIELDS) and not modal):
         return False
     if parameter.quantity.kind == "inertia":
         return modal

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.frozen import dataclass
-from kinetostat.machine.common_tables import OF_VIBRATIONS
+from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import AXES, VECTORS, Parameter, parameters, values
 from kinetostat.spec.errors import InputError, shorten
@@ -29,7 +29,7 @@ USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
-OF_MASSES = (*OF_VIBRATIONS, "tool.mass", "tool.centre_of_mass", "tool.payload")
+OF_MASSES = (*VIBRATION_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
 """How the fields begin that stand in the panel Mass; so do all whose kind says how much matter there is."""
 LARGEST_MASS = 1000.0
 """Upper end of the range of a mass that is zero, in kg per square of the machine's length."""

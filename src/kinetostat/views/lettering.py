@@ -1,4 +1,8 @@
-"""Texts of figures in fonts that have their characters; a character that no font has is shown by its number."""
+"""Texts of figures in fonts that have their characters; a character that no font has is shown by its number.
+
+Matplotlib takes text between two dollar signs as mathematics. Here symbols of quantities stay mathematics, and names
+from files do not become it.
+"""
 
 import re
 from collections.abc import Iterable
@@ -18,13 +22,14 @@ WIDE_FONTS = (
     "WenQuanYi Zen Hei", "WenQuanYi Micro Hei", "IPAGothic", "Droid Sans Fallback", "Microsoft YaHei", "Yu Gothic",
     "Malgun Gothic", "Hiragino Sans", "PingFang SC", "Arial Unicode MS", "Unifont",
 )  # fmt: skip
-"""Fonts that have Chinese, Japanese and Korean characters; those that are installed stand behind the usual font."""
+"""Fonts that have Chinese, Japanese and Korean characters; those that are installed follow the usual font."""
 MATHEMATICS = re.compile(r"\$[^$]*\$")
+"""Text that Matplotlib takes as mathematics."""
 POINTS_PER_INCH = 72
 TICK_LABEL_SIZE = 7.5
 """Size of the labels beside an axis, points."""
-POWER = r"\mathdefault"
-"""The command that Matplotlib writes around numbers on an axis."""
+NUMBER_COMMAND = r"\mathdefault"
+"""The command that Matplotlib writes around numbers on an axis, such as powers of ten."""
 
 
 @cache
@@ -36,7 +41,7 @@ def families() -> tuple[str, ...]:
 
 @cache
 def _known_characters() -> frozenset[int]:
-    """The characters that the fonts have."""
+    """The codes of the characters that the installed fonts have."""
     paths = [fontManager.findfont(name) for name in families()]
     return frozenset(code for path in paths for code in get_font(path).get_charmap())
 
@@ -52,12 +57,12 @@ def _symbols() -> frozenset[str]:
 
 
 def is_mathematics(text: str) -> bool:
-    """Return whether all that stands between two dollar signs is a symbol or a power of ten, and not part of a name."""
-    return all(part in _symbols() or POWER in part for part in MATHEMATICS.findall(text))
+    """Return whether all text between dollar signs is a symbol of a quantity or a number, and not part of a name."""
+    return all(part in _symbols() or NUMBER_COMMAND in part for part in MATHEMATICS.findall(text))
 
 
 def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
-    """Return the room that the longest of some labels beside an axis takes, inches."""
+    """Return the width of the widest of some labels beside an axis, inches."""
     font = FontProperties(family=[*families()], size=size)
     widths = (text_to_path.get_text_width_height_descent(drawable(label), font, False)[0] for label in labels)
     return float(max(widths, default=0.0)) / POINTS_PER_INCH

@@ -1,4 +1,4 @@
-"""The frame, the look and the tables of all pages. Texts are escaped here; what is HTML already is a `Markup`."""
+"""The frame, the style and the tables of all HTML pages. Texts are escaped here; HTML itself is a `Markup`."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -12,15 +12,15 @@ class Markup(str):
 
 
 STYLE = Path(__file__).with_name("page.css").read_text("utf-8")
-"""Of every page: light and dark, screen and paper."""
+"""Style of every page: light and dark, screen and paper."""
 
 
 def whole_page(title: str, style: str, body: Iterable[str]) -> str:
     """A self-contained page.
 
     Args:
-        title: of the window.
-        style: CSS after `STYLE`.
+        title: title of the window.
+        style: CSS that follows `STYLE`.
         body: elements in order, HTML.
     """
     head = (
@@ -32,12 +32,12 @@ def whole_page(title: str, style: str, body: Iterable[str]) -> str:
 
 
 def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[bool]) -> str:
-    """Write a table, in a box that scrolls where the table is too wide.
+    """Write a table, in a box that scrolls if the table is too wide.
 
     Args:
-        caption: above the table; none if empty.
-        heads: of the columns; if all are empty, there is no row of heads.
-        rows: cells as text, or as HTML where they are a `Markup`.
+        caption: text above the table; none if empty.
+        heads: heads of the columns; if all are empty, there is no row of heads.
+        rows: cells as text, or as HTML in a `Markup`.
         numeric: for each column, whether it holds numbers (aligned to the right).
     """
     above = f"<caption>{as_markup(caption)}</caption>" if caption else ""

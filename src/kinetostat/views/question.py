@@ -1,8 +1,8 @@
 """Questions about a machine, and answers that describe themselves: the nouns from which every surface is made.
 
-A question says its word, what it takes and which function answers. The description of the answer lists fields,
-sentences, tables and figures once. Surfaces are made of both elsewhere: `data_forms`, `terminal`, `notebook`,
-`report.described`, `commands.asking`, the studio.
+A question names the function that answers it and its options. The description of the answer lists fields, sentences,
+tables and figures once. Other files make the surfaces of both: `data_forms`, `terminal`, `notebook`, `report.answers`,
+`commands.asking`, `studio.question_tab`.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from kinetostat.machine.machine import Machine
 
 Take = str | Callable[[Any], Any]
-"""How a number is taken from an answer: the name of an attribute, with dots, or a function."""
+"""The way to a number of an answer: the name of an attribute, with dots, or a function of the answer."""
 Late = str | Callable[..., Any]
-"""A function, or where it lives, "views.vibration_figures.vibration_figures": it is imported when it is first used."""
+"""A function, or its place, "views.vibration_figures.vibration_figures", from which it is imported at its first use."""
 
 
 def late(function: Late) -> Any:
-    """Import the function, or what else a text names; a function is returned as it is."""
+    """Import the object that a text names; a function is returned as it is."""
     if not isinstance(function, str):
         return function
     module, _, name = function.rpartition(".")
@@ -38,16 +38,16 @@ class Field:
     """A value of an answer, or of each of its records.
 
     Attributes:
-        key: its name in JSON, CSV and NetCDF.
-        take: how it is taken; the attribute of the name `key` if empty. A mapping has a value for each entry of an
-            axis, such as x, y, z.
-        unit: of its numbers in files, SI; empty where there is none.
-        long_name: what it is, in words.
+        key: name of the value in JSON, CSV and NetCDF.
+        take: the way to the value; the attribute with the name `key` if empty. A mapping has a value for each entry of
+            an axis, such as x, y, z.
+        unit: unit of its numbers in files, SI; empty if it has none.
+        long_name: its meaning in a phrase.
         axes: names of the axes of its array; of a mapping, the name of its one axis.
-        forms: files that have it, some of "json", "csv" and "nc".
-        optional: whether JSON leaves it out where it is None.
-        column: its name in CSV and NetCDF if that is not the key. In CSV a mapping has a column for each entry, of the
-            name "column_entry", or "entry" alone where `column` is "*".
+        forms: kinds of files that have it, of "json", "csv" and "nc".
+        optional: whether JSON leaves it out if it is None.
+        column: its name in CSV and NetCDF if that is not the key. In CSV a mapping has a column for each entry with the
+            name "column_entry", or "entry" alone if `column` is "*".
     """
 
     key: str
@@ -61,7 +61,7 @@ class Field:
 
     @property
     def name(self) -> str:
-        """Its name in tables of numbers."""
+        """The name of the value in CSV and NetCDF."""
         return self.key if self.column in ("", "*") else self.column
 
     def of(self, item: Any) -> Any:
@@ -78,7 +78,7 @@ MESSAGE = Field("message")
 FIRST_FIELDS = (NAME, STATUS, MESSAGE)
 """Fields with which answers about a machine begin: its name, and the status of its pose in a word and in a sentence."""
 LOADS_LEFT_OUT = Field("loads_left_out", forms=("json",))
-"""The sentence on loads of the file that do not count: an answer with this field says it on all surfaces."""
+"""The sentence on loads of the file that do not count: an answer with this field shows it on all surfaces."""
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,11 @@ class Records:
     """Several things of one kind in an answer, such as its modes: objects in JSON, rows in CSV, an axis in NetCDF.
 
     Attributes:
-        key: of their list in JSON.
-        axis: name of one of them: the axis in NetCDF, and the head of the column that counts them in CSV.
-        fields: what each of them has.
-        take: how they are taken from the answer; the attribute of the name `key` if empty.
-        forms: files that have them.
+        key: name of their list in JSON.
+        axis: name of one of them: of the axis in NetCDF, and of the column that counts them in CSV.
+        fields: the values of each of them.
+        take: the way to them in the answer; the attribute with the name `key` if empty.
+        forms: kinds of files that have them.
     """
 
     key: str
@@ -116,12 +116,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of an answer that is drawn when it is called; `title=""` draws it without a title, below a caption.
+    """A figure of an answer, which a call draws; `title=""` draws it without a title, for use with a caption.
 
     Attributes:
         caption: a sentence for a report.
-        draw: draws it.
-        minor: whether a report leaves it out.
+        draw: function that draws the figure.
+        minor: whether a report leaves the figure out.
         file: name of its file without the suffix, if that is not the name of the figure.
     """
 
@@ -136,30 +136,30 @@ class Drawing:
 
 
 Lines = Iterable[tuple[str, str]]
-"""Sentences, each with the word that stands before it, such as "Damping"."""
+"""Sentences, each with the word before it, such as "Damping"."""
 NO_PARTS: Callable[[Any], tuple[()]] = lambda _answer: ()  # noqa: E731 - a default that several fields share
 
 
 @dataclass(frozen=True)
 class Description:
-    """All that surfaces know of answers of one kind.
+    """Everything that surfaces know of answers of one kind.
 
     Attributes:
-        title: of a section or a panel that shows one.
+        title: title of a section or a panel that shows an answer.
         fields: values and records of the answer, in the order of JSON.
-        lines: the sentences, the answer first. The line "Pose" is left out where a report has said it.
-        tables: the tables, each with a title, and sentences between them; `full` wants every row.
-        figures: drawings by name, the most telling first.
-        makers: functions that make a form of their own, such as the dataset that an answer already holds.
-        axes: of the arrays in NetCDF.
-        machine: how the machine is taken from the answer.
-        state: what stands behind its name in the first line.
-        answered: whether there is an answer; where there is none, `message` of the answer says why.
-        files: name of each file that a folder of results gets, with its form "json", "csv" or "nc", or a function
-            that writes its text, dataset or plain data; where this gives None, there is no such file.
-        kept: whether the answer keeps what its file demands; a command says by its exit code where it does not.
-        undrawn: why a folder of results gets nothing, where that is so.
-        figure_prefix: stands before the names of the figures in a folder.
+        lines: the sentences, the answer first. A report leaves the line "Pose" out, because its first page has it.
+        tables: the tables, each with a title, and sentences between them; with `full`, every row.
+        figures: drawings by name, the most important first.
+        makers: functions that make a form in a way of their own, such as the dataset that an answer already holds.
+        axes: axes of the arrays in NetCDF.
+        machine: the way to the machine in the answer.
+        state: text after the name of the machine in the first line.
+        answered: whether there is an answer; if not, `message` of the answer says why.
+        files: name of each file in a folder of results, with its form "json", "csv" or "nc", or with a function that
+            returns its text, dataset or plain data, or None if the answer has no such file.
+        kept: whether the answer keeps the requirements of its file; if not, a command says so by its exit code.
+        undrawn: the reason why a folder of results would be empty; empty if it would not.
+        figure_prefix: beginning of the names of the figures in a folder.
     """
 
     title: str
@@ -179,7 +179,7 @@ class Description:
 
     @property
     def forms(self) -> tuple[str, ...]:
-        """Files that an answer can be: JSON, CSV where it has records, NetCDF where it has arrays; and what is made."""
+        """Kinds of files that an answer can be: JSON, CSV if it has records, NetCDF if it has arrays, and `makers`."""
         tables = [part for part in self.fields if isinstance(part, Records)]
         arrays = [part for part in self.fields if isinstance(part, Field) and part.axes and "nc" in part.forms]
         csv = ("csv",) if any("csv" in part.forms for part in tables) else ()
@@ -187,43 +187,43 @@ class Description:
         return tuple(dict.fromkeys(["json", *csv, *nc, *self.makers]))
 
     def sentences(self, answer: Any) -> Lines:
-        """The lines of an answer, with one about the loads of the file that do not count behind the first."""
+        """The lines of an answer; after the first one, a line about the loads of the file that do not count."""
         first, *others = [*self.lines(answer)] or [("", "")]
         parts = [part for part in self.fields if isinstance(part, Field) and part.key == LOADS_LEFT_OUT.key]
-        uncounted = parts[0].of(answer) if parts else ""
-        lines = [first, ("Loads", uncounted), *others]
+        left_out = parts[0].of(answer) if parts else ""
+        lines = [first, ("Loads", left_out), *others]
         return [(head, sentence) for head, sentence in lines if sentence]
 
     def machine_of(self, answer: Any) -> "Machine":
-        """The machine that an answer is about."""
+        """The machine of an answer."""
         machine: Machine = Field("machine", self.machine).of(answer)
         return machine
 
     def drawings(self, answer: Any) -> "dict[str, Drawing]":
-        """The figures of an answer by name; none where nothing can be drawn."""
+        """The figures of an answer by name; none if nothing can be drawn."""
         return dict(late(self.figures)(answer)) if self.figures else {}
 
 
 Kind = Literal["flag", "direction", "count", "number", "choice", "quantity", "text", "file", "setting"]
-"""Kinds of what an option takes: `quantity` is a text with a unit, `file` a path, `setting` a line in the table of the
-machine file that is named as the option is: it changes the machine and is not handed on."""
+"""Kinds of the value of an option: `quantity` is a text with a unit, and `file` a path. `setting` is a line in the
+table of the machine file that has the option's name: it changes the machine and is not handed to the function."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """Something that a question takes besides the machine; on the command line, in Python and in the studio.
+    """An option of a question besides the machine: on the command line, in Python and in the studio.
 
     Attributes:
-        name: the argument in Python; on the command line `--name`, with dashes.
-        kind: kind of what is given.
+        name: name of the argument in Python; `--name`, with dashes, on the command line.
+        kind: kind of its value.
         meaning: a phrase for the help.
-        metavar: the word that stands for it in the help, such as "X,Y,Z".
-        default: what counts where nothing is given.
-        choices: what may be chosen, for the kind "choice".
+        metavar: the word for its value in the help, such as "X,Y,Z".
+        default: the value if none is given.
+        choices: the values of the kind "choice".
         many: whether it may be given several times; its value is then a list.
         first: whether the command line takes it without its name, after the machine.
         required: whether it must be given.
-        word: the option on the command line if it is not the name.
+        word: the option on the command line if that is not `--name`.
         former: earlier words of the command line, which still work and warn.
     """
 
@@ -250,13 +250,13 @@ class Question:
     """A question about a machine; its word and a phrase about it are in `questions`.
 
     Attributes:
-        example: a command line.
-        answer: the function: takes a machine and the options by name, and `progress` if it takes long.
-        options: what it takes besides the machine.
-        loaded: help on `--loaded`, where the state of the machine matters.
-        output: words on what a folder of results gets, or on the files; empty if nothing is written.
-        suffixes: of the files that `--output` names, where an answer is written to files instead of a folder.
-        slow: words on what is being done, where the function takes `progress` or people would wonder.
+        example: a command line for the help.
+        answer: the function that answers: it takes a machine, the options by name, and `progress` if it takes long.
+        options: the options of the question.
+        loaded: help on `--loaded`; empty if the state of the machine does not matter.
+        output: a phrase on the contents of a folder of results, or on the files; empty if nothing is written.
+        suffixes: suffixes of the files that `--output` names, for an answer that is written to files without a folder.
+        slow: word beside the progress bar for the work being done, such as "searching".
         reports_progress: whether the function takes `progress`.
         full: help on `--full`; empty if there is nothing more to show.
     """

@@ -1,6 +1,6 @@
-"""Sections on the answers to further questions: each is made of the description of its answer, or written here.
+"""Sections of a report on the answers to its questions, most of them made from the description of the answer.
 
-Nothing is computed here.
+Sections on a state under load and on a design study say more and are written here. Nothing is computed here.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -56,8 +56,8 @@ ANSWERS_WITH_SECTIONS = (
 )  # fmt: skip
 """Answers of `studies.report.REPORT_QUESTIONS` with a section, in the order of a report."""
 LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
-SAID_BEFORE = "Pose"
-"""Line that a report has on its first page."""
+LINE_OF_FIRST_PAGE = "Pose"
+"""Head of the line that is on the first page of a report already."""
 
 
 def answer_sections(answers: Answers) -> Iterator[Section]:
@@ -89,9 +89,9 @@ def described_section(description: Description, answer: Any, more: Iterable[Bloc
     """Write the section on an answer.
 
     Args:
-        description: of answers of this kind.
-        answer: at the pose of the report.
-        more: blocks that stand behind it.
+        description: the description of answers of this kind.
+        answer: the answer at the pose of the report.
+        more: further blocks at the end of the section.
     """
     return Section(description.title, (*_description_blocks(description, answer), *more))
 
@@ -101,7 +101,7 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
         yield Paragraph(typeset(answer.message))
         return
     for head, sentence in description.sentences(answer):
-        if head != SAID_BEFORE:
+        if head != LINE_OF_FIRST_PAGE:
             yield Paragraph(typeset(sentence), f"{head}:")
     for part in description.tables(answer, False):
         yield Paragraph(typeset(part)) if isinstance(part, str) else as_table(part, f"{part.title}.")
@@ -111,7 +111,7 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
 
 
 def _frequencies(answers: Answers) -> Iterator[Block]:
-    """The first natural frequency over the poses of the maps, where there are any."""
+    """A map of the first natural frequency over the poses of the maps, if there is one."""
     over = answers.of("frequencies")
     if over is not None and (over["status"] == int(Status.OK)).any():
         draw = contour_maps if over["status"].ndim == 2 else curves
@@ -120,17 +120,17 @@ def _frequencies(answers: Answers) -> Iterator[Block]:
 
 
 def loaded_section(state: LoadedState, answers: Answers) -> Section:
-    """Write the section: verdict, shape, displacement, what each leg carries, stiffness, and the curve.
+    """Write the section on the state under load: verdict, shape, displacement, loads of legs, stiffness, and the curve.
 
     Args:
-        state: of the machine under its loads.
-        answers: of the report; its analysis is that of the machine without loads.
+        state: the machine at rest under its loads.
+        answers: the answers of the report, whose analysis is that of the machine without loads.
     """
     return Section("Under load", tuple(_loaded_blocks(state, answers.analysis)))
 
 
 def verdict_of(state: LoadedState) -> Paragraph:
-    """Say whether the machine is at rest, what is special, and how far the load may grow."""
+    """Say whether the machine is at rest, what is special about that, and how far its loads may grow."""
     stability = f" {stability_of(state)}" if state.displacement else ""
     return Paragraph(typeset(f"{state.message}{stability}"), f"Under load, {state.rest.word}:")
 
@@ -140,9 +140,9 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     if not state.displacement:
         return
     display = state.machine.display
-    moved = displacement_table(state, display)
+    displacements = displacement_table(state, display)
     yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
-    yield as_table(moved, f"{moved.title}, with exact geometry and by linear equations; base axes.")
+    yield as_table(displacements, f"{displacements.title}, with exact geometry and by linear equations; base axes.")
     yield figure_of(bars_figure(state), "What each leg carries.")
     yield as_table(springs_of(state, display), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
@@ -159,7 +159,7 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
 
 
 WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": loaded_section}
-"""Sections that say more than the description: the state under load is shown beside the free one."""
+"""Functions that write the sections which say more than the description of the answer."""
 
 
 def _fit_section(machine: Machine, record: FitRecord) -> Section:
@@ -222,9 +222,9 @@ def _study_question(problem: Problem) -> tuple[Block, ...]:
 def _study_search(result: Result) -> tuple[Block, ...]:
     problem, figures = result.problem, pictures(result)
     settings = problem.study.optimizer
-    about = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {result.message}"
-    shown = (name for name in ("convergence", "front") if name in figures)
-    return (Paragraph(typeset(about)), *(figure_of(figures[name](), figures[name].caption) for name in shown))
+    method = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {result.message}"
+    names = (name for name in ("convergence", "front") if name in figures)
+    return (Paragraph(typeset(method)), *(figure_of(figures[name](), figures[name].caption) for name in names))
 
 
 def _study_answer(result: Result) -> tuple[Block, ...]:
