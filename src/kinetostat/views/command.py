@@ -19,6 +19,7 @@ from kinetostat.studies.corrections import CorrectionTable, Term, correction_tab
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.forward import coordinate_text
+from kinetostat.views.options import LAW_TOLERANCE
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 
@@ -250,13 +251,7 @@ COMMAND_QUESTION = Question(
             many=True,
             word="--over",
         ),
-        Option(
-            "tolerance",
-            "quantity",
-            'error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the '
-            "error without corrections)",
-            metavar="LENGTH",
-        ),
+        LAW_TOLERANCE,
         Option(
             "fit",
             "file",

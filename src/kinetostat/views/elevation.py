@@ -22,6 +22,7 @@ from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
 from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.options import LAW_TOLERANCE
 from kinetostat.views.question import (
     FIRST_FIELDS,
     Axis,
@@ -314,13 +315,7 @@ ELEVATION_QUESTION = Question(
             "axis of the base about which gravity turns in it as the elevation falls (default: load.gravity_axis)",
             default=(),
         ),
-        Option(
-            "tolerance",
-            "quantity",
-            'error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the '
-            "error without corrections)",
-            metavar="LENGTH",
-        ),
+        LAW_TOLERANCE,
     ),
     output="elevation.json, elevation.csv, elevation.nc and the figure",
     reports_progress=True,

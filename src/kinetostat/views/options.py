@@ -20,6 +20,13 @@ QUANTITIES = (
 """Help on the quantities of sweeps, maps and sensitivities."""
 DISPLACED = "the machine at rest under its loads: its displacement, if no quantity is named"
 """Help on `--loaded` of questions about quantities."""
+LAW_TOLERANCE = Option(
+    "tolerance",
+    "quantity",
+    'error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the error '
+    "without corrections)",
+    metavar="LENGTH",
+)
 VARIED = "FIELD=from:to:count[:log]"
 
 
