@@ -11,7 +11,9 @@ from scipy.optimize import linprog
 from kinetostat import build, load
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of
-from kinetostat.machine.parameters import with_values
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.motion.rates import PoseRates
+from kinetostat.studies.dynamics import dynamics
 from machines import cable, written
 
 EQUAL = 1e-9
@@ -56,7 +58,12 @@ MACHINES = {
 
 
 def poses(machine, count):
-    """The machine at random poses around its own."""
+    """The free machine at random poses around its own."""
+    return (state.free for state in states(machine, count))
+
+
+def states(machine, count):
+    """States of the machine at random poses around its own."""
     rng = np.random.default_rng(count)
     table = machine.tables["pose"]
     names = [name for name in vars(table) if isinstance(getattr(table, name), float)]
@@ -65,7 +72,7 @@ def poses(machine, count):
         state = state_of(with_values(machine, moved))
         if state.status.word == "ok":
             count -= 1
-            yield state.free
+            yield state
 
 
 def screws(response):
@@ -133,11 +140,47 @@ def greatest_motion(response, direction):
     return solved.x[-1] if solved.status == 0 else np.inf if solved.status == 3 else -np.inf
 
 
-def by_faces(response, direction):
-    """How far a wrench may grow within the faces of the set."""
+def by_faces(faces, direction):
+    """How far a wrench, or an acceleration, may grow within the faces of the set."""
     reach = np.inf
-    for face in response.faces:
+    for face in faces:
         rate = float(np.dot(face.normal.components(), direction))
         if abs(rate) > 1e-12:
             reach = min(reach, (face.upper if rate > 0 else face.lower) / rate)
     return reach
+
+
+def massive(machine):
+    """The machine with masses of all its parts and without gravity, so that links weigh nothing."""
+    known = values(machine)
+    given = {path: 2.0 for path in known if path.startswith("linear_density.")}
+    given |= {"tool.mass": 3.0, "drives.rotor_inertia": 1e-4, "drives.lead": 0.01, "drives.ratio": 5.0}
+    given |= {f"tool.inertia.{place}": size for place, size in enumerate((0.02, 0.03, 0.04))}
+    given |= {f"tool.centre_of_mass.{place}": size for place, size in enumerate((0.02, 0.01))}
+    given |= {f"load.gravity.{place}": 0.0 for place in range(3)}
+    return with_values(machine, {path: value for path, value in given.items() if path in known})
+
+
+def greatest_gain(state, gains):
+    """By a linear programme over the forces of the drives: how fast the coordinates may gain speed along gains.
+
+    The equations of motion over the coordinates of the pose know no faces and no screws of legs.
+    """
+    equations = dynamics(state)
+    held = equations.forces([0.0] * len(gains), [0.0] * len(gains))["process"] @ equations.jacobian
+    drives = state.free.drives
+    bounds = [
+        (d.lower, d.upper) if s < 0.0 else (-d.upper, -d.lower) for d, s in zip(drives, equations.senses, strict=True)
+    ]
+    equal = np.column_stack([equations.jacobian.T, -equations.mass @ gains])
+    solved = linprog([0.0] * len(drives) + [-1.0], A_eq=equal, b_eq=held, bounds=[*bounds, (None, None)])
+    return solved.x[-1] if solved.status == 0 else np.inf if solved.status == 3 else -np.inf
+
+
+def twist_of(state, gains):
+    """The acceleration of the tool point from rest by those of the coordinates of the pose [6], rad/s² and m/s²."""
+    here = dynamics(state)._machine_here
+    still = dict.fromkeys(here.names, 0.0)
+    twist = here.along(PoseRates(dict(zip(here.names, gains, strict=True)), still)).platform.twist
+    size = float(here.rigid.length)
+    return np.array([*twist.rotational.components(), *(c * size for c in twist.translational.components())], float)

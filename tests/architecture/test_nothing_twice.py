@@ -16,6 +16,7 @@ CALLED_FROM_OUTSIDE = {
     "_split_lines": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",
     "page_pictures": "the pages of a PDF, for the pictures of the documentation",
+    "mass_at_drives": "M over the drives, for programs",
     "gravity_at_drives": "g over the drives, for programs",
     "coriolis_at_drives": "C over the drives, for programs",
     "shares_of": "shares by name, for programs",

@@ -9,12 +9,27 @@ import numpy as np
 import pytest
 
 import kinetostat
-from driven_sets import EQUAL, MACHINES, by_faces, greatest_motion, greatest_wrench, poses, screws
+from driven_sets import (
+    EQUAL,
+    MACHINES,
+    by_faces,
+    greatest_gain,
+    greatest_motion,
+    greatest_wrench,
+    massive,
+    poses,
+    screws,
+    states,
+    twist_of,
+)
 from kinetostat import load
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.engine.moving import rigid_form
 from kinetostat.equilibrium.state import actuator_loads_at_rest, state_of
 from kinetostat.kinetostatics.feasible import BLOCKS, greatest_ball, greatest_speed
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.parameters import with_values
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.motion.operators import loads_by_acceleration
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -26,7 +41,60 @@ def test_faces_bound_what_a_linear_programme_finds(name, count):
         direction = np.zeros(6)
         direction[there] = rng.normal(size=len(there))
         expected = greatest_wrench(response, direction)
-        assert by_faces(response, direction) == pytest.approx(expected, rel=EQUAL), direction
+        assert by_faces(response.faces, direction) == pytest.approx(expected, rel=EQUAL), direction
+
+
+def with_accelerations(state):
+    return replace(state.free, acceleration_loads=loads_by_acceleration(rigid_form(state).at(state)))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("count", [10, pytest.param(167, marks=pytest.mark.slow)])
+def test_accelerations_are_those_of_a_linear_programme_over_the_drives(name, count):
+    machine, rng = massive(MACHINES[name]()), np.random.default_rng(2)
+    for state in states(machine, count):
+        response = with_accelerations(state)
+        size = sum(path.startswith("pose.") for path in values(machine))
+        gains = rng.normal(size=size)
+        reach = by_faces(response.acceleration_faces, twist_of(state, gains))
+        assert reach == pytest.approx(greatest_gain(state, gains), rel=EQUAL)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_quantities_of_accelerations_are_the_least_of_linear_programmes(name):
+    """Along single components, both ways, and in whichever direction of a thousand, and the worst of all."""
+    machine, rng = massive(MACHINES[name]()), np.random.default_rng(3)
+    for state in states(machine, 2):
+        response = with_accelerations(state)
+        size = sum(path.startswith("pose.") for path in values(machine))
+        motions = np.array([twist_of(state, row) for row in np.eye(size)]).T
+        for number, component in enumerate(COMPONENTS):
+            gains, *_ = np.linalg.lstsq(motions, np.eye(6)[number], rcond=None)
+            possible = np.abs(motions @ gains - np.eye(6)[number]).max() < 1e-9
+            reach = min(greatest_gain(state, sign * gains) for sign in (1.0, -1.0)) if possible else 0.0
+            value = QUANTITIES[f"greatest_acceleration_{component}"].value(response)
+            assert value == pytest.approx(reach, rel=EQUAL)
+        for name_, part in (("least_acceleration", slice(3, 6)), ("least_angular_acceleration", slice(0, 3))):
+            radius = QUANTITIES[name_].value(response)
+            others = np.delete(motions, part, axis=0)
+            _, sizes, rows = np.linalg.svd(others)
+            allowed = rows[(sizes > 1e-9).sum() :].T  # gains without motion of the other kind
+            moved = motions[part] @ allowed
+            if not allowed.shape[1]:
+                assert np.isnan(radius)
+                continue
+            drawn = allowed @ np.linalg.pinv(moved) @ moved @ rng.normal(size=(allowed.shape[1], 8))
+            for gains in drawn.T:
+                assert greatest_gain(state, gains / np.linalg.norm(motions[part] @ gains)) >= radius * (1.0 - EQUAL)
+            normals = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)
+            felt = normals[:, part] @ moved @ np.linalg.pinv(moved)
+            room = np.array([float(face.room) for face in response.acceleration_faces])
+            sizes = np.linalg.norm(felt, axis=1)
+            worst = np.argmin(np.where(sizes > 1e-9 * sizes.max(), room / np.maximum(sizes, 1e-300), np.inf))
+            face = response.acceleration_faces[worst]
+            sign = 1.0 if face.upper < -face.lower else -1.0
+            gains = allowed @ np.linalg.pinv(moved) @ (sign * felt[worst] / sizes[worst])
+            assert greatest_gain(state, gains) == pytest.approx(radius, rel=EQUAL)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -103,6 +171,22 @@ def test_a_compiled_map_gives_what_a_pose_gives(name):
         response = state_of(with_values(machine, {"pose.z": float(height)})).free
         expected = [float(QUANTITIES[q].value(response)) for q in quantities]
         np.testing.assert_allclose(values[:, place], expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "cables", "delta"])
+def test_compiled_accelerations_and_their_slopes_are_those_of_poses(name):
+    machine = massive(MACHINES[name]())
+    quantities = ["least_acceleration", "greatest_acceleration_x", "greatest_acceleration_z"]
+    function = kinetostat.compile(machine, ["z"], quantities)
+    heights = np.linspace(0.0, 0.02, 3) + machine.tables["pose"].z
+    numbers, slopes = function(heights), function.jacobian(heights)
+    for place, height in enumerate(heights):
+        near = [state_of(with_values(machine, {"pose.z": float(height + step)})) for step in (-1e-6, 0.0, 1e-6)]
+        rows = np.array([[float(QUANTITIES[q].value(with_accelerations(state))) for q in quantities] for state in near])
+        np.testing.assert_allclose(numbers[:, place], rows[1], rtol=1e-10)
+        np.testing.assert_allclose(
+            np.ravel(slopes[:, ..., place]), (rows[2] - rows[0]) / 2e-6, rtol=1e-5, atol=1e-6 * np.abs(rows).max()
+        )
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tripteron"])

@@ -10,7 +10,7 @@ import pytest
 from kinetostat.engine.moving import Path, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinetostatics.feasible import driven_springs
+from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.loads import gravity_of, located_members

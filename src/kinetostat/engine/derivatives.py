@@ -23,7 +23,7 @@ from kinetostat.engine.batch import (
     by_free_springs,
     silent,
 )
-from kinetostat.engine.form import Specimen, Weights, equations_of, form_of, objectives_of
+from kinetostat.engine.form import Specimen, Weights, equations_of, form_of, objectives_of, plan_for
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
     FallingBack,
@@ -230,9 +230,8 @@ class _Routes:
         self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._modes, self._joints = modes, machine.chains().size if machine.family.chains else 0
-        self._loaded = bool(
-            rest_numbers(machine, [name for objective in weights for name, _ in objective], limited=False)
-        )
+        names = [name for objective in weights for name, _ in objective]
+        self._loaded, self._plan = bool(rest_numbers(machine, names, limited=False)), plan_for(machine, names)
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
@@ -323,7 +322,7 @@ class _Routes:
         """The program of the objectives and their derivatives, or without weights that of the closing equations."""
         limited = False
         trace, arguments = (
-            (objectives_of, (weights, self._differentiated, closed, self._modes, limited))
+            (objectives_of, (weights, self._differentiated, closed, self._modes, limited, self._plan))
             if weights
             else (equations_of, (self._differentiated,))
         )

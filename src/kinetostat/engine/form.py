@@ -4,7 +4,7 @@ Nothing is compiled or evaluated here, and nothing depends on a machine's number
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -16,19 +16,23 @@ from kinetostat.arrays import Array
 from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, closing_equations, within_reach
 from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.motion.operators import at_pose, loads_by_acceleration
+from kinetostat.motion.rigid import MotionPlan, mechanism_over_scalars, plan_of
+from kinetostat.spec.errors import InputError
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
 from kinetostat.vibration.slopes import vibrating
 
@@ -174,6 +178,7 @@ def objectives_of(
     closed: bool = False,
     modes: int = 0,
     limited: bool = True,
+    plan: MotionPlan | None = None,
 ) -> TracedFormula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
 
@@ -186,6 +191,7 @@ def objectives_of(
             status are further columns, unless the family places the joints itself. If quantities are about the machine
             under load, coordinates of its state follow, see `step_of`.
         limited: whether the limits of a machine meant under its loads judge its points at rest.
+        plan: which motions there are, where quantities are about accelerations, see `plan_for`.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
     """
     given = traced_machine(kind, form)
@@ -209,9 +215,34 @@ def objectives_of(
         response = replace(response, frequencies=lowest_frequencies(vibration.squares(known)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
+    if plan is not None:
+        here = at_pose(given.machine, response.configuration, joints, plan)
+        response = replace(response, acceleration_loads=loads_by_acceleration(here))
     accepted = response.status < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
     return formula_of(given, columns, results, result_of(response.status), paths, coordinates)
+
+
+def plan_for(machine: Machine, names: Iterable[str]) -> MotionPlan | None:
+    """Decide at the pose of a machine which motions its programs count with; None for quantities without masses.
+
+    Args:
+        machine: with numbers.
+        names: of quantities.
+
+    Raises:
+        InputError: quantities are about accelerations, and the machine has no place at its pose.
+    """
+    if not needs_masses(names):
+        return None
+    state = MachineState(machine)
+    if int(state.free.status) in PLACELESS:
+        raise InputError(
+            f"accelerations of {machine.name} are not known, because it has no place at the pose of its file: "
+            f"{state.refusal} Change [pose]."
+        )
+    with np.errstate(all="ignore"):
+        return plan_of(mechanism_over_scalars(machine, state.configuration, state.joints))
 
 
 def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:

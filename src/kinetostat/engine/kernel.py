@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, TracedFormula, form_of, objectives_of, reduced_angles
+from kinetostat.engine.form import Form, Specimen, TracedFormula, form_of, objectives_of, plan_for, reduced_angles
 from kinetostat.engine.gradient import Interpreted, with_gradients
 from kinetostat.engine.machine_code import MachineCode, Program, machine_code_of, unpack
 from kinetostat.engine.program_files import read_program, write_program
@@ -200,7 +200,11 @@ def program_fill(
     """
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
-    program = program_of(Recipe(objectives_of, Specimen(machine), form, (objectives, None, closed)))
+    arguments: tuple[Any, ...] = (objectives, None, closed)
+    plan = plan_for(machine, quantities)
+    if plan is not None:
+        arguments = (*arguments, 0, True, plan)
+    program = program_of(Recipe(objectives_of, Specimen(machine), form, arguments))
     return ProgramFill(machine, form, fixed, program, closed, further)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.form import objectives_of, step_of
+from kinetostat.engine.form import objectives_of, plan_for, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.machine_functions import (
@@ -148,8 +148,9 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
         yield _program(functions, "placement_at", Body(body.fixed, body.columns, [*driven.results, *sloped], body.code))
     if functions.quantities:
         wanted = [((name, 1.0),) for name in functions.quantities]
-        yield _program(functions, "quantities_at", objectives_of(kind, form, wanted, closed=closed).body)
-        formula = objectives_of(kind, form, wanted, functions.inputs, closed)
+        plan = plan_for(functions.machine, functions.quantities)
+        yield _program(functions, "quantities_at", objectives_of(kind, form, wanted, closed=closed, plan=plan).body)
+        formula = objectives_of(kind, form, wanted, functions.inputs, closed, plan=plan)
         inputs = formula.inputs[: len(functions.inputs)]
         yield _program(functions, "quantity_slopes_at", with_gradients(formula.body, inputs))
 

@@ -2,7 +2,7 @@
 
 A set of wrenches is an intersection of slabs `lower <= n . w <= upper`, which is exact for any number of drives, with
 bounds of either sign (a cable pulls only) and beside any structure that carries loads without a drive. What a machine
-file says about its drives is in `machine`; vertices and pictures are made elsewhere.
+file says about its drives is in `drive_limits`; vertices and pictures are made elsewhere.
 
 Source: theory (81)-(84). Screws are at the tool point, base axes.
 """
@@ -15,90 +15,18 @@ from itertools import combinations
 
 from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, where
 from kinetostat.algebra.screw import Twist, Wrench
-from kinetostat.algebra.solve import conjugate, right_inverse
+from kinetostat.algebra.solve import Conjugated, conjugate, right_inverse
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import INFINITE, combine, free_springs_as_joints
 from kinetostat.machine.leg import LegScrews, Spring
 from kinetostat.machine.limits import is_set
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration
 from kinetostat.tolerances import DEPENDENT_GENERATORS, UNREACHED_COMPONENT
 
 BLOCKS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 """Components of a screw that turn, and that move."""
-
-
-@dataclass(frozen=True)
-class DriveLimits:
-    """Greatest loads and speed of a drive.
-
-    Attributes:
-        spring: of its actuator.
-        lower, upper: least and greatest load, N or N·m: positive in the sense in which the actuator's joint is pulled
-            open; infinite if not limited.
-        speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
-        lost_motion: what its joint misses between both senses of motion, m or rad, theory (105).
-    """
-
-    spring: Spring
-    lower: Scalar
-    upper: Scalar
-    speed: Scalar
-    lost_motion: Scalar = 0.0
-
-
-def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveLimits, ...]:
-    """Return what a machine file lets its drives do, in the order of the actuators that hold something.
-
-    Loads are those of [limits]; where an actuator only pulls or only pushes, the tensions of [load] bound it as well.
-    """
-    limits, load = machine.tables["limits"], machine.tables["load"]
-    result = []
-    for spring in driven_springs(configuration):
-        slides = spring.joint.point is None
-        most = limits.actuator_force if slides else limits.actuator_moment
-        lower, upper = -most if is_set(most) else -math.inf, most
-        if spring.acts:
-            least = load.min_tension if is_set(load.min_tension) else 0.0
-            greatest = load.max_tension if is_set(load.max_tension) else most
-            if is_set(most) and is_set(load.max_tension):
-                greatest = smaller(most, load.max_tension)
-            lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
-        speed = limits.actuator_speed if slides else limits.actuator_turning_speed
-        result.append(DriveLimits(spring, lower, upper, speed, lost_motion(machine, slides)))
-    return tuple(result)
-
-
-def lost_motion(machine: Machine, slides: bool) -> Scalar:
-    """Lost motion of the joint of a drive between both senses: its play, and friction that no integral part removes.
-
-    Args:
-        machine: with its tables [drives] and [servo].
-        slides: whether the drive is linear.
-
-    Returns:
-        m, or rad of a rotary drive.
-
-    Source: theory (105).
-    """
-    drives, servo = machine.tables["drives"], machine.tables["servo"]
-    play = (1.0 - servo.position_at_load) * (drives.backlash if slides else drives.angular_backlash)
-    absent = is_zero(drives.rotor_friction) or not is_zero(servo.integral_time)
-    if absent or is_zero(servo.velocity_gain) or is_zero(servo.position_gain):
-        return play
-    turns = drives.lead * (0.5 / math.pi) if slides else reciprocal(drives.ratio)
-    return play + 2.0 * drives.rotor_friction * turns * reciprocal(servo.velocity_gain * servo.position_gain)
-
-
-def driven_springs(configuration: Configuration) -> list[Spring]:
-    """The springs of all actuators that hold something; one that is free by form does not."""
-    return [
-        spring
-        for leg in configuration.legs
-        for spring in leg.springs
-        if spring.actuated and not is_zero(spring.stiffness)
-    ]
 
 
 @dataclass(frozen=True)
@@ -362,22 +290,82 @@ def greatest_speed(given: Transmission, speeds: Sequence[Scalar], block: slice) 
     """
     if given.wrenches is None:
         return math.nan
-    turning, shrink = block.start == 0, reciprocal(given.length)
-    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in given.constraints]
-    stopped = [column for column in stopped if not all(is_zero(c) for c in column)]
-    structure = conjugate(stopped, [1.0] * 3, [1.0] * 3) if stopped else None
+    shrink, turning, structure = reciprocal(given.length), block.start == 0, _structure(given, block)
     radius: Scalar = math.inf
     for wrench, speed in zip(given.wrenches, speeds, strict=True):
-        whole = _components_in_newtons(wrench, shrink)
-        part = list(whole[block])
-        for column, inverse in zip(structure.columns, structure.inverses, strict=True) if structure else ():
-            share = inverse * total([a * b for a, b in zip(part, column, strict=True)])
-            part = [a - share * b for a, b in zip(part, column, strict=True)]
-        square = total([c * c for c in part])
-        felt = square > UNREACHED_COMPONENT * total([c * c for c in whole])
-        needed = sqrt(square) * given.length if turning else sqrt(square)
+        size, felt = _allowed_size(_components_in_newtons(wrench, shrink), block, structure)
+        needed = size * given.length if turning else size
         radius = smaller(where(felt, speed * reciprocal(where(felt, needed, 1.0)), math.inf), radius)
     return where(radius < math.inf, radius, math.nan)
+
+
+def _structure(given: Transmission, block: slice) -> Conjugated | None:
+    """An orthonormal basis of the motions in a block that the structure does not allow; None where it allows all."""
+    shrink = reciprocal(given.length)
+    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in given.constraints]
+    stopped = [column for column in stopped if not all(is_zero(c) for c in column)]
+    return conjugate(stopped, [1.0] * 3, [1.0] * 3) if stopped else None
+
+
+def _allowed_size(whole: Sequence[Scalar], block: slice, structure: Conjugated | None) -> tuple[Scalar, Scalar]:
+    """The size of what allowed motions in a block feel of a row of six, and whether that is more than round-off."""
+    part = list(whole[block])
+    for column, inverse in zip(structure.columns, structure.inverses, strict=True) if structure else ():
+        share = inverse * total([a * b for a, b in zip(part, column, strict=True)])
+        part = [a - share * b for a, b in zip(part, column, strict=True)]
+    square = total([c * c for c in part])
+    return sqrt(square), square > UNREACHED_COMPONENT * total([c * c for c in whole])
+
+
+def acceleration_faces(
+    given: Transmission,
+    rows: Sequence[Twist],
+    bounds: Sequence[tuple[Scalar, Scalar]],
+    carried: Sequence[Scalar],
+) -> list[Face]:
+    """Return all faces of the set of accelerations from rest that the drives allow, as `wrench_faces` does of wrenches.
+
+    Args:
+        given: how drives and platform act on each other.
+        rows: for each drive, its load per unit of acceleration at the tool point.
+        bounds: least and greatest load of each drive, N or N·m.
+        carried: what each drive carries at rest.
+
+    Source: theory (82) with what a drive carries by an acceleration in the place of what it carries by a wrench.
+    """
+    return wrench_faces(replace(given, shares=tuple(rows)), bounds, carried)
+
+
+def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: slice) -> Scalar:
+    """The greatest acceleration from rest that the drives allow in whichever direction the machine can move.
+
+    Without turning (m/s²), or for the other block about the tool point without moving it (rad/s²). Negative where the
+    drives do not hold what they carry at rest; infinite where nothing that moves has a mass; NaN where nothing moves.
+
+    Args:
+        faces: of the set of accelerations.
+        given: how drives and platform act on each other.
+        block: of `BLOCKS`.
+    """
+    grow, turning, structure = given.length, block.start == 0, _structure(given, block)
+    radius: Scalar = math.inf
+    for face in faces:
+        rotational, translational = face.normal.rotational, face.normal.translational * grow
+        size, felt = _allowed_size((*rotational.components(), *translational.components()), block, structure)
+        needed = size if turning else size * reciprocal(grow)
+        radius = smaller(where(felt, face.room * reciprocal(where(felt, needed, 1.0)), _reach_if_unfelt(face)), radius)
+    stopped = total([where(inverse > 0.0, 1.0, 0.0) for inverse in structure.inverses]) if structure else 0.0
+    return where(stopped < 2.5, radius, math.nan)
+
+
+def greatest_acceleration_along(faces: Sequence[Face], given: Transmission, row: int) -> Scalar:
+    """The greatest acceleration from rest of one component alone, either way; 0 where the structure forbids it.
+
+    Args:
+        faces, given: see `greatest_acceleration`.
+        row: of rx ry rz x y z = 0 ... 5.
+    """
+    return _where_structure_allows(given, row, greatest_along(faces, row, given.length))
 
 
 def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int) -> Scalar:
@@ -396,7 +384,12 @@ def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int
         square, whole = _components_in_newtons(wrench, shrink)[row], _components_in_newtons(wrench, shrink)
         felt = square * square > UNREACHED_COMPONENT * total([c * c for c in whole])
         rate = smaller(where(felt, speed * reciprocal(where(felt, part, 1.0)), math.inf), rate)
+    return _where_structure_allows(given, row, rate)
+
+
+def _where_structure_allows(given: Transmission, row: int, amount: Scalar) -> Scalar:
+    """An amount of one component alone, or 0 where the structure forbids this motion."""
     for wrench in given.constraints:
-        entry = _components_in_newtons(wrench, shrink)[row]
-        rate = where(entry * entry > UNREACHED_COMPONENT, 0.0, rate)
-    return rate
+        entry = _components_in_newtons(wrench, reciprocal(given.length))[row]
+        amount = where(entry * entry > UNREACHED_COMPONENT, 0.0, amount)
+    return amount

@@ -27,6 +27,8 @@ from kinetostat.kinetostatics.extremes import (
 )
 from kinetostat.kinetostatics.feasible import (
     BLOCKS,
+    greatest_acceleration,
+    greatest_acceleration_along,
     greatest_along,
     greatest_ball,
     greatest_speed,
@@ -64,8 +66,9 @@ class MapQuantity:
         modal: whether it is about natural vibrations, so that the machine must have masses.
         cut: whether it is about the receptance across a cut, which is computed pose by pose and has no derivatives.
         cables: whether it is about the tensions of cables, or what they can hold; it has no derivatives.
-        driven: what of its drives it is about: "load" or "speed", which the file must then limit, or "reversal", for
-            which it must give lost motion; empty if nothing.
+        driven: what of its drives it is about: "load" or "speed", which the file must then limit, "acceleration", for
+            which it must limit loads and have masses, or "reversal", for which it must give lost motion; empty if
+            nothing.
     """
 
     name: str
@@ -234,18 +237,32 @@ def _of_cables() -> list[MapQuantity]:
 
 def _of_drives() -> list[MapQuantity]:
     """Loads that the drives hold and speeds that they allow: in all directions, and along each component."""
-    words = {"translation": ("force", "N", "speed", "m/s"), "rotation": ("moment", "N·m", "rate", "rad/s")}
+    words = {
+        "translation": ("force", "N", "speed", "m/s", "acceleration"),
+        "rotation": ("moment", "N·m", "rate", "rad/s", "angular_acceleration"),
+    }
     entries = []
-    for block, (load, unit, motion, rate) in words.items():
-        ball, quick = partial(_ball, block=BLOCKS[block]), partial(_quickness, block=BLOCKS[block])
-        symbols = [rf"${letter}_{{\mathrm{{{word},min}}}}$" for letter, word in (("w", load), ("t", motion))]
+    for block, (load, unit, motion, rate, gain) in words.items():
+        ball = partial(_held, measure=greatest_ball, row=BLOCKS[block])
+        quick = partial(_allowed, measure=greatest_speed, row=BLOCKS[block])
+        strong = partial(_acceleration, measure=greatest_acceleration, row=BLOCKS[block])
+        pairs = (("w", load), ("t", motion), ("a", "turn" if block == "rotation" else "move"))
+        symbols = [rf"${letter}_{{\mathrm{{{word},min}}}}$" for letter, word in pairs]
         entries += [
             MapQuantity(f"least_wrench_{load}", unit, symbols[0], ball, better="more", driven="load"),
             MapQuantity(f"least_twist_{motion}", rate, symbols[1], quick, better="more", driven="speed"),
+            MapQuantity(f"least_{gain}", f"{rate}**2", symbols[2], strong, better="more", driven="acceleration"),
         ]
+    held, allowed = partial(_held, measure=greatest_along), partial(_allowed, measure=greatest_speed_along)
+    gained = partial(_acceleration, measure=greatest_acceleration_along)
     for row, name in enumerate(COMPONENTS):
-        _, unit, _, rate = words["rotation" if row in ROTATIONS else "translation"]
-        for word, letter, value, shown in (("wrench", "w", _along, unit), ("twist", "t", _speed_along, rate)):
+        _, unit, _, rate, *_ = words["rotation" if row in ROTATIONS else "translation"]
+        words_of_drives = (
+            ("wrench", "w", held, unit, "load"),
+            ("twist", "t", allowed, rate, "speed"),
+            ("acceleration", "a", gained, f"{rate}**2", "acceleration"),
+        )
+        for word, letter, value, shown, about in words_of_drives:
             symbol = rf"${letter}_{{\mathrm{{{name},max}}}}$"
             entries.append(
                 MapQuantity(
@@ -255,26 +272,27 @@ def _of_drives() -> list[MapQuantity]:
                     partial(value, row=row),
                     (name,),
                     "more",
-                    driven="load" if word == "wrench" else "speed",
+                    driven=about,
                 )
             )
     return sorted(entries, key=lambda entry: entry.name.rpartition("_")[0])
 
 
-def _ball(response: Response, block: slice) -> Scalar:
-    return greatest_ball(response.faces, block, response.configuration.length)
+def _held(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+    """A number of the wrenches that drives hold."""
+    return measure(response.faces, row, response.configuration.length)
 
 
-def _along(response: Response, row: int) -> Scalar:
-    return greatest_along(response.faces, row, response.configuration.length)
+def _allowed(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+    """A number of the speeds that drives allow."""
+    return measure(response.transmission, [drive.speed for drive in response.drives], row)
 
 
-def _quickness(response: Response, block: slice) -> Scalar:
-    return greatest_speed(response.transmission, [drive.speed for drive in response.drives], block)
-
-
-def _speed_along(response: Response, row: int) -> Scalar:
-    return greatest_speed_along(response.transmission, [drive.speed for drive in response.drives], row)
+def _acceleration(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+    """A number of the accelerations that drives allow; NaN where they have not been computed."""
+    if response.acceleration_loads is None:
+        return math.nan
+    return measure(response.acceleration_faces, response.transmission, row)
 
 
 def _of_reversal() -> list[MapQuantity]:
@@ -363,6 +381,8 @@ QUANTITIES = {
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
 
+CARRYING = ("load", "acceleration")
+"""What quantities are about for which it counts what drives carry already."""
 LOADS_OF_ACTUATORS = ("actuator_force", "actuator_moment")
 """Quantities that are about the machine at rest if it is meant so, and to first order about the free one else."""
 
@@ -381,18 +401,24 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
     names = list(names)
     wanted = {QUANTITIES[name].loaded for name in names} - {""}
     bounded = limited and limits_loads(machine.tables["limits"])
-    carries = bounded or any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven == "load" for name in names)
+    carries = bounded or any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
     return wanted | {"actuators"} if machine.loaded and carries else wanted
 
 
+def needs_masses(names: Iterable[str]) -> bool:
+    """Whether quantities need what drives carry by accelerations (`motion.operators.loads_by_acceleration`)."""
+    return any(QUANTITIES[name].driven == "acceleration" for name in names)
+
+
 def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) -> bool:
-    """Whether quantities need more of a pose than its linear response: a state of rest, vibrations, or tensions.
+    """Whether quantities need more of a pose than its linear response: a state of rest, masses, or tensions.
 
     Args:
         machine, names, limited: see `rest_numbers`.
     """
+    names = list(names)
     wanted = [QUANTITIES[name] for name in names]
-    beyond = any(quantity.modal or quantity.cables for quantity in wanted)
+    beyond = any(quantity.modal or quantity.cables for quantity in wanted) or needs_masses(names)
     return beyond or bool(rest_numbers(machine, [quantity.name for quantity in wanted], limited))
 
 
@@ -402,6 +428,7 @@ GROUPS = {
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
     "greatest_wrench": tuple(f"greatest_wrench_{name}" for name in COMPONENTS),
     "greatest_twist": tuple(f"greatest_twist_{name}" for name in COMPONENTS),
+    "greatest_acceleration": tuple(f"greatest_acceleration_{name}" for name in COMPONENTS),
     "reversal_error": tuple(f"reversal_error_{name}" for name in COMPONENTS),
     "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
     "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),

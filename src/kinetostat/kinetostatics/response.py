@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
-from kinetostat.algebra.screw import Wrench
+from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
@@ -20,7 +20,8 @@ from kinetostat.kinematics.closing import Joints, within_reach
 from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.kinetostatics.feasible import DriveLimits, Face, Transmission, drive_limits, transmission, wrench_faces
+from kinetostat.kinetostatics.drive_limits import DriveLimits, drive_limits
+from kinetostat.kinetostatics.feasible import Face, Transmission, acceleration_faces, transmission, wrench_faces
 from kinetostat.late import LateModule
 from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
 from kinetostat.machine.limits import limits_loads
@@ -63,6 +64,8 @@ class Response:
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
         cables: numbers of cables (`equilibrium.cables`), where they have been computed.
         drives: what each drive may do, in the order of the actuators that hold something.
+        acceleration_loads: load of each drive per unit of acceleration at the tool point (`motion.operators`), where it
+            has been computed.
     """
 
     configuration: Configuration
@@ -86,6 +89,7 @@ class Response:
     softest: Scalar | None = None
     cables: Mapping[str, Any] | None = None
     drives: tuple[DriveLimits, ...] = ()
+    acceleration_loads: Sequence[Twist] | None = None
     regularity = renamed_property("singularity_margin")
 
     @cached_property
@@ -106,7 +110,19 @@ class Response:
     @cached_property
     def faces(self) -> list[Face]:
         """The wrenches that the drives hold beside the loads that count already, theory (82)."""
-        return wrench_faces(self.transmission, [(drive.lower, drive.upper) for drive in self.drives], self.drive_loads)
+        return wrench_faces(self.transmission, self._bounds, self.drive_loads)
+
+    @cached_property
+    def acceleration_faces(self) -> list[Face]:
+        """The accelerations from rest that the drives allow beside the loads that count already; none if not known."""
+        rows = self.acceleration_loads
+        if rows is None:
+            return []
+        return acceleration_faces(self.transmission, rows, self._bounds, self.drive_loads)
+
+    @property
+    def _bounds(self) -> list[tuple[Scalar, Scalar]]:
+        return [(drive.lower, drive.upper) for drive in self.drives]
 
     @property
     def undecided(self) -> bool:

@@ -9,7 +9,9 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from kinetostat.algebra.scalar import Scalar, total
+from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.solve import Row, dual_basis
+from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.machine import Configuration, Machine
@@ -18,6 +20,7 @@ from kinetostat.motion.forces import (
     DriveStatics,
     ForceDemand,
     demands,
+    drive_forces,
     drive_statics,
     inertia,
     weight,
@@ -200,6 +203,27 @@ def mass_at_drives(here: MachineAtPose) -> list[Row]:
     rates = [[row[a] * unit for row in by_name] for a, unit in enumerate(units)]
     nothings = [0.0] * len(rates)
     return Operators(mass, [nothings] * len(rates), nothings, rates, [nothings] * len(rates)).at_drives()[0]
+
+
+def loads_by_acceleration(here: MachineAtPose) -> list[Twist]:
+    """Load of each drive, positive where its joint is pulled open, per unit of acceleration of the platform from rest.
+
+    A drive that accelerates a machine by a, at the tool point, carries a . row of it beside what it carries at rest:
+    N, or N·m of rotary drives, per m/s² and rad/s². Accelerations that structure does not allow do not count in a row.
+
+    Source: theory (90) and (92).
+    """
+    rigid, shrink = here.rigid, 1.0 / here.rigid.length
+    rows: list[list[Scalar]] = [[0.0] * 6 for _ in rigid.drives]
+    for way in here.statics.ways:
+        moved = machine_motion(rigid, Moving(Twist(Vector(*way[:3]), Vector(*way[3:])), STILL))
+        forces = drive_forces(rigid, here.statics, inertia(rigid, _from_rest(moved)))
+        rows = [[a - b * f for a, b in zip(row, way, strict=True)] for row, f in zip(rows, forces, strict=True)]
+    levers = [1.0 if drive.slides else rigid.length for drive in rigid.drives]
+    return [
+        Twist(Vector(*row[:3]) * lever, Vector(*row[3:]) * (lever * shrink))
+        for row, lever in zip(rows, levers, strict=True)
+    ]
 
 
 def _from_rest(motion: MachineMotion) -> MachineMotion:

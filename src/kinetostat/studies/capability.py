@@ -12,26 +12,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.feasible import (
-    BLOCKS,
-    Transmission,
-    drive_limits,
-    greatest_ball,
-    greatest_speed,
-)
+from kinetostat.kinetostatics.drive_limits import drive_limits
+from kinetostat.kinetostatics.feasible import BLOCKS, Transmission, greatest_acceleration, greatest_ball, greatest_speed
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
+from kinetostat.motion.operators import loads_by_acceleration
 from kinetostat.numerics.polytopes import reach_along, vertices
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.dynamics import dynamics
+from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
@@ -169,11 +166,10 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
     response = _with_loads(state)
     drives = _drives(response)
     sets = []
-    inertia = _inertia_at_drives(state) if "load" in kinds else None
     for block in ("translation", "rotation"):
         loads = _wrenches(response, drives, block) if "load" in kinds else None
         rates = _twists(response, drives, block) if "speed" in kinds else None
-        gains = None if inertia is None else _accelerations(response, drives, block, inertia)
+        gains = _accelerations(response, drives, block) if "load" in kinds else None
         sets += [each for each in (loads, rates, gains) if each is not None]
     return Capability(state, Status.OK, _message(state.machine, sets), drives, tuple(sets), direction)
 
@@ -188,10 +184,20 @@ def limits_of_drives(state: MachineState) -> set[str]:
 
 def _with_loads(state: MachineState) -> Response:
     """The machine at its pose, with what its drives carry at rest where it is meant so."""
+    response = replace(state.free, acceleration_loads=_acceleration_loads(state))
     if not state.machine.loaded or state.at_rest is None:
-        return state.free
+        return response
     carried = [float(load[0]) for _, load in actuator_loads_at_rest(state.at_rest)]
-    return replace(state.free, loaded={"drive_loads": carried})
+    return replace(response, loaded={"drive_loads": carried})
+
+
+def _acceleration_loads(state: MachineState) -> list[Twist] | None:
+    """Loads of drives per unit of acceleration; None without masses, or where drives do not move the machine alone."""
+    try:
+        rows = loads_by_acceleration(rigid_form_of(state).at(state))
+    except InputError:
+        return None
+    return rows if any(float(c) for row in rows for c in row.components()) else None
 
 
 def _drives(response: Response) -> tuple[DriveAtPose, ...]:
@@ -243,40 +249,23 @@ def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> Ca
     return _set(name, unit, least, matrix, bounds, directions, names * 2)
 
 
-def _inertia_at_drives(state: MachineState) -> Array | None:
-    """M over the drives, along their joints [drives x drives]; None without masses, or if drives cannot move alone.
-
-    Source: theory (95).
-    """
-    try:
-        moving = dynamics(state)
-        mass = moving.mass_at_drives * np.outer(moving.senses, moving.senses)
-    except InputError:
-        return None
-    return mass if np.isfinite(mass).all() and np.diagonal(mass).any() else None
-
-
-def _accelerations(
-    response: Response, drives: Sequence[DriveAtPose], block: str, inertia: Array
-) -> CapabilitySet | None:
+def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
     """The accelerations from rest that the drives allow, without turning or of turns alone; None if it has none.
 
-    A drive that accelerates carries tau_0 - (M q'')_a, with q'' = g_a . a. Friction does not count.
-
-    Source: theory (84) and (95).
+    Friction does not count.
     """
-    moving = _motions(response.transmission, block)
-    if moving is None or len(moving[1]) != len(inertia):
+    directions = _null_space(_block_of(response.transmission.constraints, block), response.transmission, block)
+    if not response.acceleration_faces or not directions.shape[1]:
         return None
-    directions, rates = moving
-    rows = inertia @ rates
+    whole = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)[:, BLOCKS[block]]
+    rows = whole @ directions @ directions.T
     sizes = np.linalg.norm(rows, axis=1)
-    felt = sizes > DEPENDENT * sizes.max(initial=0.0)
-    carried, lower, upper = (np.array([getattr(d, name) for d in drives]) for name in ("carried", "lower", "upper"))
-    names = [(drive.name,) for drive, seen in zip(drives, felt, strict=True) if seen]
+    felt = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
+    faces = [response.acceleration_faces[number] for number in felt]
+    names = [tuple(drives[drive].name for drive in face.drives) for face in faces]
     matrix = np.vstack([rows[felt], -rows[felt]])
-    bounds = np.concatenate([(carried - lower)[felt], (upper - carried)[felt]])
-    least = float((bounds / np.tile(sizes[felt], 2)).min(initial=math.inf))
+    bounds = np.array([float(face.upper) for face in faces] + [-float(face.lower) for face in faces])
+    least = float(greatest_acceleration(response.acceleration_faces, response.transmission, BLOCKS[block]))
     unit = "m/s**2" if block == "translation" else "rad/s**2"
     name = "acceleration" if block == "translation" else "angular acceleration"
     return _set(name, unit, least, matrix, bounds, directions, names * 2)
@@ -322,12 +311,14 @@ def _motions(given: Transmission, block: str) -> tuple[Array, Array] | None:
     """
     if given.wrenches is None:
         return None
-    stopped, driven = (
-        np.array([wrench.components() for wrench in some], dtype=float).reshape(-1, 6)[:, BLOCKS[block]]
-        for some in (given.constraints, given.wrenches)
-    )
+    stopped, driven = (_block_of(some, block) for some in (given.constraints, given.wrenches))
     directions = _null_space(stopped, given, block)
     return (directions, driven @ directions @ directions.T) if directions.shape[1] else None
+
+
+def _block_of(wrenches: Sequence[Wrench], block: str) -> Array:
+    """Components of wrenches in a block [n x 3]."""
+    return np.array([wrench.components() for wrench in wrenches], dtype=float).reshape(-1, 6)[:, BLOCKS[block]]
 
 
 def _null_space(stopped: Array, given: Transmission, block: str) -> Array:

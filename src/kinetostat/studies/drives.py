@@ -21,7 +21,7 @@ from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.feasible import driven_springs
+from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine

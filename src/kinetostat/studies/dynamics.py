@@ -16,7 +16,7 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS
-from kinetostat.kinetostatics.feasible import driven_springs
+from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import joint_actuators, name_of, senses_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values

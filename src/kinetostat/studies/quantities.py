@@ -15,8 +15,8 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinetostatics.feasible import drive_limits
-from kinetostat.kinetostatics.quantities import GROUPS, MOST_CABLES, QUANTITIES, rest_numbers
+from kinetostat.kinetostatics.drive_limits import drive_limits
+from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
@@ -167,7 +167,7 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
         InputError: names the quantity, and what the machine lacks or its file must say.
     """
     machine = state.machine
-    weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal]
+    weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal or needs_masses([name])]
     if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
         refuse_unknown_mass(machine, weighing[0], state.configuration)
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
@@ -225,6 +225,7 @@ def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: 
             _refuse_without_lost_motion(state, name, varied)
             continue
         drives = drive_limits(state.machine, state.configuration)
+        what = "load" if what in CARRYING else what
         linear, first, rotary, second = LIMITS_OF_DRIVES[what]
         fields = [(linear, first)] * any(d.spring.joint.point is None for d in drives)
         fields += [(rotary, second)] * any(d.spring.joint.point is not None for d in drives)

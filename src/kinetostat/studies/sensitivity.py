@@ -16,7 +16,14 @@ from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
+from kinetostat.kinetostatics.quantities import (
+    CARRYING,
+    LOADS_OF_ACTUATORS,
+    QUANTITIES,
+    needs_masses,
+    needs_state,
+    rest_numbers,
+)
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
@@ -240,8 +247,10 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     """Whether any of the quantities may depend on a parameter."""
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
     loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
-    if path.startswith(NEVER) or (path.startswith(VIBRATION_FIELDS) and not modal):
+    accelerated = needs_masses(names)
+    if path.startswith(NEVER) or (path.startswith(VIBRATION_FIELDS) and not (modal or accelerated)):
         return False
+    modal = modal or accelerated
     if parameter.quantity.kind == "inertia":
         return modal
     massive = KINDS[parameter.quantity.kind].heavy or path.startswith("drives.")
@@ -249,7 +258,7 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
         return here[path] != 0.0  # a link or rotor without mass has no motion of its own
     if loaded:
         return not path.startswith(NOT_EVEN_LOADED)
-    driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven == "load" for name in names)
+    driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
     if driven and path.startswith(("load.", "tool.")):
         return not path.startswith(NOT_EVEN_LOADED)  # to first order, actuators carry the loads and the platform
     if ".centre_of_mass." in path or (modal and path.startswith("tool.")):

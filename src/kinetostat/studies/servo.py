@@ -17,7 +17,7 @@ from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.feasible import driven_springs
+from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked

@@ -10,8 +10,9 @@ QUANTITIES = (
     "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
     "actuator_moment (the greatest under [load]), mass (of all moving parts), frequency (the six lowest natural "
     "frequencies) or frequency_1, least_wrench_force, least_wrench_moment, least_twist_speed, least_twist_rate, "
-    "greatest_wrench, greatest_twist (loads and speeds that the drives allow in all directions, and along each "
-    "component), reversal_error, least_real_receptance and stable_width (across [cutting]); tension, least_tension, "
+    "least_acceleration, least_angular_acceleration, greatest_wrench, greatest_twist, greatest_acceleration (loads, "
+    "speeds and accelerations that the drives allow in all directions, and along each component), "
+    "reversal_error, least_real_receptance and stable_width (across [cutting]); tension, least_tension, "
     "greatest_tension, tension_reserve, capacity and wrench_closure (of cables); of the machine at rest under its "
     "loads: "
     'displacement (the default where [load] says state = "loaded"), tangent_stiffness, tangent_free_stiffness, '
