@@ -6,6 +6,7 @@ Source: theory section 10. At the tool point, base axes.
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from operator import attrgetter
 from typing import Literal, TypeAlias
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, where
@@ -92,14 +93,6 @@ def _compliance(response: Response, i: int, j: int) -> Scalar:
 
 def _stiffness(response: Response, i: int, j: int) -> Scalar:
     return response.stiffness.entry(i, j)
-
-
-def _singularity_margin(response: Response) -> Scalar:
-    return response.singularity_margin
-
-
-def _mass(response: Response) -> Scalar:
-    return response.mass
 
 
 def _compliance_unit(i: int, j: int) -> str:
@@ -238,32 +231,36 @@ def _of_cables() -> list[MapQuantity]:
 def _of_drives() -> list[MapQuantity]:
     """Loads that the drives hold and speeds that they allow: in all directions, and along each component."""
     words = {
-        "translation": ("force", "N", "speed", "m/s", "acceleration"),
-        "rotation": ("moment", "N·m", "rate", "rad/s", "angular_acceleration"),
+        "translation": ("force", "N", "speed", "m/s", ""),
+        "rotation": ("moment", "N·m", "rate", "rad/s", "angular_"),
     }
     entries = []
-    for block, (load, unit, motion, rate, gain) in words.items():
-        ball = partial(_held, measure=greatest_ball, row=BLOCKS[block])
-        quick = partial(_allowed, measure=greatest_speed, row=BLOCKS[block])
-        strong = partial(_acceleration, measure=greatest_acceleration, row=BLOCKS[block])
+    for block, (load, unit, motion, rate, turning) in words.items():
+        ball = partial(_wrench_number, measure=greatest_ball, row=BLOCKS[block])
+        quick = partial(_speed_number, measure=greatest_speed, row=BLOCKS[block])
+        strong = partial(_acceleration_number, measure=greatest_acceleration, row=BLOCKS[block])
         pairs = (("w", load), ("t", motion), ("a", "turn" if block == "rotation" else "move"))
         symbols = [rf"${letter}_{{\mathrm{{{word},min}}}}$" for letter, word in pairs]
         entries += [
             MapQuantity(f"least_wrench_{load}", unit, symbols[0], ball, better="more", driven="load"),
             MapQuantity(f"least_twist_{motion}", rate, symbols[1], quick, better="more", driven="speed"),
-            MapQuantity(f"least_{gain}", f"{rate}**2", symbols[2], strong, better="more", driven="acceleration"),
+            MapQuantity(
+                f"least_{turning}acceleration", f"{rate}**2", symbols[2], strong, better="more", driven="acceleration"
+            ),
         ]
-    held, allowed = partial(_held, measure=greatest_along), partial(_allowed, measure=greatest_speed_along)
-    gained = partial(_acceleration, measure=greatest_acceleration_along)
+    of_wrenches, of_speeds = (
+        partial(_wrench_number, measure=greatest_along),
+        partial(_speed_number, measure=greatest_speed_along),
+    )
+    of_accelerations = partial(_acceleration_number, measure=greatest_acceleration_along)
     for row, name in enumerate(COMPONENTS):
         _, unit, _, rate, *_ = words["rotation" if row in ROTATIONS else "translation"]
-        words_of_drives = (
-            ("wrench", "w", held, unit, "load"),
-            ("twist", "t", allowed, rate, "speed"),
-            ("acceleration", "a", gained, f"{rate}**2", "acceleration"),
-        )
-        for word, letter, value, shown, about in words_of_drives:
-            symbol = rf"${letter}_{{\mathrm{{{name},max}}}}$"
+        for word, value, shown, about in (
+            ("wrench", of_wrenches, unit, "load"),
+            ("twist", of_speeds, rate, "speed"),
+            ("acceleration", of_accelerations, f"{rate}**2", "acceleration"),
+        ):
+            symbol = rf"${word[0]}_{{\mathrm{{{name},max}}}}$"
             entries.append(
                 MapQuantity(
                     f"greatest_{word}_{name}",
@@ -278,17 +275,17 @@ def _of_drives() -> list[MapQuantity]:
     return sorted(entries, key=lambda entry: entry.name.rpartition("_")[0])
 
 
-def _held(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+def _wrench_number(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
     """A number of the wrenches that drives hold."""
     return measure(response.faces, row, response.configuration.length)
 
 
-def _allowed(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+def _speed_number(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
     """A number of the speeds that drives allow."""
     return measure(response.transmission, [drive.speed for drive in response.drives], row)
 
 
-def _acceleration(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
+def _acceleration_number(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
     """A number of the accelerations that drives allow; NaN where they have not been computed."""
     if response.acceleration_loads is None:
         return math.nan
@@ -348,8 +345,8 @@ QUANTITIES = {
         *_entries("compliance", "C", _compliance_unit, _compliance, "less"),
         *_entries("stiffness", "K", _stiffness_unit, _stiffness, "more"),
         *_free_stiffnesses(),
-        MapQuantity("singularity_margin", "1", "singularity margin", _singularity_margin, better="more"),
-        MapQuantity("mass", "kg", "moving mass", _mass, better="less"),
+        MapQuantity("singularity_margin", "1", "singularity margin", attrgetter("singularity_margin"), better="more"),
+        MapQuantity("mass", "kg", "moving mass", attrgetter("mass"), better="less"),
         MapQuantity("aspect", "1", "aspect", aspect, whole=True),
         *_extremes(),
         MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition, better="less"),
@@ -382,7 +379,7 @@ QUANTITIES = {
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
 
 CARRYING = ("load", "acceleration")
-"""What quantities are about for which it counts what drives carry already."""
+"""Subjects of quantities for which it counts what drives carry already."""
 LOADS_OF_ACTUATORS = ("actuator_force", "actuator_moment")
 """Quantities that are about the machine at rest if it is meant so, and to first order about the free one else."""
 
