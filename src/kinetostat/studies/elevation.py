@@ -28,7 +28,7 @@ from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import limit_use
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.feasible import lost_motion
+from kinetostat.kinetostatics.drive_limits import lost_motion
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
