@@ -1,8 +1,8 @@
-"""Evaluates a machine at any number of points: its function, slab by slab, in threads. No formula lives here.
+"""Evaluate a machine at any number of points: its function, slab by slab, in threads. No formula lives here.
 
-A `Function` gives the numbers of a machine as functions of some of its parameters, in machine code whatever the number
-of points, so that one pose has the digits that it has among many. The last functions are kept by the machine itself,
-not by what is in it: who asks for one again has it without a look at the machine's numbers.
+A `Function` gives the numbers of a machine as functions of some of its parameters. It is machine code for any number of
+points, so that one pose has the same digits alone and among many. The last functions are kept by the identity of the
+machine, so that asking for one again does not compare the machine's numbers.
 """
 
 import math
@@ -28,9 +28,9 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
 
 NUMPY_SLAB = 4096
-"""Points per NumPy call: intermediates stay in the second cache level."""
+"""Points per NumPy call, so that intermediate arrays stay in the second level of the cache."""
 FUNCTIONS_KEPT = 64
-"""Functions kept in memory with their machines."""
+"""Number of functions kept in memory with their machines."""
 NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt takes effect soon."""
 
@@ -79,8 +79,8 @@ def evaluate(
             pays to compile states of rest and vibrations for few points as well.
     """
     function = function_of(machine, points.paths, quantities, math.inf if repeated else points.size)
-    served = points if part is None else ConsecutivePoints(points, part.start, part.stop)
-    results, status = function.at(served, progress, threads)
+    evaluated = points if part is None else ConsecutivePoints(points, part.start, part.stop)
+    results, status = function.at(evaluated, progress, threads)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
 
 
@@ -89,10 +89,10 @@ class Function:
     """Numbers of a machine as functions of some of its parameters. Threads may share it.
 
     Attributes:
-        fill: evaluates slabs.
+        fill: function that evaluates a slab.
         paths: leaf paths of the parameters.
-        rows: how many numbers there are for each point.
-        slab: points of a slab; None for the number that suits machine code.
+        rows: number of results at each point.
+        slab: number of points of a slab; None for the number that suits machine code.
     """
 
     fill: Fill
@@ -108,12 +108,12 @@ class Function:
             progress: called after each slab.
             threads: number of slabs computed at the same time; by default the number of processors.
         """
-        most = available_cores()
-        return in_slabs(points, self.fill, self.rows, self.slab or NATIVE_SLAB, min(threads or most, most), progress)
+        cores = available_cores()
+        return in_slabs(points, self.fill, self.rows, self.slab or NATIVE_SLAB, min(threads or cores, cores), progress)
 
     @property
     def direct(self) -> ProgramFill | None:
-        """The single program that evaluates the function at nearly all points, where nothing is computed before it."""
+        """The program that evaluates the function alone at nearly all points; None if it needs results of others."""
         fill = self.fill.first if isinstance(self.fill, FallingBack) else self.fill
         return fill if isinstance(fill, ProgramFill) and fill.alone else None
 
@@ -123,15 +123,15 @@ def function_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str
 
     Args:
         machine: gives all parameters that do not vary.
-        paths: leaf paths of those that do.
+        paths: leaf paths of the parameters that vary.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
-        count: points at which it will be evaluated; of few, states of rest and vibrations are not found in machine
-            code, which takes seconds to compile.
+        count: number of points at which it will be evaluated. For few points, states of rest and vibrations are not
+            found by machine code, which takes seconds to compile.
     """
-    same, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)
-    if not _needs_state(same, quantities):
-        return _function(same, paths, quantities)
-    return _function(same, paths, quantities, way_of(machine, paths, quantities, count))
+    key, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)
+    if not _needs_state(key, quantities):
+        return _function(key, paths, quantities)
+    return _function(key, paths, quantities, way_of(machine, paths, quantities, count))
 
 
 @lru_cache(FUNCTIONS_KEPT)
@@ -149,7 +149,7 @@ def _function(
 
 
 Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
-"""A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
+"""Makes the function that evaluates slabs, from a machine, its varying paths and names of quantities."""
 
 
 def in_slabs(
@@ -207,7 +207,7 @@ def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence
 
 
 def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int) -> Iterator[int]:
-    """Run the task over all starts, in order. Few tasks wait at a time, so that an interrupt takes effect soon."""
+    """Run the task for all starts, in order. Few tasks wait at a time, so that an interrupt takes effect soon."""
     if threads == 1 or len(starts) == 1:
         yield from map(task, starts)
         return
@@ -233,8 +233,8 @@ class PopulationResults:
     Attributes:
         values: by name [designs x poses]; NaN where the status is not OK.
         status: `Status` codes [designs x poses].
-        slopes: derivatives of each quantity in turn by each path [quantities x paths x designs x poses], where they
-            have been computed.
+        slopes: derivatives of each quantity by each path [quantities x paths x designs x poses]; None if they were not
+            computed.
     """
 
     values: dict[str, Array]
@@ -251,7 +251,7 @@ class PopulationResults:
 
 
 def evaluate_designs(machine: Machine, population: Population, quantities: Sequence[str]) -> PopulationResults:
-    """Compute quantities of every design at every pose; the size of a population alone decides how it is cut.
+    """Compute quantities of every design at every pose.
 
     Args:
         machine: gives all parameters that do not vary.
@@ -280,7 +280,7 @@ def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: S
     """Find the first limit, in the order of the checks, that each point passes: its index in `fields`, or -1.
 
     Args:
-        machine: with its limits.
+        machine: the machine with its limits.
         columns: values of the varying parameters by leaf path, SI [points].
         fields: names of the limits that are set.
     """
@@ -309,7 +309,7 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
 
 
 def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
-    """The limits with which points are compared, a slab of points at a time."""
+    """The comparisons of points with their limits, slab by slab, with the part of the points that each slab is."""
     size, judged_at_rest = len(next(iter(columns.values()))), "actuators" in rest_numbers(machine, ())
     slab = Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
     for start in range(0, size, slab):

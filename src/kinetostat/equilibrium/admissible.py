@@ -1,7 +1,7 @@
 """Admissible motions: small motions of platform and coordinates that keep all legs closed, and statics over them.
 
-Rigid parts of several legs often hold the same motion, so that closing conditions repeat each other. Which ones do is
-decided here, by geometry alone: in equations that hold stiffnesses too, soft springs could not be told from round-off.
+Rigid parts of several legs often hold the same motion, so that closing conditions repeat each other. Geometry alone
+decides here which ones do: in equations with stiffnesses, soft springs could not be distinguished from round-off.
 
 Source: theory (38) and (39). Units, axes and origin are those of `mechanism`; arrays have the poses first.
 """
@@ -18,7 +18,7 @@ from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT, OPEN_BY_STEP, UN
 
 
 def starts_of(equations: Balance) -> Integers:
-    """The first place of each leg's coordinates, after those of the platform's twist, and the end of the last one's."""
+    """Place of each leg's first coordinate among twist and coordinates, without wrenches, and the number of all."""
     sizes = [leg.size for leg in equations.mechanism.legs]
     return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
 
@@ -26,8 +26,8 @@ def starts_of(equations: Balance) -> Integers:
 def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
     """The matrices of springs, of loads and wrenches that turn, and of closing conditions, for small motions.
 
-    The first two are over the twist of the platform and all coordinates [n x N x N]; the third, over the same, must
-    give 0 [n x conditions x N].
+    All are over the twist of the platform and all coordinates, N numbers: the first two are [n x N x N], and the third
+    [n x conditions x N], whose product with a small motion is zero if the legs stay closed.
     """
     mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
     count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
@@ -53,13 +53,13 @@ def gaps_of(equations: Balance) -> Array:
 
 @dataclass(frozen=True)
 class Admissible:
-    """Poses at which as many closing conditions A are independent, and what keeps A x = 0.
+    """The admissible motions at poses at which the same number of closing conditions A x = 0 are independent.
 
     Attributes:
         rows: numbers of the poses [k].
         motions: a basis of the admissible motions, as columns [k x coordinates x m].
-        inverse: A+, of the independent conditions [k x coordinates x conditions], with A A+ b = b for all gaps b that
-            can be closed.
+        inverse: A+, the inverse of the independent conditions [k x coordinates x conditions]: A A+ b = b for all gaps b
+            that can be closed.
     """
 
     rows: Integers
@@ -68,21 +68,21 @@ class Admissible:
 
 
 def admissible(equations: Balance, conditions: Array, rows: Integers | None = None) -> Iterator[Admissible]:
-    """Sort poses by the number of their independent conditions.
+    """Find the admissible motions, in groups of poses with the same number of independent conditions.
 
-    Where the coordinates of each leg follow from its end, the motions of the platform are a basis, in a hundredth of
-    the time. Elsewhere A = U diag(s) V^T gives an orthonormal one.
+    If the coordinates of each leg follow from its end, the motions of the platform are a basis, which takes a hundredth
+    of the time. Elsewhere A = U diag(s) V^T gives an orthonormal basis.
 
     Args:
         equations: the equations at the states.
-        conditions: A of them [n x conditions x coordinates].
-        rows: numbers of the poses to be sorted; those at which the conditions are finite if None.
+        conditions: their closing conditions A [n x conditions x coordinates].
+        rows: numbers of the poses; those at which the conditions are finite if None.
     """
     rows = np.flatnonzero(np.isfinite(conditions).all(axis=(1, 2))) if rows is None else rows
-    following = _following(equations, conditions[rows], rows)
-    if following is not None:
-        yield following
-        rows = np.setdiff1d(rows, following.rows)
+    by_platform = _motions_of_platform(equations, conditions[rows], rows)
+    if by_platform is not None:
+        yield by_platform
+        rows = np.setdiff1d(rows, by_platform.rows)
     if not len(rows):
         return
     left, values, right = np.linalg.svd(conditions[rows])
@@ -95,8 +95,8 @@ def admissible(equations: Balance, conditions: Array, rows: Integers | None = No
         yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
 
 
-def _following(equations: Balance, conditions: Array, rows: Integers) -> Admissible | None:
-    """The motions of the platform, and of legs that follow it in one way each, where they surely do."""
+def _motions_of_platform(equations: Balance, conditions: Array, rows: Integers) -> Admissible | None:
+    """The motions of the platform with those of the legs that follow; only poses at which legs surely follow it."""
     size, starts = equations.mechanism.ways.shape[1], starts_of(equations)
     if any(leg.size != size for leg in equations.mechanism.legs):
         return None
@@ -114,21 +114,22 @@ def _following(equations: Balance, conditions: Array, rows: Integers) -> Admissi
 
 
 def within(matrix: Array, allowed: Array) -> Array:
-    """The symmetric part of a matrix M over some motions, the columns of Z: that of Z^T M Z [n x k x k]."""
+    """The symmetric part of Z^T M Z, which is the matrix M over the motions in the columns of Z [n x k x k]."""
     return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
 
 
 def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Array:
     """Solve the linear equations at a state over the admissible motions, for right sides [n x unknowns x k].
 
-    Twist and coordinates are x = A+ b + Z y, where Z^T H Z y balances what is left. Springs enter by the triangular
-    factor of diag(sqrt k) Z, the stiffest first, and not by Z^T H Z, so that contrasts cost half of their digits. Of
-    the wrenches of legs that are not determined, those of least norm are taken. NaN where the equations are not finite.
+    Twist and coordinates are x = A+ b + Z y, where Z^T H Z y balances the remaining forces. Springs enter by the
+    triangular factor of diag(sqrt k) Z, the stiffest first, and not by Z^T H Z, so that contrasts of stiffness cost
+    half as many digits. If wrenches of legs are not determined, those of least norm are taken. The result is NaN where
+    the equations are not finite.
 
     Args:
         equations: the equations at the state.
         right: right sides, in the order of the unknowns.
-        loaded: whether to count what loads and wrenches do by turning.
+        loaded: whether loads and wrenches that turn count.
     """
     elastic, geometric, conditions = tangent_matrices(equations)
     geometric = geometric if loaded else np.zeros_like(geometric)
@@ -139,11 +140,11 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     for part in admissible(equations, conditions, np.flatnonzero(np.all(sound, axis=0))):
         whole = elastic[part.rows] + geometric[part.rows]
         motion = part.inverse @ gap[part.rows]
-        back = np.swapaxes(part.motions, 1, 2)
+        transposed = np.swapaxes(part.motions, 1, 2)
         if part.motions.shape[2]:
-            resisted = back @ (force[part.rows] - whole @ motion)
-            bent = back @ geometric[part.rows] @ part.motions
-            motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), bent, resisted)
+            remaining = transposed @ (force[part.rows] - whole @ motion)
+            turning = transposed @ geometric[part.rows] @ part.motions
+            motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), turning, remaining)
         wrenches = np.swapaxes(part.inverse, 1, 2) @ (whole @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
@@ -158,12 +159,12 @@ def places_of(equations: Balance) -> tuple[Integers, Integers]:
 
 
 def spring_factor(equations: Balance, part: Admissible) -> Array:
-    """Upper triangular R with R^T R the stiffness of the springs over the admissible motions [k x m x m]."""
+    """Upper triangular R, for which R^T R is the stiffness of the springs over the admissible motions [k x m x m]."""
     size = equations.mechanism.ways.shape[1]
     stiff = [terms.carrying[part.rows] for terms in equations.legs]
     roots = np.sqrt(np.concatenate(stiff, axis=1)) if stiff else np.zeros((len(part.rows), 0))
     stretched = roots[:, :, None] * part.motions[:, size:]
-    # Householder's reflections keep small rows below large ones, and lose them above.
+    # Householder's reflections keep the digits of small rows below large ones, and lose them above.
     order = np.argsort(-roots, axis=1, kind="stable")
     rows = [np.take_along_axis(stretched, order[:, :, None], axis=1)]
     for leg, (first, last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
@@ -179,23 +180,23 @@ def holds_all(springs: Array) -> Mask:
     return np.asarray(sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1))
 
 
-def _balanced_motion(springs: Array, bent: Array, force: Array) -> Array:
-    """The motions y with (R^T R + G) y = f: by R where springs hold every motion, else as one matrix."""
+def _balanced_motion(springs: Array, turning: Array, force: Array) -> Array:
+    """The motions y with (R^T R + G) y = f: by R if springs hold every motion, else by the sum as one matrix."""
     holds = holds_all(springs)
     result = np.zeros_like(force)
     if holds.any():
         inverse = np.linalg.inv(springs[holds])
         back = np.swapaxes(inverse, 1, 2)
-        turned = np.eye(springs.shape[1]) + back @ bent[holds] @ inverse
-        result[holds] = inverse @ finite_solution(turned, back @ force[holds])
+        scaled = np.eye(springs.shape[1]) + back @ turning[holds] @ inverse
+        result[holds] = inverse @ finite_solution(scaled, back @ force[holds])
     if not holds.all():
-        whole = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + bent[~holds]
+        whole = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + turning[~holds]
         result[~holds] = finite_solution(whole, force[~holds])
     return result
 
 
 def finite_solution(rates: Array, right: Array) -> Array:
-    """Solutions of linear equations; NaN where these are not finite, which a pose without a place leaves behind."""
+    """Solutions of linear equations; NaN where these are not finite, as at poses at which legs cannot be placed."""
     sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
     result = np.full((*rates.shape[:2], right.shape[2]), np.nan)
     try:

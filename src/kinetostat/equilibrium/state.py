@@ -1,8 +1,8 @@
 """A machine in a state: free, with relaxed springs, or at rest under its loads. Every question about a pose reads it.
 
-What follows from a pose is computed when it is first asked for, and kept: where the legs are, their screws, K and C,
-what moves, the equations at rest, and how the machine stands there. A state is made once and handed on, so that no two
-answers solve for the same joints. What is not about a pose, and what an answer says in words, has no place here.
+What follows from a pose is computed when it is first asked for, and kept: places and screws of the legs, K and C,
+mobility, the equations at rest, and their stability. A state is made once and handed on, so that no two answers solve
+for the same joints. Sentences of answers, and numbers that do not belong to a pose, are not in this file.
 """
 
 from collections.abc import Mapping
@@ -58,18 +58,18 @@ else:
 
 HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
 """Statuses without loads at which a machine may come to rest: tension and weight hold where springs do not."""
-SOUGHT_NO_REST = (*PLACELESS, Status.UNDECIDED)
-"""Statuses without loads at which nobody can look for a rest: no place, or no knowing what carries a load."""
-NEARBY = 0.03
-"""Distance from the pose at which general mobility is sought: share of the characteristic length; in angles, rad."""
+WITHOUT_SEARCH_FOR_REST = (*PLACELESS, Status.UNDECIDED)
+"""Statuses without loads at which no state of rest can be sought: legs cannot be placed, or loads are undecided."""
+NEARBY_DISTANCE = 0.03
+"""Distance of poses nearby, which show general mobility, as a share of the characteristic length; of angles, rad."""
 
 
 @dataclass(frozen=True, eq=False)
 class MachineState(Immutable):
     """A machine at its pose, or at n poses, with all that follows from it.
 
-    `machine.loaded` says which state is meant: free, or at rest under all loads of the file. What is `free`, or
-    about limits and motions, is known of both; what is at rest is solved for where somebody asks.
+    `machine.loaded` says which state is meant: free, or at rest under all loads of the file. The free state, limits and
+    mobility are known of both; the state of rest is solved for when it is asked for.
 
     Attributes:
         machine: the machine with its pose and its loads, or with columns of n poses.
@@ -86,7 +86,7 @@ class MachineState(Immutable):
         return MachineState, (self.machine, self.count)
 
     def at(self, rows: Integers) -> "MachineState":
-        """The states at some of the poses [rows]; this one where these are all of them."""
+        """The states at some of the poses [rows]; this object if these are all of them."""
         if len(rows) == self.count:
             return self
         columns = {p: value.values[rows] for p, value in values(self.machine).items() if isinstance(value, Column)}
@@ -94,7 +94,7 @@ class MachineState(Immutable):
 
     @cached_property
     def joints(self) -> Joints | None:
-        """Joint coordinates that close the legs; None of a family that places its legs in closed form."""
+        """Joint coordinates that close the legs; None for a family that places its legs in closed form."""
         return closure.solve_joints(self.machine) if self.machine.family.chains else None
 
     @cached_property
@@ -104,15 +104,15 @@ class MachineState(Immutable):
 
     @cached_property
     def free(self) -> Response:
-        """The free machine: screws of its legs, K and C, and its limits as far as they are about it."""
+        """The response of the free machine: screws of its legs, K and C, and limits of the pose without loads."""
         return respond(self.machine, self.joints, self.configuration)
 
     @cached_property
     def response(self) -> Response:
-        """The free machine, judged in the state that is meant: limits compare what actuators carry there.
+        """The response of the free machine, with the limits of actuators' loads compared in the state that is meant.
 
-        Nothing changes where nothing limits the loads of actuators, where the machine comes to no rest, and where its
-        loads say too little: the answer about its rest says so.
+        It is `free` itself if nothing limits these loads, if the machine comes to no rest, and if masses or bounds are
+        missing in the file: the answer under load then says so.
         """
         if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.status) not in HELD_BY_LOADS:
             return self.free
@@ -123,8 +123,8 @@ class MachineState(Immutable):
         if not stands:
             return self.free
         checks = load_checks(self.machine, self.configuration, self.actuator_loads)
-        passed = int(self.free.status) == Status.OK and not within(checks)
-        status = Status.JOINT_LIMIT if passed else self.free.status
+        beyond = int(self.free.status) == Status.OK and not within(checks)
+        status = Status.JOINT_LIMIT if beyond else self.free.status
         return replace(self.free, status=status, checks=(*self.free.checks, *checks))
 
     @cached_property
@@ -134,24 +134,24 @@ class MachineState(Immutable):
 
     @cached_property
     def nearby(self) -> list[Configuration]:
-        """The machine at up to three poses near its pose, to tell what holds in general from what is special here."""
+        """The machine at up to three poses near its pose, which show whether the mobility is special to the pose."""
         return _nearby(self.machine, float(self.configuration.length))
 
     @cached_property
     def mobility(self) -> Mobility | None:
-        """Motions that are free, and the sort of the pose; None where the joints have no place."""
+        """Free motions and the kind of the pose; None if the joints cannot be placed."""
         return known_mobility(self.free, self.nearby)
 
     @cached_property
     def refusal(self) -> str:
-        """Why the pose has no answer, and what to change, in a sentence or two; empty where it has one."""
+        """The reason why the pose has no answer, and what to change, in a sentence or two; empty if it has one."""
         if self.status is Status.OK:
             return ""
         return why_not(self.machine, self.response, self.nearby if self.status is Status.SINGULAR else [])
 
     @cached_property
     def left_out(self) -> str:
-        """A sentence on the loads of the file that do not count in the state that is meant; empty where all do."""
+        """A sentence on the loads of the file that do not count in the state that is meant; empty if all do."""
         return "" if self.machine.loaded else loads_left_out(self.machine, self.configuration)
 
     @cached_property
@@ -171,7 +171,7 @@ class MachineState(Immutable):
         """The machine with all its loads and the tensions that its file leaves open, as rows of screw motions.
 
         Raises:
-            InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
+            InputError: there is gravity but no mass in the file, or bounds of tensions contradict each other.
         """
         return self._loads[0]
 
@@ -182,10 +182,10 @@ class MachineState(Immutable):
 
     @cached_property
     def at_rest(self) -> "Balance | None":
-        """The equations where the machine is at rest under its loads at a single pose, stable or not.
+        """The equations of the state of rest under the loads at a single pose, stable or not.
 
-        None where the machine has no place, where rigid parts leave undecided what carries a load, or where it comes to
-        no rest.
+        None if the legs cannot be placed, if rigid parts leave undecided what carries a load, or if the machine comes
+        to no rest.
 
         Raises:
             InputError: as for `mechanism`.
@@ -197,29 +197,29 @@ class MachineState(Immutable):
 
     @cached_property
     def stability(self) -> "Stability | None":
-        """Whether the machine stays where it is at rest, and how far its loads may grow; None without a rest."""
+        """Stability of the state of rest, and the factor by which the loads may grow; None without a state of rest."""
         return None if self.at_rest is None else tangent.stability(self.at_rest)
 
     @property
     def stands(self) -> bool:
-        """Whether the machine comes to rest under its loads and its springs hold it there."""
+        """Whether the machine comes to a stable state of rest under its loads."""
         return self.stability is not None and self.stability.stable
 
     @property
     def equations(self) -> "Balance | None":
-        """The equations in the state that is meant, at a single pose; None where it comes to no stable rest."""
+        """The equations in the state that is meant, at a single pose; None if the machine comes to no stable rest."""
         if not self.machine.loaded:
             return self.free_equations
         return self.at_rest if self.stands else None
 
     @cached_property
     def limit(self) -> "LoadLimit | None":
-        """The state in which the machine stands last while its loads grow, up to all of them; None if it never does."""
+        """The last stable state of rest while the loads grow, up to all of them; None if there is none."""
         return load_limit.limit_of(self.mechanism)
 
     @cached_property
     def struts(self) -> "tuple[Strut, ...]":
-        """The struts whose E I is known, with what presses them at rest; none without a rest."""
+        """The struts whose E I is known, with their compression at rest; none without a state of rest."""
         if self.at_rest is None:
             return ()
         configuration, joints = self.configuration, None if self.joints is None else self.joints.coordinates
@@ -228,14 +228,14 @@ class MachineState(Immutable):
 
     @cached_property
     def actuator_loads(self) -> list[tuple[Spring, float]]:
-        """Every actuator with the size of what it carries at rest, N or N·m; none without a rest."""
+        """Every actuator with the size of its force or moment at rest, N or N·m; none without a state of rest."""
         loads = [] if self.at_rest is None else actuator_loads_at_rest(self.at_rest)
         return [(spring, float(abs(load[0]))) for spring, load in loads]
 
 
 @checked
 def state_of(machine: Machine | MachineState) -> MachineState:
-    """The state of a machine at its pose; a state that has been made already is handed on as it is."""
+    """The state of a machine at its pose; a state is returned as it is."""
     return machine if isinstance(machine, MachineState) else MachineState(machine)
 
 
@@ -244,21 +244,20 @@ def states_at(machine: Machine, columns: Mapping[str, Array], count: int) -> Mac
 
     Args:
         machine: gives all parameters that do not vary.
-        columns: values of those that vary by leaf path, SI [n].
-        count: n.
+        columns: values of the parameters that vary, by leaf path, SI [n].
+        count: number of poses, n.
     """
     return MachineState(with_values(machine, columns), count)
 
 
 def _nearby(machine: Machine, length: float) -> list[Configuration]:
-    """Return the machine at up to three poses near its pose: those that it can reach, of three that are tried.
+    """Return the machine at those of three poses near its pose that it can reach; `length` is characteristic, m.
 
     Mobility is a rank, and a rank can drop at a special pose, so that other poses must show what holds in general. They
     are random, so that none lies on a symmetry of the machine, but the seed is fixed, so that they never change.
-    `length` is the characteristic length.
     """
     kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
-    reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
+    reach = {path: NEARBY_DISTANCE * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
     here, rng = values(machine), Random(0)
     poses = [{path: here[path] + r * rng.uniform(-1.0, 1.0) for path, r in reach.items()} for _ in range(3)]
     answers = [respond(with_values(machine, pose)) for pose in poses]
@@ -266,7 +265,7 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
 
 
 def actuator_loads_at_rest(equations: "Balance") -> list[tuple[Spring, Array]]:
-    """Return every actuator with what it carries in a state, N or N·m, positive where it is pulled open [n]."""
+    """Return every actuator with its force or moment in a state, N or N·m, positive if it is pulled open [n]."""
     mechanism = equations.mechanism
     holding = total([terms.holding for terms in equations.legs])
     units = [mechanism.force * (1.0 if spring.joint.point is None else mechanism.length) for spring in mechanism.driven]
@@ -279,10 +278,10 @@ def _loaded_mechanism(
     """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
 
     Returns:
-        The mechanism, and where tensions within their bounds hold its loads; everywhere if none are to be chosen [n].
+        The mechanism, and whether tensions within their bounds hold its loads [n]; true if none are to be chosen.
 
     Raises:
-        InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
+        InputError: there is gravity but no mass in the file, or bounds of tensions contradict each other.
     """
     mechanism = mechanisms.mechanism_of(machine, configuration, joints, count)
     check_loads(machine, count, mechanism.weighs)
@@ -309,7 +308,7 @@ def _loaded_mechanism(
 
 
 def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
-    """Refuse loads at n poses that say too little.
+    """Refuse loads at n poses if the file lacks a number that they need.
 
     Args:
         machine: the machine with its loads.
@@ -317,8 +316,8 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         weighs: whether any of its masses is known.
 
     Raises:
-        InputError: there is gravity but nothing says a mass, or it turns about no axis; links are warmer, but nothing
-            says how they grow.
+        InputError: there is gravity but no mass, or it is turned about an axis that is zero; or links are warmer, but
+            their expansion is not given.
     """
     load = machine.tables["load"]
     if not weighs and np.any(stacked_columns(load.gravity, count)):

@@ -1,6 +1,6 @@
-"""Files of natural vibrations: modes as CSV or NetCDF, the state space as a MATLAB file or NetCDF. Computes nothing.
+"""Write natural vibrations to files: modes as CSV or NetCDF, the state space as a MATLAB file or NetCDF.
 
-The suffix of the file decides which of the two it is.
+The suffix of the file decides between the two. Nothing is computed here.
 """
 
 from collections.abc import Sequence
@@ -57,18 +57,16 @@ def write_state_space(
 
 
 def state_space_dataset(answer: StateSpace) -> xr.Dataset:
-    """Return A, B, C and D with the names of states, inputs and outputs; `rate` are the rates of the states."""
+    """Return A, B, C and D with the names of states, inputs and outputs; `rate` has rates of the states."""
     equations, states = answer.equations, list(answer.equations.states)
-    units = {"units": "SI, of the output per input"}
-    damping = {"long_name": "damping ratio", "units": "1"}
     return xr.Dataset(
         {
             "A": (("rate", "state"), equations.a, {"units": "1/s"}),
             "B": (("rate", "input"), equations.b, {"units": "SI, of the rate per input"}),
             "C": (("output", "state"), equations.c, {"units": "SI, of the output per state"}),
-            "D": (("output", "input"), equations.d, units),
+            "D": (("output", "input"), equations.d, {"units": "SI, of the output per input"}),
             "frequency": (("mode",), list(answer.frequencies), {"long_name": "natural frequency", "units": "Hz"}),
-            "damping_ratio": (("mode",), list(answer.ratios), damping),
+            "damping_ratio": (("mode",), list(answer.ratios), {"long_name": "damping ratio", "units": "1"}),
         },
         {
             "rate": states,

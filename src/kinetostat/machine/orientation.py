@@ -1,7 +1,7 @@
-"""Orientations as people have them: quaternions, rotation matrices, tilt and torsion; turned into roll, pitch and yaw.
+"""Orientations as people write them, quaternions, rotation matrices, tilt and torsion, converted to roll, pitch, yaw.
 
 Machine files, overrides and Python may give any of these in the place of the three angles. Everything after reading
-knows the angles Q = Rz(yaw) Ry(pitch) Rx(roll) alone. Tilt and torsion are those of I. A. Bonev, "Advantages of the
+uses the angles of Q = Rz(yaw) Ry(pitch) Rx(roll) alone. Tilt and torsion are those of I. A. Bonev, "Advantages of the
 modified Euler angles in the design and control of PKMs" (2002): Q = Rz(azimuth) Ry(angle) Rz(torsion - azimuth). In the
 base frame.
 """

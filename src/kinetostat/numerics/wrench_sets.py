@@ -1,8 +1,8 @@
 """Sets of wrenches that forces within bounds can hold, by their faces, and the distance of wrenches from them.
 
-Such a set is a sum of segments (a zonotope), or of rays where forces may be as large as they like. Each of its faces
-lies across a direction at right angles to all but one dimension of the wrenches of unit forces, so that the faces are
-found without a vertex. Which forces act, and along which lines, is not known here.
+Such a set is a sum of segments (a zonotope), or of rays if forces have no upper bound. In d dimensions each of its
+faces contains d - 1 of the wrenches of unit forces, so that its normal is perpendicular to these, and the faces are
+found without computing a vertex. Which forces act, and along which lines, is not known here.
 
 Source: theory (78); S. Bouchard, C. Gosselin and B. Moore, "On the ability of a cable-driven robot to generate a
 prescribed set of wrenches", J. Mechanisms and Robotics 2 (2010); capacity: F. Guay, P. Cardou, A. Cruz-Ruiz and S.
@@ -20,47 +20,48 @@ from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.tolerances import DEGENERATE_FACE, UNRESISTED
 
-LARGEST = 1e300
-"""Stands for a force without a bound: a face that such a force moves is out of every wrench's reach."""
-UNBOUNDED = 1e200
-"""Distance beyond which a face is there only because of `LARGEST`."""
+UNBOUNDED_FORCE = 1e300
+"""Number that stands for a force without a bound: a face that such a force moves is beyond every wrench."""
+FARTHEST_FACE = 1e200
+"""Distance beyond which a face exists only because of `UNBOUNDED_FORCE`."""
 MOST_NUMBERS = 120_000
-"""Numbers in the largest array of a slab, so that it stays in the second level of the cache."""
+"""Greatest number of entries of an array in a slab, so that it stays in the second level of the cache."""
 
 
 @dataclass(frozen=True)
 class Faces:
-    """Directions across the faces of n sets of wrenches.
+    """Normals of the faces of n sets of wrenches.
 
     Attributes:
-        normals: unit vectors; NaN where the forces of a face are dependent [d x faces x n].
-        pulls: parts of unit forces along them, exactly 0 of those in the face [faces x m x n].
+        normals: unit normals; NaN where the forces of a face are dependent [d x faces x n].
+        pulls: components of the wrenches of unit forces along the normals, exactly 0 for those in the face
+            [faces x m x n].
     """
 
     normals: Array
     pulls: Array
 
     def ends(self, least: Array, most: Array) -> tuple[Array, Array]:
-        """The reach of the sets along the normals, and against them [faces x n].
+        """The extent of the sets along the normals, and against them [faces x n].
 
         Args:
             least, most: bounds of every force [m x n]; `most` may be infinite.
         """
         forth, back = np.maximum(self.pulls, 0.0), np.maximum(-self.pulls, 0.0)
-        high = np.where(np.isinf(most), LARGEST, most)  # 0 times infinity would be nothing that counts
+        high = np.where(np.isinf(most), UNBOUNDED_FORCE, most)  # 0 times infinity would be NaN
         above = (forth * high).sum(axis=1) - (back * least).sum(axis=1)
         below = (back * high).sum(axis=1) - (forth * least).sum(axis=1)
         return above, below
 
 
 def faces(wrenches: Array) -> Faces:
-    """Find the directions across all faces of the sets of wrenches.
+    """Find the normals of all faces of the sets of wrenches.
 
-    The direction is the product of the d - 1 wrenches in the face, whose components are their minors. The minors of
-    the first wrenches are those of many faces and are computed once.
+    The normal is the cross product of the d - 1 wrenches in the face, whose components are their minors. Minors of the
+    first wrenches belong to many faces and are computed once.
 
     Args:
-        wrenches: those of unit forces, as columns [d x m x n].
+        wrenches: wrenches of unit forces, as columns [d x m x n].
     """
     size, count = wrenches.shape[:2]
     unit = wrenches / np.maximum(np.sqrt((wrenches * wrenches).sum(axis=0)), UNRESISTED)
@@ -81,7 +82,7 @@ def faces(wrenches: Array) -> Faces:
 
 
 def _next_minors(minors: Array, unit: Array, order: int) -> Array:
-    """Minors of `order` columns from those of one less: sets of rows, then sets of columns, in lexical order."""
+    """Minors of `order` columns from those of one less [row sets x column sets x n], in lexical order."""
     size, count = unit.shape[:2]
     sets, rows = list(combinations(range(count), order)), list(combinations(range(size), order))
     before = {columns: place for place, columns in enumerate(combinations(range(count), order - 1))}
@@ -99,15 +100,14 @@ def _next_minors(minors: Array, unit: Array, order: int) -> Array:
 def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: Array | None = None) -> Array:
     """The distance of required wrenches from the faces of the set that forces within bounds can hold [n].
 
-    It is that of the outermost one from the nearest face, negative by its distance beyond a face if it is
-    outside; infinite where the set has no face, and NaN where the wrenches of all forces span less than their space by
-    two dimensions.
+    It is the distance of the outermost required wrench from the nearest face, negative if that wrench is outside. It is
+    infinite if the set has no face, and NaN if the wrenches of all forces span two dimensions less than their space.
 
     Args:
-        wrenches: those of unit forces, as columns [n x d x m].
+        wrenches: wrenches of unit forces, as columns [n x d x m].
         least, most: bounds of every force [n x m]; `most` may be infinite.
-        required: wrenches all of which must be held, as all mixtures of them then are [n x k x d].
-        box: half the sizes of a box of wrenches about each of them [n x d]; no box if it is left out.
+        required: wrenches that must all be held [n x k x d]; mixtures of them are then held as well.
+        box: half the sizes of a box of wrenches about each of them [n x d]; no box if it is None.
     """
     count, size, forces = wrenches.shape
     result = np.empty(count)
@@ -118,19 +118,19 @@ def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: A
         along = np.stack(
             [sum(a * b for a, b in zip(across.normals, w.T, strict=True)) for w in required[part].transpose(1, 0, 2)]
         )
-        more = sum(a * b for a, b in zip(np.abs(across.normals), half[part].T, strict=True))
-        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - more
+        of_box = sum(a * b for a, b in zip(np.abs(across.normals), half[part].T, strict=True))
+        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - of_box
         known = ~np.isnan(across.normals[0])
         distance = np.where(known, inside, np.inf).min(axis=0)
-        result[part] = np.where(known.any(axis=0), np.where(distance > UNBOUNDED, np.inf, distance), np.nan)
+        result[part] = np.where(known.any(axis=0), np.where(distance > FARTHEST_FACE, np.inf, distance), np.nan)
     return result
 
 
 def wrench_closure(wrenches: Array) -> Array:
-    """The wrench that forces from 0 to 1 can hold in every direction [n]: positive where they hold any wrench.
+    """The wrench that forces from 0 to 1 can hold in every direction [n]; if it is positive, forces hold any wrench.
 
     Args:
-        wrenches: those of unit forces, as columns [n x d x m].
+        wrenches: wrenches of unit forces, as columns [n x d x m].
     """
     count, size, forces = wrenches.shape
     unit = np.ones((count, forces))

@@ -16,7 +16,7 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.actuation import commanded_state
-from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, states_at
+from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, states_at
 from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, pose_of
@@ -135,7 +135,7 @@ def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int)
     """Solve one slab of poses; None where the machine can have no state of rest at any of them."""
     state = states_at(machine, columns, count)
     status = np.broadcast_to(state.free.status, (count,))
-    rows = np.flatnonzero(~np.isin(status, SOUGHT_NO_REST))
+    rows = np.flatnonzero(~np.isin(status, WITHOUT_SEARCH_FOR_REST))
     if not len(rows):
         return None
     placed = {path: column[rows] for path, column in columns.items()}

@@ -1,4 +1,4 @@
-"""Quantities of a machine at poses of the user's own: arrays and CSV; `datasets` labels them for Python."""
+"""Quantities of a machine at poses that a user gives: arrays and CSV. `datasets` makes labelled arrays of them."""
 
 import csv
 import io
@@ -24,9 +24,9 @@ from kinetostat.studies.poses import PoseColumns
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
-"""Whole matrices by name, and how the names of their entries begin."""
+"""Beginning of the names of entries, by the name of the matrix."""
 MACHINES_KEPT = 8
-"""Machines about which facts that do not depend on the poses are kept, by identity."""
+"""Number of machines, by identity, whose facts that do not depend on the poses are kept."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PoseAnswers:
         matrices: "K", "C", both or none.
         values: values by quantity, with the entries of the matrices [poses]; NaN where the status is not OK.
         status: `Status` codes [poses].
-        loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
+        loads_left_out: a sentence on the loads of the file that do not count; empty if all do.
     """
 
     machine: Machine
@@ -101,7 +101,7 @@ def answers_at(
 
 @lru_cache(MACHINES_KEPT)
 def _state_and_cables(machine: Identical) -> tuple[MachineState, int]:
-    """The state of a machine at its pose, where all that it has computed is still there, and its number of cables."""
+    """The state of a machine at its pose, kept with everything that it has computed, and the number of cables."""
     return state_of(machine.value), cable_count(machine.value)
 
 

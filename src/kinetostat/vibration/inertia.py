@@ -1,8 +1,8 @@
 """The mass matrix of a mechanism at a state: kinetic energy by the rates of its platform and of its legs' coordinates.
 
-A part moves with the screws of the motions that carry it. A uniform bar is straight between its ends and has the
-kinetic energy of both ends' velocities, so that it needs no coordinates of its own; it does not spin about its axis.
-Arrays have the poses first, or hold scalars of any kind for one pose. Nothing is solved here.
+A part moves with the screws of the motions that carry it. A uniform bar is straight between its ends, and its kinetic
+energy follows from the velocities of both ends, so that it needs no coordinates of its own; spin about its axis does
+not count. Arrays have the poses first, or hold scalars of any kind for one pose. Nothing is solved here.
 
 Source: theory (55)-(57). Units are those of `equilibrium.mechanism`; masses are multiplied by the length, so that
 eigenvalues are in 1/s².
@@ -28,9 +28,9 @@ class PartRates:
     """Motion of a mass by the rates of some coordinates.
 
     Attributes:
-        moving: velocity of its point [n x 3 x coordinates].
-        turning: angular velocity of its body [n x 3 x coordinates].
-        tensor: inertia about the point where it is [n x 3 x 3]; None where it has none.
+        moving: velocity of its point per unit of each rate [n x 3 x coordinates].
+        turning: angular velocity of its body per unit of each rate [n x 3 x coordinates].
+        tensor: inertia about its point [n x 3 x 3]; None if it has none.
     """
 
     moving: Array
@@ -39,7 +39,7 @@ class PartRates:
 
 
 def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
-    """The inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None where it has none."""
+    """The inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None if it has none."""
     entries = masses.inertia[:, number]
     if all(is_zero(entry) for entry in entries.flat) if entries.dtype == object else not entries.any():
         return None
@@ -53,10 +53,10 @@ def leg_rates(leg: ElasticLeg, placed: PlacedChain) -> list[PartRates]:
     rates = []
     for number, carried in enumerate(leg.masses.carried):
         motion, screws = placed.before[carried], placed.screws[:, :carried]
-        at = motion.point(leg.masses.point[:, number])
-        moving = cross(screws[..., :3], at[:, None]) + screws[..., 3:]
-        moved, turned = (np.swapaxes(part, 1, 2) @ follows[:carried] for part in (moving, screws[..., :3]))
-        rates.append(PartRates(moved, turned, tensor_of(leg.masses, number, motion)))
+        point = motion.point(leg.masses.point[:, number])
+        velocities = cross(screws[..., :3], point[:, None]) + screws[..., 3:]
+        moving, turning = (np.swapaxes(part, 1, 2) @ follows[:carried] for part in (velocities, screws[..., :3]))
+        rates.append(PartRates(moving, turning, tensor_of(leg.masses, number, motion)))
     return rates
 
 
@@ -64,16 +64,16 @@ def platform_rates(masses: Masses, platform: Motions) -> list[PartRates]:
     """Motion of each mass of the platform by its twist, at the origin."""
     rates = []
     for number in range(len(masses.carried)):
-        at = platform.point(masses.point[:, number])
-        ones = np.broadcast_to(np.eye(3), (len(at), 3, 3))
-        moving = np.concatenate([-skew_of(at), ones], axis=2)
-        turning = np.concatenate([ones, np.zeros((len(at), 3, 3))], axis=2)
+        point = platform.point(masses.point[:, number])
+        ones = np.broadcast_to(np.eye(3), (len(point), 3, 3))
+        moving = np.concatenate([-skew_of(point), ones], axis=2)
+        turning = np.concatenate([ones, np.zeros((len(point), 3, 3))], axis=2)
         rates.append(PartRates(moving, turning, tensor_of(masses, number, platform)))
     return rates
 
 
 def energies(masses: Masses, rates: Sequence[PartRates], length: Array) -> Iterator[tuple[str, Array]]:
-    """Mass matrices of parts with their names; their sum is that of all [n x coordinates x coordinates]."""
+    """Mass matrices of parts with their names, which add up to that of all parts [n x coordinates x coordinates]."""
     for name, part, uncoupled in zip(masses.names, rates, _columns(masses.uncoupled, length), strict=True):
         matrix = np.swapaxes(part.moving, 1, 2) @ part.moving * uncoupled[:, None, None]
         if part.tensor is not None:

@@ -28,7 +28,7 @@ class Turned:
     """A solid of revolution about z.
 
     Attributes:
-        profile: (radius, height) of its outline from below upwards, m.
+        profile: (radius, height) of the points of its outline, from below upwards, m.
     """
 
     profile: tuple[Point2, ...]
@@ -39,9 +39,9 @@ class Extruded:
     """A plate: an outline in the x-y plane, raised along z.
 
     Attributes:
-        outline: corners, counter-clockwise, m.
-        height: along z from 0, m.
-        chamfer: of all edges, m.
+        outline: corners in the x-y plane, counter-clockwise, m.
+        height: height of the plate, from z = 0, m.
+        chamfer: width of the chamfer of all edges, m.
     """
 
     outline: tuple[Point2, ...]
@@ -55,8 +55,8 @@ class Swept:
 
     Attributes:
         path: points of its axis, m.
-        radius: of the wire, m.
-        closed: whether its end is its beginning.
+        radius: radius of the wire, m.
+        closed: whether its end joins its beginning.
     """
 
     path: tuple[Point3, ...]
@@ -72,10 +72,10 @@ class Look:
     """A surface as physically based renderers describe it.
 
     Attributes:
-        color: of diffuse reflection, and of a metal also of its mirror images; sRGB as "#rrggbb".
+        color: colour of diffuse reflection, and for a metal also of mirror images; sRGB as "#rrggbb".
         metalness: 0 for plastics and paint, 1 for a bare metal.
         roughness: 0 for a mirror, 1 for chalk.
-        opacity: 1 unless it is translucent.
+        opacity: 1 for an opaque surface, less for a translucent one.
     """
 
     color: str
@@ -105,7 +105,7 @@ LOOKS = {
     "y axis": Look("#2c9c4a", 0.0, 0.5),
     "z axis": Look("#2d62d3", 0.0, 0.5),
 }
-"""Materials of solids, and how they look."""
+"""Looks by the names of materials."""
 
 
 def looks_data() -> dict[str, dict[str, Any]]:
@@ -133,13 +133,13 @@ class Solid:
     """A shape at its place.
 
     Attributes:
-        name: unique within its scene; the same part has the same name at every pose.
-        shape: in its own axes.
+        name: a name that is unique within its scene; the same part has the same name at every pose.
+        shape: its shape in its own axes.
         material: one of `LOOKS`.
-        place: from its own axes to the base frame.
-        scale: along its own axes.
+        place: displacement from its own axes to the base frame.
+        scale: factors along its own axes.
         layer: one of `LAYERS`.
-        leg: name of the leg that it belongs to; empty if none.
+        leg: name of the leg to which it belongs; empty if it belongs to none.
     """
 
     name: str
@@ -169,10 +169,10 @@ class Scene:
     """Solids and labels of a picture.
 
     Attributes:
-        solids, labels: in the base frame.
-        centre: of all solids, m.
-        size: its diagonal, m.
-        floor: height of the ground below it, m.
+        solids, labels: solids and labels in the base frame.
+        centre: centre of all solids, m.
+        size: diagonal of the box around all solids, m.
+        floor: height of the ground below them, m.
     """
 
     solids: tuple[Solid, ...]
@@ -246,7 +246,7 @@ def _round(number: float) -> float:
 def upright(origin: Vector, z: Vector, x: Vector | None = None) -> Displacement:
     """Return the place whose z axis is along `z`, and whose x axis is as near as possible to `x` (if that is given)."""
     up = unit(z)
-    hint = x if x is not None and up.cross(x).norm() > NO_DIRECTION * x.norm() else _far_from(up)
+    hint = x if x is not None and up.cross(x).norm() > NO_DIRECTION * x.norm() else _axis_across(up)
     side = unit(up.cross(hint))
     return Displacement(Rotation(side.cross(up), side, up), origin)
 
@@ -257,5 +257,6 @@ def unit(vector: Vector) -> Vector:
     return vector * (1.0 / size) if size > 0.0 else AXES[2]
 
 
-def _far_from(direction: Vector) -> Vector:
+def _axis_across(direction: Vector) -> Vector:
+    """The axis that is most nearly perpendicular to a direction."""
     return min(AXES, key=lambda axis: abs(axis.dot(direction)))
