@@ -67,7 +67,7 @@ def machine():
     return load("delta-linear")
 
 
-CASES = [("", True), ("", False), ("priors", True), ("priors", False), ("wide", True)]
+CASES = [("", True), ("", False), ("priors", True), ("priors", False), ("wide", True), ("wide", False)]
 """Whether seven numbers are fitted, with or without priors, or fourteen; and whether the probe's sigma is known."""
 
 
@@ -117,7 +117,7 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
     rates = base.observed.linearisation(np.zeros(len(base.unknowns)))[1]
     before = _sizes_by_name(base.unknowns, {"": {}, "priors": NARROW, "wide": WIDE}[what], "prior")
     wishes = Wishes(base.sizes, before, np.full(len(before), np.inf), np.full(len(before), PREFERENCE), False, known)
-    inside, ratios, freedoms = [], [], []
+    inside, ratios = [], []
     for _ in range(200):
         truth = somewhere(draw, what == "wide")
         paths = numbers_of(truth)
@@ -126,7 +126,6 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
         fit = best_fit(Linear(rates, true, noise), base.observed.pose, wishes)
         answer = replace(base, fit=fit)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
-        freedoms.append(fit.freedom)
         inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.sure, strict=True)]
         linear = firmware_numbers(replace(answer, fit=replace(fit, values=true)))
         numbers = firmware_numbers(answer)
@@ -134,7 +133,8 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
             parts = (np.atleast_1d(getattr(each, name)) for each in (numbers, linear))
             inside += [abs(a - b) <= h for a, b, h in zip(*parts, numbers.halves[name], strict=True) if h > 0.0]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
-    assert np.sqrt(np.average(ratios, weights=freedoms)) == pytest.approx(1.0, abs=0.1)
+    # Every printer counts once: where sigma is estimated, the freedom grows with it, and weights would choose great ones.
+    assert np.sqrt(np.mean(ratios)) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("what", ["", "priors", "wide"])

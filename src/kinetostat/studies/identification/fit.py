@@ -36,6 +36,8 @@ FOLDS = 5
 FULL_PREFERENCE = 50.0
 """The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
 would go where the curvature of the equations explains some of the noise."""
+TRIED_SPREADS = 400
+"""Standard deviations of measurements that are tried, by a constant factor; as many again between the best ones."""
 LEAST_FREEDOM = 0.5
 """Freedom of residuals at least: measured values that explain themselves say nothing of their standard deviation."""
 MOST_FIT_STEPS = 500
@@ -163,7 +165,11 @@ def best_fit(question: ResidualEquations, groups: Integers, wishes: Wishes, tell
             values = _least_squares(question, wishes, kept, values, seen, np.inf if squares else spread)
             after, rates = _rates_at(question, values, wishes)
             last, rank = spread, seen.rank
-            spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after, rates, kept, wishes, last)
+            spread = (
+                _spread(after, rates, wishes)
+                if wishes.judged
+                else _own_spread(after[kept], rates[kept], values, wishes)
+            )
             settled = abs(spread - last) <= SAME_SPREAD * last
     return _fit_result(before, after, rates, kept, values, groups, wishes)
 
@@ -190,16 +196,38 @@ def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
     return max(MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
 
 
-def _own_spread(residuals: Array, rates: Array, kept: Mask, wishes: Wishes, last: float) -> float:
-    """Estimate the standard deviation of measurements from their residuals, where priors weigh against these.
+def _own_spread(residuals: Array, rates: Array, values: Array, wishes: Wishes) -> float:
+    """Estimate the standard deviation of measurements from residuals, where priors weigh against these.
 
-    It is that of the kept residuals over their freedom, which depends on it: a few steps from the last one settle both.
+    It is the one for which the values are most likely whatever the unknowns are, to first order: errors as large as the
+    priors say, seen through the rates, and the measurements' own make up their variance along each combination that
+    is seen, and their own alone along all others. Where this is greatest, the squares of the residuals are the variance
+    times their freedom; but these may also agree, or nearly, far from there, where steps towards them would end.
+
+    Args:
+        residuals: of the kept rows, at the values [rows].
+        rates: of the same rows, per plausible size [rows x unknowns].
+        values: of the unknowns, SI [unknowns].
+        wishes: priors and preferences.
+
+    Source: D. MacKay, Neural Computation 4(3), 1992, equations 2.9 and 2.14.
     """
-    squares, spread = float((residuals[kept] ** 2).sum()), last
-    for _ in range(MOST_ROUNDS):
-        seen = _combinations(rates[kept], wishes, spread)
-        spread = max(np.sqrt(squares / _freedom(rates[kept], seen)), wishes.resolution)
-    return float(spread)
+    units = values / wishes.sizes
+    weights = np.hypot(wishes.sizes / wishes.priors, wishes.preferred)
+    ways, sizes, _ = np.linalg.svd(rates / np.maximum(weights, 1e-12), full_matrices=False)
+    whole = residuals + rates @ units
+    squares, total = (ways.T @ whole) ** 2, float(whole @ whole)
+    rest, others = max(total - float(squares.sum()), 0.0), len(whole) - len(sizes)
+    most = np.sqrt(total / len(whole)) + wishes.resolution
+    least, most = max(wishes.resolution, 1e-9 * most), max(most, 1e-300)
+    for _ in range(2):
+        tried = np.geomspace(max(least, 1e-300), max(most, least, 1e-300), TRIED_SPREADS)
+        variances = tried**2
+        each = variances[:, None] + sizes**2
+        unlikely = (np.log(each) + squares / each).sum(axis=1) + others * np.log(variances) + rest / variances
+        best = int(np.argmin(unlikely))
+        least, most = float(tried[max(best - 1, 0)]), float(tried[min(best + 1, TRIED_SPREADS - 1)])
+    return float(tried[best])
 
 
 def _freedom(rates: Array, seen: "_Combinations") -> float:
@@ -302,7 +330,7 @@ def _fit_result(
     wishes: Wishes,
 ) -> Fit:
     """Describe the fit at its values: covariance and intervals, theory (65), rank, and poses that took no part."""
-    spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after, rates, kept, wishes, 1.0)
+    spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after[kept], rates[kept], values, wishes)
     seen = _combinations(rates[kept], wishes, spread)
     rank, ways = seen.rank, seen.ways
     freedom = _freedom(rates[kept], seen)
