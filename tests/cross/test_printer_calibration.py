@@ -133,7 +133,7 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
             parts = (np.atleast_1d(getattr(each, name)) for each in (numbers, linear))
             inside += [abs(a - b) <= h for a, b, h in zip(*parts, numbers.halves[name], strict=True) if h > 0.0]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
-    # Every printer counts once: where sigma is estimated, the freedom grows with it, and weights would choose great ones.
+    # Every printer counts once: where sigma is estimated, freedoms grow with it, and weights would choose great ones.
     assert np.sqrt(np.mean(ratios)) == pytest.approx(1.0, abs=0.1)
 
 
