@@ -25,6 +25,8 @@ TURN_OPERATION = "turn"
 
 def with_gradients(body: Body, inputs: Sequence[Traced]) -> Body:
     """Return a body with further results: of each result in turn, its derivative by each input."""
+    if not inputs:
+        return body
     slopes = [slope for result in body.results for slope in gradient(result, inputs)]
     return Body(body.fixed, body.columns, [*body.results, *slopes], body.code)
 
