@@ -251,9 +251,13 @@ def needed(results: Iterable[Operand]) -> list[Node]:
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
-    """The key that tells an expression from others: nodes by number, floats by all their digits and their sign."""
-    names = [o.number if isinstance(o, Node) else repr(o) for o in operands]
-    return (operation, frozenset(names)) if operation in COMMUTATIVE else (operation, *names)
+    """The key that tells an expression from others: nodes as they are, floats by their value, zeros by their sign too."""
+    if operation in COMMUTATIVE:
+        a, b = operands
+        if isinstance(a, float) or (isinstance(b, Node) and b.number < a.number):
+            a, b = b, a
+        return operation, a, b if isinstance(b, Node) else b or repr(b)
+    return operation, *[o if isinstance(o, Node) else o or repr(o) for o in operands]
 
 
 def bounds_of(operation: str, operands: tuple[Operand, ...]) -> Bounds | None:
@@ -300,19 +304,15 @@ def _negated_operand(a: Operand) -> Any:
     return a.operands[0] if isinstance(a, Node) and a.operation == "neg" else None
 
 
-def _is(a: Operand, value: float) -> bool:
-    return isinstance(a, float) and a == value
-
-
 def _binary(operation: str, a: Operand, b: Operand) -> Traced:
     return (a if isinstance(a, Node) else b).graph.number(operation, a, b)  # type: ignore[union-attr]
 
 
 def _add(a: Any, b: Any) -> Any:
     a, b = _operand(a), _operand(b)
-    if _is(a, 0.0):
+    if a == 0.0:
         return b
-    if _is(b, 0.0):
+    if b == 0.0:
         return a
     if (minus := _negated_operand(b)) is not None:
         return _sub(a, minus)
@@ -323,9 +323,9 @@ def _add(a: Any, b: Any) -> Any:
 
 def _sub(a: Any, b: Any) -> Any:
     a, b = _operand(a), _operand(b)
-    if _is(b, 0.0):
+    if b == 0.0:
         return a
-    if _is(a, 0.0):
+    if a == 0.0:
         return -b
     if a is b and a.bounds:
         return 0.0
@@ -342,9 +342,9 @@ def _mul(a: Any, b: Any) -> Any:
     a, b = _operand(a), _operand(b)
     if isinstance(a, float):
         a, b = b, a
-    if _is(b, 1.0):
+    if b == 1.0:
         return a
-    if _is(b, 0.0):  # zero by form, at every point: it drops out even where `a` is infinite
+    if b == 0.0:  # zero by form, at every point: it drops out even where `a` is infinite
         return 0.0
     if isinstance(b, float) and math.copysign(1.0, b) < 0.0:
         return -_mul(a, -b)
@@ -357,7 +357,7 @@ def _mul(a: Any, b: Any) -> Any:
 
 def _div(a: Any, b: Any) -> Any:
     a, b = _operand(a), _operand(b)
-    if _is(b, 1.0):
+    if b == 1.0:
         return a
     if a is b and a.bounds:
         return 1.0
