@@ -85,7 +85,7 @@ def test_a_grid_is_its_poses(name):
     """Machine code and single poses decide alike which rigid parts share a load."""
     machine = case(name)
     pose = {path: value for path, value in values(machine).items() if path.startswith("pose.")}
-    share = np.linspace(0.2, 1.0, 12)
+    share = np.linspace(0.2, 1.0, 6)
     poses = {path: value * share for path, value in pose.items()}
     grid = evaluate(machine, poses, ["compliance"])
     for i in range(len(share)):

@@ -89,27 +89,42 @@ def ready(watched, address):
     assert watched.tab.evaluate("document.documentElement.dataset.check") == "ok"
 
 
+@pytest.fixture(scope="module")
+def opening():
+    """The browser of this file: it takes longer to start than to open a page."""
+    with browser() as opening:
+        yield opening
+
+
+@pytest.fixture
+def new_tab(opening):
+    """Opens tabs that know nothing of those of other tests; they are closed at the end."""
+    opened = []
+    yield lambda *size: opened.append(opening(*size)) or opened[-1]
+    for watched in opened:
+        watched.tab.close()
+
+
 @needs_chromium
-def test_an_address_gives_the_numbers_of_its_page(pages, viewer_page, tmp_path):
+def test_an_address_gives_the_numbers_of_its_page(pages, viewer_page, tmp_path, new_tab):
     """Programs that are data give the very numbers of the printed ones, and the pose is in the address too."""
-    with browser() as new_tab:
-        watched = new_tab()
-        for name in ("zhang-gosselin-4dof", "hexapod-hardware", "planar-3rrr"):
-            machine = load(name)
-            home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
-            rows = (np.array(home) + 0.05 * np.random.default_rng(2).uniform(-1, 1, (50, len(home)))).tolist()
-            ready(watched, pages[name].as_uri())
-            expected = watched.tab.evaluate(PROGRAMS, rows)
-            link = export(machine, tmp_path / "machine.link")[0].read_text("ascii").strip()
-            first = next(key for key in values(machine) if key.startswith("pose.")).removeprefix("pose.")
-            ready(watched, f"{viewer_page.as_uri()}#{link.partition('#')[2]}&{first}=0.0123")
-            assert watched.tab.evaluate(PROGRAMS, rows) == expected
-            assert watched.tab.title() == machine.name
-            assert watched.tab.evaluate("location.hash").endswith(f"&{first}=0.0123")
-            watched.tab.wait_for_function("document.querySelector('.slider input[type=number]').value !== ''")
-            assert float(watched.tab.get_by_role("spinbutton").first.input_value()) == pytest.approx(12.3)
-            assert not watched.complaints
-            assert watched.hosts <= {""}
+    watched = new_tab()
+    for name in ("zhang-gosselin-4dof", "hexapod-hardware", "planar-3rrr"):
+        machine = load(name)
+        home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
+        rows = (np.array(home) + 0.05 * np.random.default_rng(2).uniform(-1, 1, (50, len(home)))).tolist()
+        ready(watched, pages[name].as_uri())
+        expected = watched.tab.evaluate(PROGRAMS, rows)
+        link = export(machine, tmp_path / "machine.link")[0].read_text("ascii").strip()
+        first = next(key for key in values(machine) if key.startswith("pose.")).removeprefix("pose.")
+        ready(watched, f"{viewer_page.as_uri()}#{link.partition('#')[2]}&{first}=0.0123")
+        assert watched.tab.evaluate(PROGRAMS, rows) == expected
+        assert watched.tab.title() == machine.name
+        assert watched.tab.evaluate("location.hash").endswith(f"&{first}=0.0123")
+        watched.tab.wait_for_function("document.querySelector('.slider input[type=number]').value !== ''")
+        assert float(watched.tab.get_by_role("spinbutton").first.input_value()) == pytest.approx(12.3)
+        assert not watched.complaints
+        assert watched.hosts <= {""}
 
 
 def damaged(content):
@@ -148,59 +163,56 @@ def link_content(tmp_path_factory):
         (lambda c: c["data"]["inputs"][0].update(name="<img src=x onerror=globalThis.evil=1>"), ""),
     ],
 )
-def test_an_address_is_data_and_never_code(change, says, viewer_page, link_content):
+def test_an_address_is_data_and_never_code(change, says, viewer_page, link_content, new_tab):
     content = json.loads(json.dumps(link_content))
     change(content)
-    with browser() as new_tab:
-        watched = new_tab()
-        watched.tab.goto(f"{viewer_page.as_uri()}#m={damaged(content)}")
-        watched.tab.wait_for_function("document.querySelector('#status').textContent")
-        assert says in watched.text("#status")
-        assert watched.tab.evaluate("globalThis.evil ?? 0") == 0
-        assert watched.tab.locator("img").count() == 0
+    watched = new_tab()
+    watched.tab.goto(f"{viewer_page.as_uri()}#m={damaged(content)}")
+    watched.tab.wait_for_function("document.querySelector('#status').textContent")
+    assert says in watched.text("#status")
+    assert watched.tab.evaluate("globalThis.evil ?? 0") == 0
+    assert watched.tab.locator("img").count() == 0
 
 
 @needs_chromium
-def test_a_viewer_without_a_machine_says_what_it_is_for(viewer_page):
-    with browser() as new_tab:
-        watched = new_tab()
-        watched.tab.goto(viewer_page.as_uri())
-        watched.tab.wait_for_function("document.querySelector('#status').textContent")
-        assert "the machine that its address describes" in watched.text("#status")
-        watched.tab.goto("about:blank")
-        watched.tab.goto(f"{viewer_page.as_uri()}#m=abc")
-        watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
-        assert not watched.complaints
+def test_a_viewer_without_a_machine_says_what_it_is_for(viewer_page, new_tab):
+    watched = new_tab()
+    watched.tab.goto(viewer_page.as_uri())
+    watched.tab.wait_for_function("document.querySelector('#status').textContent")
+    assert "the machine that its address describes" in watched.text("#status")
+    watched.tab.goto("about:blank")
+    watched.tab.goto(f"{viewer_page.as_uri()}#m=abc")
+    watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+    assert not watched.complaints
 
 
 @needs_chromium
-def test_the_pose_follows_an_actuator(pages):
+def test_the_pose_follows_an_actuator(pages, new_tab):
     machine = load("hexapod")
     wanted = with_values(machine, {"pose.x": 0.004, "pose.roll": 0.05})
     coordinates = [float(actuator.coordinate) for actuator in stand(wanted)]
-    with browser() as new_tab:
-        watched = new_tab()
-        ready(watched, pages["hexapod"].as_uri())
-        home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
-        found = watched.tab.evaluate(
-            "([wanted, start]) => poseOf(wanted, start, opened.data, opened.programs)", [coordinates, home]
-        )
-        expected = [float(value) for key, value in values(wanted).items() if key.startswith("pose.")]
-        assert found == pytest.approx(expected, abs=1e-13)
-        field = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
-        field.fill("96")
-        field.press("Enter")
-        watched.tab.wait_for_function("location.hash.includes('x=')")
-        assert float(field.input_value()) == pytest.approx(96.0)
-        field.fill("500")
-        field.press("Enter")
-        watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
-        assert "No pose nearby" in watched.text("#status")
-        assert not watched.complaints
+    watched = new_tab()
+    ready(watched, pages["hexapod"].as_uri())
+    home = [float(value) for key, value in values(machine).items() if key.startswith("pose.")]
+    found = watched.tab.evaluate(
+        "([wanted, start]) => poseOf(wanted, start, opened.data, opened.programs)", [coordinates, home]
+    )
+    expected = [float(value) for key, value in values(wanted).items() if key.startswith("pose.")]
+    assert found == pytest.approx(expected, abs=1e-13)
+    field = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
+    field.fill("96")
+    field.press("Enter")
+    watched.tab.wait_for_function("location.hash.includes('x=')")
+    assert float(field.input_value()) == pytest.approx(96.0)
+    field.fill("500")
+    field.press("Enter")
+    watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+    assert "No pose nearby" in watched.text("#status")
+    assert not watched.complaints
 
 
 @needs_chromium
-def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path):
+def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path, new_tab):
     machine = load("hexapod", ["load.force=[20, -30, -100]", "tool.mass=2 kg"])
     names = ["frequency_1", "displacement_z", "displacement_rx"]
     page = export(machine, tmp_path / "page.html", outputs=names, inputs=["load.force.2"])[0]
@@ -211,27 +223,26 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path):
     table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
     expected = evaluate(machine, table, names)
     analysis = analyze(machine)
-    with browser() as new_tab:
-        watched = new_tab()
-        ready(watched, page.as_uri())
-        found = watched.tab.evaluate(
-            """rows => rows.map(row => {
-                const { data, programs } = opened, free = new Float64Array(1), loaded = new Float64Array(8);
-                const status = programs.quantities(row, free);
-                programs.loaded(row, loaded, restOf(row, data.rest, programs));
-                return [status, free[0], loaded[6], loaded[7]];
-            })""",
-            rows.tolist(),
-        )
-        shares = watched.tab.evaluate(
-            """() => {
-                const out = new Float64Array(6 * opened.data.parts.length), C = new Float64Array(42);
-                const home = opened.data.inputs.map(({ home }) => home);
-                opened.programs.shares(home, out); opened.programs.answers(home, C);
-                return opened.data.parts.map((name, n) => [name, out[6 * n + 5] / C[20]]);
-            }"""
-        )
-        assert not watched.complaints
+    watched = new_tab()
+    ready(watched, page.as_uri())
+    found = watched.tab.evaluate(
+        """rows => rows.map(row => {
+            const { data, programs } = opened, free = new Float64Array(1), loaded = new Float64Array(8);
+            const status = programs.quantities(row, free);
+            programs.loaded(row, loaded, restOf(row, data.rest, programs));
+            return [status, free[0], loaded[6], loaded[7]];
+        })""",
+        rows.tolist(),
+    )
+    shares = watched.tab.evaluate(
+        """() => {
+            const out = new Float64Array(6 * opened.data.parts.length), C = new Float64Array(42);
+            const home = opened.data.inputs.map(({ home }) => home);
+            opened.programs.shares(home, out); opened.programs.answers(home, C);
+            return opened.data.parts.map((name, n) => [name, out[6 * n + 5] / C[20]]);
+        }"""
+    )
+    assert not watched.complaints
     found = np.array(found)
     np.testing.assert_array_equal(found[:, 0], expected.status)
     np.testing.assert_allclose(found[:, 1], expected.values["frequency_1"], rtol=1e-9)
@@ -244,32 +255,31 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path):
 
 
 @needs_chromium
-def test_formulas_of_every_machine_are_those_of_the_engine(pages):
+def test_formulas_of_every_machine_are_those_of_the_engine(pages, new_tab):
     """At random poses: statuses are equal, entries within a share of the diagonal in their row and column."""
-    with browser() as new_tab:
-        for name, path in pages.items():
-            watched = new_tab()
-            watched.tab.goto(path.as_uri())
-            watched.tab.wait_for_function("document.documentElement.dataset.check")
-            assert watched.tab.evaluate("document.documentElement.dataset.check") == "ok", name
-            machine = load(name)
-            home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
-            length = float(machine.chains().length if machine.family.chains else machine.configure().length)
-            drawn = 0.3 * np.random.default_rng(1).uniform(-1.0, 1.0, (POSES, len(home)))
-            rows = np.array([*home.values()]) + drawn * [length if key[-1] in "xyz" else 1.0 for key in home]
-            found = watched.tab.evaluate(PROGRAMS, rows.tolist())
-            codes = np.array([int(row[0]) for row in found])
-            numbers = np.array([[float(number) for number in row[1:]] for row in found])
-            table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
-            expected = evaluate(machine, table, ENTRIES, repeated=True)
-            assert np.array_equal(codes, expected.status), name
-            ok = codes == Status.OK
-            assert ok.sum() > 20, name
-            assert worst(numbers[ok], np.stack([expected.values[e] for e in ENTRIES], axis=1)[ok]) < AGREED, name
-            joins_what_the_scene_joins(machine, *watched.tab.evaluate(PLACES))
-            assert not watched.complaints
-            assert watched.hosts <= {""}
-            watched.tab.close()
+    for name, path in pages.items():
+        watched = new_tab()
+        watched.tab.goto(path.as_uri())
+        watched.tab.wait_for_function("document.documentElement.dataset.check")
+        assert watched.tab.evaluate("document.documentElement.dataset.check") == "ok", name
+        machine = load(name)
+        home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
+        length = float(machine.chains().length if machine.family.chains else machine.configure().length)
+        drawn = 0.3 * np.random.default_rng(1).uniform(-1.0, 1.0, (POSES, len(home)))
+        rows = np.array([*home.values()]) + drawn * [length if key[-1] in "xyz" else 1.0 for key in home]
+        found = watched.tab.evaluate(PROGRAMS, rows.tolist())
+        codes = np.array([int(row[0]) for row in found])
+        numbers = np.array([[float(number) for number in row[1:]] for row in found])
+        table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
+        expected = evaluate(machine, table, ENTRIES, repeated=True)
+        assert np.array_equal(codes, expected.status), name
+        ok = codes == Status.OK
+        assert ok.sum() > 20, name
+        assert worst(numbers[ok], np.stack([expected.values[e] for e in ENTRIES], axis=1)[ok]) < AGREED, name
+        joins_what_the_scene_joins(machine, *watched.tab.evaluate(PLACES))
+        assert not watched.complaints
+        assert watched.hosts <= {""}
+        watched.tab.close()
 
 
 def joins_what_the_scene_joins(machine, drawing, points):
@@ -301,46 +311,44 @@ def worst(found, expected):
 
 
 @needs_chromium
-def test_a_page_follows_its_address_and_its_sliders(pages):
+def test_a_page_follows_its_address_and_its_sliders(pages, new_tab):
     machine = load("hexapod")
-    with browser() as new_tab:
-        watched = new_tab()
-        watched.tab.goto(f"{pages['hexapod'].as_uri()}#x=0.01&yaw=0.1")
-        watched.tab.wait_for_function("document.querySelectorAll('#matrix td').length === 36")
-        assert float(watched.tab.get_by_role("spinbutton").first.input_value()) == pytest.approx(10.0)
-        table = PointTable({"pose.x": np.array([0.01]), "pose.yaw": np.array([0.1])})
-        expected = evaluate(machine, table, ["stiffness_z"]).values["stiffness_z"][0]
-        shown = watched.tab.locator("#matrix tr:last-child td:last-child").inner_text()
-        assert float(shown) == pytest.approx(1e-6 * expected, rel=1e-3)
-        length = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
-        before = length.input_value()
-        watched.tab.get_by_role("slider", name="z, mm").focus()
-        watched.tab.keyboard.press("ArrowRight")
-        watched.tab.wait_for_function("location.hash.includes('z=')")
-        assert length.input_value() != before
-        watched.tab.get_by_role("button", name="As in the file").click()
-        watched.tab.wait_for_function("location.hash === ''")
-        watched.tab.get_by_role("button", name="Compliance C").click()
-        assert "µm/N" in watched.text("#matrix-units")
-        watched.tab.locator("#map").click(position={"x": 5, "y": 5})
-        watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
-        assert not watched.complaints
+    watched = new_tab()
+    watched.tab.goto(f"{pages['hexapod'].as_uri()}#x=0.01&yaw=0.1")
+    watched.tab.wait_for_function("document.querySelectorAll('#matrix td').length === 36")
+    assert float(watched.tab.get_by_role("spinbutton").first.input_value()) == pytest.approx(10.0)
+    table = PointTable({"pose.x": np.array([0.01]), "pose.yaw": np.array([0.1])})
+    expected = evaluate(machine, table, ["stiffness_z"]).values["stiffness_z"][0]
+    shown = watched.tab.locator("#matrix tr:last-child td:last-child").inner_text()
+    assert float(shown) == pytest.approx(1e-6 * expected, rel=1e-3)
+    length = watched.tab.get_by_role("spinbutton", name="leg 1 actuator, mm")
+    before = length.input_value()
+    watched.tab.get_by_role("slider", name="z, mm").focus()
+    watched.tab.keyboard.press("ArrowRight")
+    watched.tab.wait_for_function("location.hash.includes('z=')")
+    assert length.input_value() != before
+    watched.tab.get_by_role("button", name="As in the file").click()
+    watched.tab.wait_for_function("location.hash === ''")
+    watched.tab.get_by_role("button", name="Compliance C").click()
+    assert "µm/N" in watched.text("#matrix-units")
+    watched.tab.locator("#map").click(position={"x": 5, "y": 5})
+    watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+    assert not watched.complaints
 
 
 @needs_chromium
 @pytest.mark.parametrize("width", [390, 768, 1280, 1920])
-def test_nothing_sticks_out_at_any_width(pages, width):
-    with browser() as new_tab:
-        watched = new_tab(width)
-        for name in ("hexapod-hardware", "planar-3rrr", "delta"):
-            watched.tab.goto(pages[name].as_uri())
-            watched.tab.wait_for_function("document.documentElement.dataset.mapTime")
-            assert watched.tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
-        assert not watched.complaints
+def test_nothing_sticks_out_at_any_width(pages, width, new_tab):
+    watched = new_tab(width)
+    for name in ("hexapod-hardware", "planar-3rrr", "delta"):
+        watched.tab.goto(pages[name].as_uri())
+        watched.tab.wait_for_function("document.documentElement.dataset.mapTime")
+        assert watched.tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
+    assert not watched.complaints
 
 
 @needs_chromium
-def test_a_name_in_a_file_is_never_markup(tmp_path):
+def test_a_name_in_a_file_is_never_markup(tmp_path, new_tab):
     evil = "<img src=x onerror=document.title=1>"
     machine = load("tripteron")
     page = export(machine, tmp_path / "page.html")[0]
@@ -349,10 +357,9 @@ def test_a_name_in_a_file_is_never_markup(tmp_path):
     page.write_text(
         page.read_text("utf-8").replace(json.dumps(actuator), json.dumps(evil).replace("<", "\\u003c"), 1), "utf-8"
     )
-    with browser() as new_tab:
-        watched = new_tab()
-        watched.tab.goto(page.as_uri())
-        watched.tab.wait_for_function("document.querySelectorAll('#actuators tr').length === 3")
-        assert watched.text("#actuators td") == evil
-        assert watched.tab.locator("#actuators img").count() == 0
-        assert not watched.complaints
+    watched = new_tab()
+    watched.tab.goto(page.as_uri())
+    watched.tab.wait_for_function("document.querySelectorAll('#actuators tr').length === 3")
+    assert watched.text("#actuators td") == evil
+    assert watched.tab.locator("#actuators img").count() == 0
+    assert not watched.complaints
