@@ -17,7 +17,7 @@ ROOM = np.array([2.0, 1.5])
 """Half of the length and of the width between the feet of the cables, m."""
 TOP = 2.3
 """Of the upper feet over the lower ones, m."""
-STEPS, EVERY = 100_000, 500
+STEPS, EVERY = 20_000, 500
 """Of the descent at most, and after how many each time it is tried whether a platform is nearly at rest."""
 DRAG = 1e-4
 """Of the platform itself, as a share of that of its dashpots."""

@@ -167,7 +167,7 @@ def reader(tmp_path, monkeypatch, request):
     """A reader in an empty folder. Figures are drawn once, a studio does not listen; reports have small pictures.
 
     Reports are validated by PyNite: Exudyn takes more than a minute for the hexapod of README. `test_validation` asks
-    both engines about that machine, and .ci/newcomer follows README as it stands.
+    both engines about that machine.
     """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))

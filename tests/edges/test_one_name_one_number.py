@@ -27,6 +27,12 @@ NOTHING = 1e-12
 MOST = 50
 """Conditions that one requirement may have."""
 
+QUICK = ("hexapod", "planar-3rrr", "tripteron", "zhang-gosselin-4dof")
+"""Machines that plain `pytest` asks; the others take long."""
+each_machine = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.numbers) for name in bundled()]
+)
+
 SPOKEN = {
     **{f"C_{component}": f"compliance_{component}" for component in COMPONENTS},
     **{f"K_{component}": f"stiffness_{component}" for component in COMPONENTS},
@@ -78,7 +84,7 @@ def agree(name, one, other, scale=0.0):
     assert one is None or math.isclose(one, other, rel_tol=SAME, abs_tol=NOTHING * scale), (name, one, other)
 
 
-@pytest.mark.parametrize("name", bundled())
+@each_machine
 def test_analyze_path_requirements_and_compare_show_the_same_numbers(capsys, tmp_path, name):
     changes = settings(name)
     demands = [q for q, v in QUANTITIES.items() if not (v.needs or v.modal or v.loaded or v.driven)]
@@ -110,7 +116,7 @@ def test_analyze_path_requirements_and_compare_show_the_same_numbers(capsys, tmp
         assert row["units"] == (QUANTITIES[SPOKEN[row["name"]]].unit if SPOKEN[row["name"]] in QUANTITIES else "1")
 
 
-@pytest.mark.parametrize("name", bundled())
+@each_machine
 def test_print_shows_the_numbers_of_the_json(capsys, name):
     """First lines, tables and the panel of the studio: each with the words that stand before the number."""
     changes = settings(name)
