@@ -251,7 +251,7 @@ def needed(results: Iterable[Operand]) -> list[Node]:
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
-    """The key that tells an expression from others: nodes as they are, floats by their value, zeros by their sign too."""
+    """The key that tells an expression from others: nodes as they are, floats by value, zeros by their sign too."""
     if operation in COMMUTATIVE:
         a, b = operands
         if isinstance(a, float) or (isinstance(b, Node) and b.number < a.number):
