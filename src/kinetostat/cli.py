@@ -39,7 +39,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
 LOOKING = "computing; if the pose is out of reach, the nearest one is looked for"
-"""What is said where an analysis takes long."""
+"""Words beside the progress bar of a long analysis."""
 
 EXAMPLES = """examples:
   kinetostat list

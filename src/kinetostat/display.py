@@ -12,7 +12,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.units import UnitError, multiple_of_unit
 
 SI = "si"
-"""How people write that every result is shown in SI units."""
+"""Word of a file for results that are all shown in SI units."""
 DIGITS = (2, 12)
 """The fewest and the most significant digits that may be asked for."""
 DASH = "–"
@@ -53,7 +53,7 @@ EXAMPLE = "mm, deg, N/um, N*m/urad"
 
 @dataclass(frozen=True)
 class Scale:
-    """How to show values of one SI unit: multiply by `factor` and write `unit`."""
+    """The scale for values of one SI unit: they are multiplied by `factor` and shown in `unit`."""
 
     factor: float
     unit: str

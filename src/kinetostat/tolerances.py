@@ -56,7 +56,7 @@ NEAREST_POSTURE = 1e-13
 NO_ANGLE_RATES = 1e-9
 """Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
 ROUNDED_ORIENTATION = 1e-3
-"""How far a quaternion or a rotation matrix may be from exact: what numbers rounded to three digits differ by."""
+"""Error of a quaternion or a rotation matrix that is accepted: that of numbers rounded to three digits."""
 UNDETERMINED = 1e-4
 """Share of undamped motion above which nothing but the damping determines where the platform is."""
 ONE_PLACEMENT = 1e-5

@@ -131,9 +131,9 @@ TURNS_COUNT = ("angle", "rate", "frequency")
 """Kinds whose angle cannot be left out: 1 Hz is 2 pi rad/s. Others may be written without theirs, a torsional stiffness
 in N*m; but none is written with an angle that it has not: a lead of "10 mm/turn" is not a length of 10 mm / (2 pi)."""
 WITHOUT_ANGLE = {"rate": "1/s"}
-"""How such a kind is written without its angle all the same, and meant as SI has it."""
+"""Unit in which such a kind may be written without its angle all the same, because SI does so."""
 RIGID = "rigid"
-"""How people write an infinite stiffness."""
+"""Word of a file for an infinite stiffness."""
 
 IN_FILES = {
     "length": ("mm", "m"),
@@ -150,7 +150,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*
 _NAME = r"(?:[A-Za-zµμ°]+|%)(?:\s*(?:\*\*|\^)\s*[1-4]|[²³⁴])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
 UNIT = re.compile(rf"(?:1\s*/\s*)?{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
-"""How the text of a unit looks, e.g. "N/um" or "1/s"."""
+"""Pattern of the text of a unit, e.g. "N/um" or "1/s"."""
 _PLAIN_SIGNS = str.maketrans({"·": "*", "µ": "u", "μ": "u", "²": "**2", "³": "**3", "⁴": "**4"})
 _LONGEST = 64
 

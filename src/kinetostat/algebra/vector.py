@@ -137,7 +137,7 @@ class Displacement:
     translation: Vector
 
     def apply(self, point: Vector) -> Vector:
-        """Where a point goes (base frame, m)."""
+        """The point after the displacement (base frame, m)."""
         return self.rotation.apply(point) + self.translation
 
     def __matmul__(self, other: "Displacement") -> "Displacement":

@@ -16,7 +16,7 @@ FIRST = "zhang-gosselin-4dof"
 PORT = 8000
 LOCAL = ("127.0.0.1", "localhost", "::1")
 EXTRA = "nicegui"
-"""What the studio needs beside kinetostat itself."""
+"""Packages that the studio needs besides kinetostat itself."""
 
 
 def add_studio_command(commands: "Commands") -> None:

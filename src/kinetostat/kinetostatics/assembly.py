@@ -36,7 +36,7 @@ Motion = tuple[Twist, Scalar]
 
 @dataclass(frozen=True)
 class Statics:
-    """How the springs of a machine share any load and resist any motion.
+    """The statics of a machine: shares of its springs in any load, and in the resistance to any motion.
 
     Attributes:
         wrenches: per leg, a basis of what it carries.
@@ -113,7 +113,7 @@ def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
 
 @dataclass(frozen=True)
 class _Shared:
-    """What C needs of `Statics`, and the modes of the legs."""
+    """The part of `Statics` that C needs, and the modes of the legs."""
 
     modes: Sequence[Modes]
     sharing: Sequence[tuple[Twist, ...]]
@@ -125,7 +125,7 @@ class _Shared:
 
 
 def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
-    """How the legs share any load."""
+    """The shares of the legs in any load."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [free_springs_as_joints(leg) for leg in legs] if redundant else legs
     modes = [modes_of(leg) if redundant or _in_series(leg) else _wrenches_as_modes(leg) for leg in balanced]

@@ -1,4 +1,4 @@
-"""Where the elasticity of a machine is centred: centres of stiffness, compliance, elasticity.
+"""Centres of the elasticity of a machine: of stiffness, of compliance, of elasticity.
 
 They belong to the machine and move with it: the point of space found does not depend on the reference point. In space
 (6 x 6) or in the plane (3 x 3, rows rz x y). The normal form's screws are in `eigenscrews`.
@@ -22,7 +22,7 @@ Point: TypeAlias = list[float]
 
 
 def centre_of_stiffness(stiffness: Matrix | None, components: Sequence[int] = SPATIAL) -> Point | None:
-    """Where the coupling block of K is symmetric: (tr(K_tt) 1 - K_tt) d = vee(K_rt - K_tr).
+    """The point at which the coupling block of K is symmetric: (tr(K_tt) 1 - K_tt) d = vee(K_rt - K_tr).
 
     Of a planar machine, where it is zero: a force through it causes no rotation. Loncaric (1987); Ciblak and Lipkin
     (1994).
@@ -44,7 +44,7 @@ def centre_of_stiffness(stiffness: Matrix | None, components: Sequence[int] = SP
 
 
 def centre_of_compliance(compliance: Matrix | None, components: Sequence[int] = SPATIAL) -> Point | None:
-    """Where the coupling block of C is symmetric: (tr(C_rr) 1 - C_rr) d = vee(C_tr - C_rt).
+    """The point at which the coupling block of C is symmetric: (tr(C_rr) 1 - C_rr) d = vee(C_tr - C_rt).
 
     Exact for rigid springs too. Of a planar machine it is the centre of stiffness. Ciblak and Lipkin (1994).
     Arguments and errors as for `centre_of_stiffness`.

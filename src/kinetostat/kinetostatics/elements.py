@@ -108,7 +108,7 @@ def _unit(spring: Spring) -> str:
 
 
 def element_share(response: Response, element: Element) -> list[Scalar]:
-    """What an element adds to the six diagonal entries of C: the sum of s_e xi_e^2 over its springs, SI.
+    """The part of an element in the six diagonal entries of C: the sum of s_e xi_e^2 over its springs, SI.
 
     A rigid one that stands alone is taken with a compliance of 1 (SI): what it would add per unit of it.
     """

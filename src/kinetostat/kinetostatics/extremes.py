@@ -24,7 +24,7 @@ SPACE = 3
 
 
 def components(response: Response) -> tuple[int, ...]:
-    """Which of rx ry rz x y z = 0 ... 5 the machine has."""
+    """The components of the machine, of rx ry rz x y z = 0 ... 5."""
     return SPATIAL if response.configuration.plane is None else PLANAR
 
 

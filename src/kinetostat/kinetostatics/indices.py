@@ -74,7 +74,7 @@ def finite(matrix: Matrix | None, components: Sequence[int] = SPATIAL) -> Array 
 
 
 def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIAL) -> dict[str, Principal]:
-    """How soft the platform is in its softest and stiffest directions, for rotation and for translation.
+    """Principal compliances of the platform, from its softest to its stiffest direction, for rotation and translation.
 
     Under a pure moment (force) along a direction, the rotation (translation) it causes along itself; the extremes of
     that are the eigenvalues of the diagonal block C_rr (C_tt).

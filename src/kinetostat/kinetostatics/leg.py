@@ -74,7 +74,7 @@ def _repeats(row: Sequence[Scalar], others: Sequence[Sequence[Scalar]]) -> bool:
 
 
 def _rank(rows: Sequence[Sequence[float]]) -> int:
-    """How many rows of numbers are independent, each taken at unit size."""
+    """The number of independent rows of numbers, each scaled to unit size."""
     sizes = [math.hypot(*row) for row in rows]
     left = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
     rank = 0
@@ -153,7 +153,7 @@ def leg_modes(leg: LegScrews) -> list[Action]:
 
 @dataclass(frozen=True)
 class Resistance:
-    """How a leg resists motion of the platform.
+    """The resistance of a leg to motions of the platform.
 
     Attributes:
         shares: one for each spring: its share in W G^-1 W^T.

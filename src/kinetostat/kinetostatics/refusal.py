@@ -55,7 +55,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
 
 
 def known_mobility(response: Response, nearby: Sequence[Configuration]) -> Mobility | None:
-    """What can move, and what sort of singularity it is; None where the joints have no place."""
+    """Free motions and the kind of the singularity; None if the joints cannot be placed."""
     screws = [screw for leg in response.legs for screw in (*leg.passive, *leg.elastic, *leg.wrenches)]
     if not all(math.isfinite(c) for screw in screws for c in screw.components()):
         return None
@@ -63,7 +63,7 @@ def known_mobility(response: Response, nearby: Sequence[Configuration]) -> Mobil
 
 
 def _locked_joints(configuration: Configuration) -> int:
-    """How many joints are held: by actuators, or by a stiffness in the joint itself."""
+    """The number of joints that are held, by actuators or by a stiffness in the joint itself."""
     return sum(_holds(spring) for spring in springs(configuration))
 
 

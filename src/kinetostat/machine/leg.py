@@ -153,7 +153,7 @@ class Spring:
 
     @property
     def kind(self) -> str:
-        """What that part is in its leg; its whole name where no leg is known."""
+        """The name of that part within its leg; its whole name if no leg is known."""
         return self.of.kind if isinstance(self.of, PartName) else self.of
 
     @property
@@ -191,7 +191,7 @@ class Element(Protocol):
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
-        """What moves freely."""
+        """Its free motions."""
 
     @property
     def springs(self) -> tuple[Spring, ...]:
@@ -223,7 +223,7 @@ class Line:
 
 @dataclass(frozen=True)
 class LegScrews:
-    """What a leg is to the platform: screws at one reference point in base axes (theory section 2).
+    """The screws by which a leg acts on the platform, at one reference point in base axes (theory section 2).
 
     Attributes:
         passive: unit twists that span what the passive joints allow (J_p).
@@ -287,7 +287,7 @@ class Leg:
 
     @property
     def label(self) -> str:
-        """What a drawing writes beside it."""
+        """Its name in a drawing."""
         return self.short or self.name
 
     @property

@@ -89,7 +89,7 @@ def _loads(parts: Parts, sliding: bool) -> Measured:
 
 
 class About(Enum):
-    """What a limit is about. A pose is checked in this order, so that the first limit it passes is well defined."""
+    """Subject of a limit. A pose is checked in this order, so that the first limit it passes is well defined."""
 
     LENGTH = "leg length"
     TRAVEL = "slide travel"
@@ -317,7 +317,7 @@ def limits_loads(limits: object) -> bool:
 
 
 def unlimited(limits: object) -> str:
-    """What an answer must say that rests on no limit: a sentence, or nothing where the table [limits] sets one."""
+    """A sentence for an answer that rests on no limit; empty if the table [limits] sets one."""
     return "" if limits_set(limits) else "No limits are set: strokes, joint angles and loads are not checked."
 
 

@@ -55,7 +55,7 @@ class ForwardPose(Immutable):
 
 @dataclass(frozen=True, eq=False)
 class Forward(Immutable):
-    """What is known of a machine whose actuators stand at given coordinates.
+    """The poses of a machine whose actuators stand at given coordinates.
 
     Attributes:
         machine: whose pose the search began at.
@@ -185,5 +185,5 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
 
 
 def actuators_at(machine: Machine, joints: Joints | None = None) -> tuple[Actuator, ...]:
-    """Where the actuators of a machine stand at its pose; see `kinematics.forward.stand`."""
+    """The actuators of a machine with their coordinates at its pose; see `kinematics.forward.stand`."""
     return tuple(replace(actuator, coordinate=float(actuator.coordinate)) for actuator in stand(machine, joints))

@@ -20,7 +20,7 @@ from kinetostat.tolerances import EQUAL_STIFFNESSES
 @former_names(name="spring", compliance="compliance_share")
 @dataclass(frozen=True)
 class Contribution:
-    """What one spring contributes to the diagonal entries of C and K.
+    """The contribution of one spring to the diagonal entries of C and K.
 
     Attributes:
         spring: its name.

@@ -1,4 +1,4 @@
-"""Which legs carry a machine over a grid of poses or loads: each state of rest by the set of legs that are not slack.
+"""The legs that carry a machine over a grid of poses or loads: in each state of rest, those that are not slack.
 
 Source: theory section 12.
 """
@@ -27,7 +27,7 @@ from kinetostat.studies.grid import grid_question
 
 @dataclass(frozen=True, eq=False)
 class Carrying(Immutable):
-    """Which legs carry at each point of a grid.
+    """The sets of legs that carry at the points of a grid.
 
     Attributes:
         machine: with its loads; gives all parameters that do not vary.
@@ -97,7 +97,7 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
 
 
 def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, Any]:
-    """Which legs carry at some points [points x legs], and `Status` codes [points]."""
+    """Whether each leg carries at some points [points x legs], and `Status` codes [points]."""
     count = len(next(iter(columns.values())))
     carries = np.zeros((count, legs), dtype=bool)
     states = states_of_rest(states_at(machine, columns, count))

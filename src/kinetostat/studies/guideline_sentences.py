@@ -56,7 +56,7 @@ def statements(answer: Guidelines) -> list[Statement]:
 
 
 def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
-    """Which elements each direction depends on; directions of which the same is true share a sentence."""
+    """Statements on the elements from which the compliance of each direction comes; alike directions share one."""
     single, over = _single(answer), answer.over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
     for i in _compliant_directions(here):
@@ -144,7 +144,7 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
 
 
 def _design(answer: Guidelines) -> Iterator[Statement]:
-    """Which parameter stiffens or softens which direction."""
+    """Statements on the directions that each parameter stiffens or softens."""
     for move in answer.parameters[:MOST_MOVES]:
         directions = [(i, p) for i, p in enumerate(move.percents) if p is not None]
         rising = sorted(((i, p) for i, p in directions if p > LEAST_EFFECT), key=lambda pair: -pair[1])
@@ -195,7 +195,7 @@ def _share_of(true: Mask) -> float:
 
 
 def _first(gains: Array) -> Integers:
-    """Which element gains most [components x poses], the first of those that gain alike."""
+    """The number of the element that gains most [components x poses]; the first one if several gain alike."""
     return np.asarray(np.nan_to_num(gains).round(6).argmax(axis=0))
 
 

@@ -61,7 +61,7 @@ NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
 
 @dataclass(frozen=True, eq=False)
 class Roles(Immutable):
-    """What each element does to each direction, pose by pose; NaN where the direction is rigid, free or has no pose.
+    """The effect of each element on each direction, pose by pose; NaN if the direction is rigid or free or has no pose.
 
     Attributes:
         shares: of each entry of the diagonal of C, 0 to 1 [elements x components x poses].
@@ -78,7 +78,7 @@ class Roles(Immutable):
 
 @dataclass(frozen=True)
 class Move:
-    """What one parameter of the design, or all entries of a stiffness together, does to the stiffness 1 / C_ii.
+    """The effect of a parameter of the design, or of all entries of a stiffness together, on the stiffness 1 / C_ii.
 
     Attributes:
         path: of the parameter.

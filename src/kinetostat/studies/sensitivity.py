@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 WITHOUT_INFLUENCE = (
     "load.", "limits.", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
 )  # fmt: skip
-"""How the fields begin on which no index depends: loads, limits, weights, buckling and growth."""
+"""Beginnings of the fields on which no index depends: loads, limits, weights, buckling and growth."""
 NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
 """Those on which nothing depends that has derivatives."""
 NOT_EVEN_LOADED = ("load.min_tension", "load.max_tension")
@@ -103,7 +103,7 @@ def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
 
 @dataclass(frozen=True)
 class Influence:
-    """What one parameter does to the indices.
+    """The effect of one parameter on the indices.
 
     Attributes:
         path: of the parameter.

@@ -23,7 +23,7 @@ KINDS = {(False, False): "linear compliance", (True, True): "torsional complianc
 """Kind of an entry by whether a rotation is moved and a moment pushes; all others are rad/N, the same as m/(N·m)."""
 
 Key = tuple[str, int, str, int]
-"""What moves and what is pushed: the place and the component of each."""
+"""Place and component that move, then place and component of the force."""
 
 
 def read_tool(path: str | Path) -> FreeTool:

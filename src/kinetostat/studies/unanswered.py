@@ -1,4 +1,4 @@
-"""What is known of a machine at a pose that has no answer: where it stands, what moves, and what of K and C is finite.
+"""Facts about a machine at a pose without an answer: actuators, free motions, and finite entries of K and C.
 
 At an actuation singularity the legs still resist: K is finite, and singular. C is finite between the loads that do no
 work on the free twists and the motions that these leave alone; its other entries are infinite.

@@ -67,7 +67,7 @@ POINTS = 1500
 NEAR = 200
 """Frequencies about each mode."""
 WIDE = 6.0
-"""How far they lie about it, in multiples of its frequency and damping ratio."""
+"""Distance of these frequencies from the mode, in multiples of its frequency and damping ratio."""
 HIGHEST = 1e20
 """Of frequencies, Hz: its square is still a number."""
 BELOW, ABOVE = 0.2, 1.6
@@ -193,7 +193,7 @@ class Vibration(Immutable):
 
     @checked
     def softest(self, direction: Sequence[float]) -> Softest:
-        """Where the real part of the receptance along a direction is least: what limits the width of a cut.
+        """The least real part of the receptance along a direction, which limits the width of a cut, and its frequency.
 
         Args:
             direction: three numbers of any size, base axes.

@@ -1,5 +1,5 @@
-"""Which requests reach the page, and how fast: none of other sites, none in frames, none too large, no tab at the
-cost of the others.
+"""Admission of requests to the page: none from other sites or in frames, none too large, and none so often that other
+tabs suffer.
 
 It knows requests and sockets only; what is on the page is the business of `page`.
 """

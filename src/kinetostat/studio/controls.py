@@ -20,17 +20,17 @@ PANELS = ("Pose", "Geometry", "Stiffness", "Mass", "Load")
 STEPS = 1000
 """Positions of a slider."""
 LENGTH_SHARE = 0.75
-"""How far a length varies about its value: in units of the machine's length in the pose, of itself elsewhere."""
+"""Range of a length about its value, in units of the machine's length in the pose, of the value itself elsewhere."""
 TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0), "load": math.pi}
-"""How far an angle varies about its value."""
+"""Range of an angle about its value, rad."""
 STIFFNESS_FACTOR = 1e3
-"""How far a stiffness varies about its value, up and down."""
+"""Factor by which a stiffness varies about its value, up and down."""
 USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
 OF_MASSES = (*VIBRATION_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
-"""How the fields begin that stand in the panel Mass; so do all whose kind says how much matter there is."""
+"""Beginnings of the fields in the panel Mass, which also has all fields whose kind is an amount of matter."""
 LARGEST_MASS = 1000.0
 """Upper end of the range of a mass that is zero, in kg per square of the machine's length."""
 SLENDERNESS = 10.0
@@ -211,7 +211,7 @@ def _usual(parameter: Parameter, length: float) -> float | None:
 # The factor by which the deflected shape is exaggerated: a slider as well, but no number of the machine.
 
 AUTO = "auto"
-"""What is typed to leave the choice of the factor to the page."""
+"""Word that leaves the choice of the factor to the page."""
 DECADES = (-3, 9)
 """Powers of ten between which the factor lies."""
 ROUND = (1.0, 2.0, 5.0)

@@ -50,7 +50,7 @@ class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES)
 
 
 class BrowserLink(Element, component=COMPONENTS / "browser_link.js"):
-    """What the page and the browser around it have in common: the address, and whether it is dark.
+    """The address of the page and its dark or light theme, which the browser shares.
 
     Events `undo` and `redo` by the keyboard; `theme` after the method `otherTheme`: dark, light, or None as the system.
     """

@@ -27,7 +27,7 @@ from kinetostat.views.usual_values import usual_range
 LENGTHS = ("m", "mm")
 """Units of axes that have one scale if both have the same."""
 LOADED = "loaded_"
-"""How the names of quantities begin that are about the machine under its loads."""
+"""Beginnings of the names of quantities of the machine under its loads."""
 RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for the whole range of the slider'
 
 

@@ -117,7 +117,7 @@ def _archive_of(files: Sequence[tuple[str, bytes]]) -> bytes:
 PICTURES = Path(__file__).parent / "gallery_pictures"
 """Pictures by the names of machines; `benchmarks/gallery_pictures.py` makes them. A machine may be without one."""
 ADDRESS = "/gallery"
-"""Where the browser gets them."""
+"""Address from which the browser gets the pictures."""
 
 
 def serve_pictures() -> None:

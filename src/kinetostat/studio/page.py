@@ -41,7 +41,7 @@ PANELS: tuple[type[Panel], ...] = (
 ACCENT = "#0b5ea8"
 """Colour of buttons and marks; style.css has it by name."""
 MODES = {"Explore": "studio", "Text": "studio texting", "Design": "studio designing", "Ask": "studio asking"}
-"""What stands beside the machine: its numbers, the text of its file, the design or the ask tab; the page's classes."""
+"""Panes beside the machine: its numbers, the text of its file, the design or the ask tab; also classes of the page."""
 EXPLORE, TEXT, DESIGN, ASK = MODES
 OTHER = "own"
 """Key in the list of machines of one that is not bundled."""

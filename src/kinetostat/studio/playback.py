@@ -61,7 +61,7 @@ class Playback:
 
     @property
     def count(self) -> int:
-        """How many poses the path has."""
+        """Number of poses of the path."""
         return len(next(iter(self._path.values()))) if self._path else 0
 
     def clear(self) -> None:

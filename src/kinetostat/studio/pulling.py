@@ -40,7 +40,7 @@ RANK = 1e-6
 
 @dataclass(frozen=True)
 class Handle:
-    """What can be pulled.
+    """A handle of the picture that can be pulled.
 
     Attributes:
         of: `PLATFORM`, `BASE` or `HEAD`.
@@ -214,7 +214,7 @@ def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
 
 
 def _motion(configuration: Configuration, goal: Displacement, length: float) -> Array:
-    """What a platform lacks to a goal: translation in units of the machine's length, then the turn, rad (small)."""
+    """Motion of a platform to a goal: translation in units of the machine's length, then the turn, rad (small)."""
     platform = configuration.platform
     apart = (platform.translation - goal.translation) * (1.0 / length)
     now, wanted = platform.rotation, goal.rotation

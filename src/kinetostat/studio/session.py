@@ -28,7 +28,7 @@ from kinetostat.studio.wording import unit_shown
 from kinetostat.units import UnitError
 
 TEXT = "text"
-"""What is noted in the place of a path while the text of the machine is being typed."""
+"""Word in the place of a path while the text of the machine is being typed."""
 REMEMBERED = 200
 """Steps that can be undone."""
 

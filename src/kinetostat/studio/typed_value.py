@@ -1,4 +1,4 @@
-"""What is typed into a field of the page: a number with its unit, or arithmetic with such numbers, e.g. "10+5 mm".
+"""Texts typed into a field of the page: a number with its unit, or arithmetic with such numbers, e.g. "10+5 mm".
 
 The text is read by the rules below and never run as a program.
 """

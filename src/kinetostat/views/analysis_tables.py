@@ -174,7 +174,7 @@ def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEER
 
 
 def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
-    """What each actuator bears, and how far it deforms."""
+    """Load and deformation of each actuator."""
     table = numeric_table("Actuators under this load", "", ["load", "deformation"])
     for spring in load.springs:
         if spring.actuated:

@@ -28,7 +28,7 @@ else:
 
 @dataclass(frozen=True)
 class Kind:
-    """How results of one kind are shown, by the description of the answer; a machine has no description.
+    """Results of one kind and the description by which they are shown; a machine has no description.
 
     Attributes:
         type: class of the results, "module.Class".

@@ -49,7 +49,7 @@ def _lines(comparison: Comparison) -> Lines:
 
 
 def _verdict_sentences(comparison: Comparison) -> Iterator[str]:
-    """Which requirements each design misses, and which are about something that it lacks."""
+    """A sentence on each design: the requirements that it misses, and those on quantities that it lacks."""
     names = [condition_of(row)[0] for row in comparison.verdicts]
     for column in zip(*comparison.verdicts, strict=True):
         missed = dict.fromkeys(name for name, each in zip(names, column, strict=True) if each and not each.met)
@@ -91,7 +91,7 @@ def _families(comparison: Comparison) -> set[str]:
 
 
 def _differing(comparison: Comparison) -> dict[str, list[str]]:
-    """What the designs say of each field of which they do not say the same, by its path."""
+    """The values of the designs for each field in which they differ, by its path."""
     families = [design.machine.family.name for design in comparison.designs]
     rows = {"family": families} if len(set(families)) > 1 else {}
     for difference in comparison.differences:

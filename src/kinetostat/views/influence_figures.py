@@ -107,7 +107,7 @@ MOST_PANELS = 6
 POINTS = 161
 """Number of points along each curve."""
 DECADES = 1.0
-"""How far curves go beyond the limits of rigidity and the present stiffness, in powers of ten."""
+"""Powers of ten by which curves go beyond the limits of rigidity and the present stiffness."""
 
 
 def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:

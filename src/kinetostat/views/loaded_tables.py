@@ -180,7 +180,7 @@ def spring_table(state: LoadedState, display: Display) -> FittedTable:
 
 
 def strut_table(state: LoadedState, display: Display) -> FittedTable:
-    """What presses each strut, and at which load it would bend away."""
+    """Compression of each strut, and the load at which it would buckle."""
     table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
     for strut in state.struts:
         reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"

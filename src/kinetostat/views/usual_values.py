@@ -7,7 +7,7 @@ from kinetostat.arrays import Array
 USUAL = (2.0, 98.0)
 """Percentiles between which values are usual."""
 FAR = 1.0
-"""How far an extreme may lie from the usual values, in units of their range, before a map leaves it out."""
+"""Distance of an extreme from the usual values, in units of their range, beyond which a map leaves it out."""
 WIDE = 30.0
 """Ratio of the usual values of a map, if all are positive, from which its colours follow the logarithm."""
 

@@ -59,7 +59,7 @@ EDGE = "#1d6b55"
 FINEST = 64
 """Nodes along an axis that the picture of a solid shows at most."""
 LIGHT = np.array([-0.45, -0.7, 0.55])
-"""Where the light comes from."""
+"""Direction from which the light comes."""
 
 
 def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition], title: str) -> Drawings:

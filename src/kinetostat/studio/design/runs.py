@@ -35,7 +35,7 @@ FAILURE = "failed.txt"
 
 
 UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError)
-"""What reading a damaged folder of a search may raise."""
+"""Exceptions that reading a damaged folder of a search may raise."""
 
 
 class Stage(StrEnum):

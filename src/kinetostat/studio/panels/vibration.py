@@ -1,4 +1,4 @@
-"""Where the machine rings: its modes as a table, the chosen one as a swing in the picture, and the tool's response.
+"""Natural frequencies and modes: a table, the chosen mode as a swing in the picture, and the tool's response.
 
 Modes, receptance and swing are computed by `ringing`; here they are chosen and written.
 """

@@ -55,7 +55,7 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
 
 
 def _demands(answers: Answers, state: LoadedState) -> Table:
-    """What a loaded machine does in a row each, beside what its file demands of it."""
+    """A table of the displacements and errors of a loaded machine beside the requirements of its file."""
     display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
     pairs = [*zip(state.components, state.displacement, strict=True)]
     moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
