@@ -43,14 +43,29 @@ def _doctor(options: argparse.Namespace) -> int:
 
 
 def _checks() -> "Iterator[InstallationCheck]":
-    """Make all checks, also those of pictures and the studio, which `studies.diagnosis` must not import."""
-    from kinetostat.studies.diagnosis import InstallationCheck, Soundness, check_of, diagnose, reinstall
+    """Make all checks: packages and extras, the computer, known numbers computed again, pictures and folders."""
+    from kinetostat.studies.diagnosis import (
+        InstallationCheck,
+        Soundness,
+        check_of,
+        diagnose,
+        machine_checks,
+        reinstall,
+        software_checks,
+    )
 
-    yield from diagnose()
+    yield from diagnose({"software": software_checks, "machine": machine_checks, "self-test": _known_numbers})
     yield check_of("self-test", "pictures", _picture_size, reinstall("matplotlib"))
     yield check_of("places", "cache", _program_folder, "chmod 700 the folder, if it is yours")
     yield InstallationCheck("places", "configuration", Soundness.ABSENT, "none: files and options say everything")
     yield check_of("places", "studio", _state_folder, reinstall("kinetostat"))
+
+
+def _known_numbers() -> "Iterator[InstallationCheck]":
+    """The self-test, whose module needs every library: where one is broken, it does not load."""
+    from kinetostat.studies.self_test import checks
+
+    yield from checks()
 
 
 def _program_folder() -> str:

@@ -6,12 +6,12 @@ and libraries are imported only when their turn comes.
 
 import os
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from kinetostat.frozen import dataclass
 from kinetostat.late import ARRAY_LIBRARIES, show_array_libraries
@@ -69,6 +69,10 @@ class InstallationCheck:
     fix: str = ""
 
 
+Checks: TypeAlias = Callable[[], Iterator[InstallationCheck]]
+"""A function that makes checks one by one."""
+
+
 class UnsoundError(Exception):
     """A check has found a fault, which the message names."""
 
@@ -94,10 +98,14 @@ def reinstall(packages: str) -> str:
     return install_command(packages.split(), again=True)
 
 
-def diagnose() -> Iterator[InstallationCheck]:
-    """Checks as they are made: packages and extras, the computer, known numbers computed again."""
+def diagnose(parts: Mapping[str, Checks]) -> Iterator[InstallationCheck]:
+    """Make the checks of several parts; one that breaks as a whole is a failure of its group.
+
+    Args:
+        parts: functions that make checks, by the group under which they are listed.
+    """
     show_array_libraries(*ARRAY_LIBRARIES)
-    for group, checks in DIAGNOSIS_PARTS.items():
+    for group, checks in parts.items():
         try:
             yield from checks()
         except Exception as trouble:
@@ -225,12 +233,3 @@ def _memory_size() -> int | None:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return None
-
-
-def self_test_checks() -> Iterator[InstallationCheck]:
-    """Known numbers, computed again, in a module that needs every library and builds on this one."""
-    yield from import_module("kinetostat.studies.self_test").checks()
-
-
-DIAGNOSIS_PARTS = {"software": software_checks, "machine": machine_checks, "self-test": self_test_checks}
-"""The parts of a diagnosis by the group under which a part is listed that breaks as a whole."""
