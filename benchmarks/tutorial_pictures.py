@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from kinetostat import build, evaluate_grid, load, load_problem, machine_picture, optimize, plot
+from kinetostat import build, elevation, evaluate_grid, load, load_problem, machine_picture, optimize, plot
 from kinetostat.cli import main
 from kinetostat.machine.machine import Machine
 
@@ -59,6 +59,14 @@ def keep_resonance(name: str) -> None:
     write(name, Image.open(drawn).convert("RGB"))
 
 
+def keep_elevation(name: str) -> None:
+    """Write a small PNG of the telescope of its tutorial over elevation."""
+    page, drawn = ROOT / "docs" / "tutorials" / "telescope.md", BytesIO()
+    text = next(block.text for block in blocks(page) if block.words == ("telescope.toml",))
+    plot(elevation(build(text))).savefig(drawn, dpi=130)
+    write(name, Image.open(drawn).convert("RGB"))
+
+
 def keep_fit(name: str) -> None:
     """Write a small PNG of the residuals of the fit that the tutorial on calibration makes."""
     page, space, drawn = ROOT / "docs" / "tutorials" / "calibrate.md", {}, BytesIO()
@@ -95,6 +103,7 @@ def write(name: str, image: Image.Image) -> None:
 if __name__ == "__main__":
     keep("delta-printer", load("delta-linear"))
     keep_resonance("delta-printer-resonance")
+    keep_elevation("telescope-elevation")
     keep_mill("mill-lobes", "five-mills")
     keep("real-hexapod", load("hexapod-hardware"))
     keep("five-bar", five_bar())

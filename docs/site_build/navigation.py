@@ -11,6 +11,7 @@ TUTORIALS = (
     "calibrate",
     "cable-robot",
     "delta-printer",
+    "telescope",
     "machine-tool",
     "jupyter",
 )

@@ -242,3 +242,13 @@ def test_equations_are_numbered_in_order_and_those_that_are_named_exist():
     named = {int(number) for page in pages() for number in re.findall(r"equation \((\d+)\)", page.read_text("utf-8"))}
     assert named
     assert named <= set(numbers)
+
+
+@pytest.mark.parametrize("job", ["cable-robot", "delta-printer", "machine-tool", "telescope"])
+def test_a_job_takes_ten_commands_at_most_and_ends_in_a_file(job):
+    """The page itself is the script of the job: the test above runs it from its first word to its last file."""
+    read = blocks(ROOT / "docs" / "tutorials" / f"{job}.md")
+    lines = [words for block in read if block.kind == "console" for words, _ in dialogues(block.text)]
+    lines += [words for block in read if block.kind == "sh" for words in commands(block.text)]
+    assert 0 < len(lines) <= 10
+    assert any("-o" in words or ">" in words for words in lines)

@@ -40,6 +40,8 @@ else:
 MOST_POSES = 5_000_000
 
 
+SMALL_MOTIONS = ("displacement_", "reversal_error_")
+"""Beginnings of the names of quantities that are small motions, which have units of their own."""
 MANIFOLD = 2.0
 """Margin from which a multiple of the bound is shown instead of a percentage."""
 
@@ -95,7 +97,8 @@ class Verdict(Immutable):
         where = self.where if self.poses == 1 else f"at {self.poses:,} poses {self.where}"
         if self.worst is None:
             return f"{self.condition} {where}: there is no result{there} ({self.status.replace('_', ' ')})."
-        worst = display.show(self.worst, self.unit)
+        small = self.quantity.startswith(SMALL_MOTIONS)
+        worst = (display.show_deflection if small else display.show)(self.worst, self.unit)
         if self.margin is None:
             return f"{self.condition} {where}: it is {worst}{there}."
         distance = f"{abs(100.0 * self.margin):.3g} % {'better' if self.met else 'worse'} than the bound"

@@ -34,7 +34,6 @@ from kinetostat.views.question import (
     Question,
     Records,
 )
-from kinetostat.views.requirement_lines import headline, requirement_lines
 from kinetostat.views.tables import numeric_table, text_table
 
 
@@ -62,9 +61,6 @@ def _lines(answer: Elevation) -> Lines:
     yield from correction_lines(answer.corrections)
     if answer.corrections.before:
         yield "", "gravity_angle is 90 deg - elevation."
-    if answer.requirements:
-        verdicts = " ".join(sentence for _, _, sentence in requirement_lines(answer.requirements, display))
-        yield "Required", f"{headline(answer.requirements)} {verdicts}"
 
 
 def _elevation_text(answer: Elevation, place: int) -> str:
