@@ -258,6 +258,36 @@ def test_the_map_shows_any_quantity_over_any_two_coordinates():
     on_page(steps)
 
 
+def test_a_map_opens_on_what_can_be_reached_and_follows_the_machine_out_of_it():
+    async def steps(page):
+        shown = page.shown("MapView", "show")
+        inside = [value is not None for value in shown["values"]]
+        assert sum(inside) > 0.4 * len(inside), "the range of the sliders is reached in 15 % of it"
+        assert shown["x"]["low"] < shown["here"][0] < shown["x"]["high"] < 60.0
+        await page.send("control pose.x", "write", "7 cm")
+        assert page.shown("MapView", "show")["x"]["high"] > 70.0
+
+    on_page(steps, "hexapod")
+
+
+def test_contributions_are_grouped_by_kind_as_analyze_groups_them(capsys):
+    async def steps(page):
+        await page.choose("contributions-component", "z")
+        shown = page.one("contributions-bars").content
+        assert "ball bearing compliance ×6" in shown
+        assert shown.index("ball bearing compliance ×6") < shown.index("leg 1 ball bearing compliance")
+
+    on_page(steps, "hexapod-hardware")
+
+
+def test_numbers_that_follow_from_others_have_no_slider():
+    async def steps(page):
+        assert page.one("control legs.leg.ball.point.0")._props["slides"]
+        assert not page.one("control legs.leg.ball.axis.0")._props["slides"]
+
+    on_page(steps, "hexapod-hardware")
+
+
 def test_contributions_are_the_attribution():
     async def steps(page):
         await page.choose("contributions-component", "y")

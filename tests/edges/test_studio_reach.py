@@ -70,3 +70,23 @@ def test_everything_fits(page, mode, size):
                 assert box["y"] + box["height"] <= size[1]
     stage = page.tab.locator(".stage").bounding_box()
     assert min(stage["width"], stage["height"]) > 340
+
+
+NARROW = (390, 844)
+
+
+def test_on_a_narrow_page_no_label_is_cut_and_the_layers_leave_the_machine_free(page):
+    page.tab.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
+    to(page, "Explore")
+    cut = page.tab.evaluate(
+        """[...document.querySelectorAll('.panel-tools .q-field__label, .panel-tabs .q-tab__label, .scene-tools label')]
+        .filter(e => e.offsetParent && e.scrollWidth > e.clientWidth + 1).map(e => e.innerText)"""
+    )
+    assert cut == []
+    layers = page.tab.locator(".scene-layers")
+    assert not layers.is_visible()
+    button = page.tab.get_by_role("button", name="Layers of the picture")
+    button.click()
+    layers.wait_for(state="visible")
+    button.click()
+    layers.wait_for(state="hidden")

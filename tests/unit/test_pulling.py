@@ -50,6 +50,15 @@ def test_a_push_keeps_the_orientation_and_a_turn_the_place():
     assert turned.rotation.x.dot(start.rotation.x) < 0.99
 
 
+@pytest.mark.parametrize("axis", ["x", "y", "z", "rx", "rz"])
+def test_coordinates_that_are_not_pulled_keep_every_digit(axis):
+    machine = load(HEXAPOD, ["pose.x=7.123456789 mm", "pose.z=133.3333333333 mm"])
+    numbers, _, _ = follow(machine, axis, 0.0031)
+    present = values(machine)
+    own = {"x": "x", "y": "y", "z": "z", "rx": "roll", "rz": "yaw"}[axis]
+    assert {path for path, number in numbers.items() if number != present[path]} == {f"pose.{own}"}
+
+
 def test_only_motions_that_a_machine_has_are_offered():
     assert free_axes(load("delta")) == ("x", "y", "z")
     assert free_axes(load("planar-3rpr")) == ("x", "y", "rz")

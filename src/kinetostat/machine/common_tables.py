@@ -37,7 +37,9 @@ class Tool:
     ] = (0.0, 0.0, 0.0)
     inertia: Annotated[
         tuple[float, float, float, float, float, float],
-        Quantity("inertia", "of `mass` about its centre, platform axes: xx, yy, zz, xy, xz, yz", count=6, apart=True),
+        Quantity(
+            "inertia", "of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz", count=6, apart=True
+        ),
     ] = (0.0,) * 6
     payload_inertia: Annotated[
         tuple[float, float, float, float, float, float],
@@ -180,7 +182,8 @@ class CableTable:
         float, Quantity("linear density", "of unstretched cable, which then sags; 0: cables are straight")
     ] = 0.0
     pulley_radius: Annotated[
-        float, Quantity("length", "of pulleys at the base, which swivel about the vertical through `from`; 0: none")
+        float,
+        Quantity("length", "of pulleys at the base, which swivel about the vertical through their joint; 0: none"),
     ] = 0.0
 
 

@@ -12,6 +12,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import AXES, VECTORS, Parameter, parameters, values
+from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.wording import label, table_of
 from kinetostat.units import KINDS
@@ -131,6 +132,10 @@ class Control:
         return round(STEPS * min(max(share, 0.0), 1.0))
 
 
+DERIVED = ("axis", "first_axis", "second_axis")
+"""Fields of a joint that may follow from another joint: `axis = "ball"` points to the ball joint."""
+
+
 def controls(machine: Machine, length: float) -> tuple[Control, ...]:
     """Return all controls of a machine, in the order of its file.
 
@@ -138,8 +143,30 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
         machine: whose present numbers the ranges lie about.
         length: its characteristic length, m.
     """
-    present = values(machine)
-    return tuple(_control(parameter, present, length) for parameter in _offered_parameters(machine, present))
+    present, derived = values(machine), _derived_fields(machine)
+    made = (_control(parameter, present, length) for parameter in _offered_parameters(machine, present))
+    # What the file derives has no slider: it would undo the derivation. It can still be typed.
+    return tuple(
+        replace(each, low=0.0, high=0.0) if each.parameter.path.rpartition(".")[0] in derived else each for each in made
+    )
+
+
+def _derived_fields(machine: Machine) -> set[str]:
+    """Paths of the axes of joints that a file leg by leg does not write: they follow from where other joints are."""
+    if machine.family.chains is None or machine.written is None:
+        return set()
+    legs = parse(machine.written.text, machine.name).get("legs", [])
+    written = {
+        f"legs.{leg.get('name')}.{joint.get('name')}.{field}"
+        for leg in (legs if isinstance(legs, list) else [])
+        if isinstance(leg, dict)
+        for joint in leg.get("joints", [])
+        if isinstance(joint, dict)
+        for field, value in joint.items()
+        if isinstance(value, list)
+    }
+    fields = {parameter.path for parameter in parameters(machine.family) if parameter.path.startswith("legs.")}
+    return {path for path in fields if path.rpartition(".")[2] in DERIVED and path not in written}
 
 
 def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:

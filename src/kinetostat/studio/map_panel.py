@@ -28,7 +28,9 @@ LENGTHS = ("m", "mm")
 """Units of axes that have one scale if both have the same."""
 LOADED = "loaded_"
 """Beginnings of the names of quantities of the machine under its loads."""
-RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for the whole range of the slider'
+MARGIN, WORTH = 2, 0.8
+"""Points of margin about what can be reached, and the share of a range above which it is left as it is."""
+RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for where the machine can be'
 
 
 class MapPanel:
@@ -45,8 +47,8 @@ class MapPanel:
         self._lane = Lane(quantity_map, self._deliver)
         with ui.row().classes("panel-tools"):
             self.quantity = choice({}, "map of", self._choose, "map-quantity")
-            self.across = choice({}, "horizontal axis", self._choose, "map-across")
-            self.up = choice({}, "vertical axis", self._choose, "map-up")
+            self.across = choice({}, "horizontal", self._choose_axis, "map-across")
+            self.up = choice({}, "vertical", self._choose_axis, "map-up")
             with icon_button("straighten", "Ranges of the axes", self._show_ranges, "map-ranges"):
                 self._menu = ui.menu().props("no-parent-event").classes("map-ranges")
         with self._menu:
@@ -57,12 +59,15 @@ class MapPanel:
         self.time = ui.label("").classes("server-time").mark("map-time")
         self._asking = False
         self._chosen_ranges: dict[str, tuple[float, float]] = {}
+        self._reached: dict[str, tuple[float, float]] = {}
+        self._fits = True
         self.fill()
 
     def fill(self) -> None:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
         self._asking = False
         self._chosen_ranges.clear()
+        self._fit_anew()
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
         first, second, *_ = fields
         self._offer_quantities()
@@ -108,7 +113,30 @@ class MapPanel:
 
     def _ends_of(self, path: str) -> Ends:
         control = self._session.controls[path]
-        return Ends(path, *self._chosen_ranges.get(path, (control.low, control.high)))
+        here = self._session.value(path)
+        low, high = self._reached.get(path, (control.low, control.high))
+        if not low <= here <= high:  # the machine has left what could be reached when the map was opened
+            low, high = control.low, control.high
+        return Ends(path, *self._chosen_ranges.get(path, (low, high)))
+
+    def _fit_anew(self) -> None:
+        """Let the next map open on what can be reached: its ranges are narrowed if it is mostly empty."""
+        self._reached.clear()
+        self._fits = True
+
+    def _narrow(self, request: MapRequest, values: Array) -> bool:
+        """Narrow the ranges of axes to where a first map has values, with a margin; whether that is worth a new one."""
+        points = math.isqrt(values.size)
+        known = np.isfinite(values).reshape(points, points)
+        if not known.any():
+            return False
+        for ends, inside in ((request.across, known.any(axis=1)), (request.up, known.any(axis=0))):
+            places = np.flatnonzero(inside)
+            first, last = max(places[0] - MARGIN, 0), min(places[-1] + MARGIN, points - 1)
+            if last - first <= WORTH * (points - 1) and ends.path not in self._chosen_ranges:
+                step = (ends.high - ends.low) / (points - 1)
+                self._reached[ends.path] = (ends.low + first * step, ends.low + last * step)
+        return bool(self._reached)
 
     def _scale(self, path: str) -> tuple[Control, Scale]:
         control = self._session.controls[path]
@@ -122,6 +150,11 @@ class MapPanel:
             return  # the designer has chosen other axes meanwhile, and that map is on its way
         (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
         values = np.full(4, np.nan) if isinstance(maps, str) else maps[quantity]
+        if self._fits and not isinstance(maps, str):
+            self._fits = False
+            if self._narrow(request, values):
+                self.refresh(request.since)
+                return
         points = math.isqrt(values.size)
         known = values[np.isfinite(values)]
         ends = np.array(usual_range(known) if known.size else (0.0, 0.0))
@@ -190,6 +223,11 @@ class MapPanel:
 
     def _choose(self) -> None:
         if self._asking:
+            self.refresh()
+
+    def _choose_axis(self) -> None:
+        if self._asking:
+            self._fit_anew()
             self.refresh()
 
     def _pick(self, event: GenericEventArguments) -> None:

@@ -34,6 +34,8 @@ DIFFERENCE = 1e-6
 ITERATIONS, HALVINGS = 6, 4
 DONE = 1e-7
 """Residual, in units of the machine's length, at which the part is where it was pulled."""
+DECIMALS = 9
+"""Of metres and radians: finer than anybody can pull, and without the digits of round-off."""
 RANK = 1e-6
 """Singular values below this share of the largest count as zero: motions that no number can make."""
 
@@ -174,6 +176,9 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
         else:
             break
         numbers, residual = numbers + step, trial
+    # What has moved less than a residual may be left is round-off: it stays as it was written, to the last digit.
+    start = problem.start
+    numbers = np.where(np.abs(numbers - start) > DONE * units, np.round(numbers, DECIMALS), start)
     # All numbers that have an effect, changed or not: a whole pull changes the same ones, and is one step to undo.
     return {path: float(n) for path, n, counts in zip(problem.unknowns, numbers, effective, strict=True) if counts}
 

@@ -70,11 +70,15 @@ class ScenePanel:
         with ui.element("div").classes("scene-tools"):
             self.loaded = ui.switch("under load", on_change=lambda event: self._load(bool(event.value)))
             self.loaded.props("dense").tooltip(UNDER_LOAD).mark("loaded")
-            self.layers = {layer: self._layer(layer, text) for layer, text in LAYERS.items()}
+            with ui.element("div").classes("scene-layers") as shown:
+                self.layers = {layer: self._layer(layer, text) for layer, text in LAYERS.items()}
         with ui.element("div").classes("scene-views") as self.tools:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
+            # On a narrow page the list would lie on the machine: there this button opens it.
+            layers = icon_button("layers", "Layers of the picture", lambda: shown.classes(toggle="open"), "layers")
+            layers.classes("layers-button")
             self.ghost = icon_button("filter_none", GHOST, self._keep_ghost, "ghost")
             icon_button("photo_camera", "Save the picture as PNG", self._save, "picture")
         with ui.element("div").classes("scene-key"):

@@ -8,7 +8,9 @@ import math
 from nicegui import ui
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.machine import springs as springs_of
 from kinetostat.machine.parameters import with_leg
+from kinetostat.studies.attribution import parts_and_kinds
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studio.answers import (
     SINGULARITY,
@@ -26,7 +28,7 @@ from kinetostat.studio.elements import CurveView, choice, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import bars, engineering, full_label, paragraph
+from kinetostat.studio.wording import bars, engineering, full_label, heading, paragraph
 from kinetostat.units import KINDS
 
 LEAST = 5e-4
@@ -61,7 +63,7 @@ class ContributionsPanel(Panel):
 
 
 def contributions_text(report: Report, component: str) -> str:
-    """Bars of the parts that make one component of the compliance, all springs of a part added up.
+    """Bars of the parts that make one component of the compliance, all springs of a part added up; first by kind.
 
     Args:
         report: of one pose.
@@ -80,9 +82,12 @@ def contributions_text(report: Report, component: str) -> str:
     if not rows:
         return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
     unit = QUANTITIES[f"compliance_{component}"].unit
-    return paragraph(
-        f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}", "lead"
-    ) + bars("contributions to the compliance", rows, report.legs)
+    lead = f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}"
+    springs = {each.spring: each.compliance_share[index] or 0.0 for each in analysis.attribution}
+    _, together = parts_and_kinds(springs_of(analysis.state.configuration), springs)
+    kinds = [(kind, share, f"{100 * share:.1f} %") for kind, share in together if share > LEAST]
+    grouped = bars("contributions by kind of part", kinds) + heading("Part by part") if len(kinds) < len(rows) else ""
+    return paragraph(lead, "lead") + grouped + bars("contributions to the compliance", rows, report.legs)
 
 
 class SensitivityPanel(Panel):
