@@ -33,13 +33,12 @@ REGISTERED = {"kinetostat.exchange.solids"}
 PARTICIPLES_LEFT: dict[str, int] = {
     "accuracy": 1,
     "algebra": 4,
-    "engine": 2,
+    "engine": 1,
     "kinematics": 2,
-    "kinetostatics": 3,
-    "machine": 22,
-    "spec": 3,
+    "machine": 19,
+    "spec": 2,
     "studies": 3,
-    "studio": 6,
+    "studio": 3,
 }
 CLASSES_LEFT: frozenset[str] = frozenset(
     {

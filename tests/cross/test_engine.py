@@ -16,7 +16,7 @@ from kinetostat.engine.kernel import program_of, slab_fill
 from kinetostat.engine.machine_code import Program, machine_code_of
 from kinetostat.engine.native import Body, host_lanes
 from kinetostat.engine.points import Axis, Grid, PointTable
-from kinetostat.engine.trace import Graph, Traced, needed
+from kinetostat.engine.trace import Graph, Traced, needed_nodes
 from kinetostat.engine.trigonometry import cos_and_sin
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
@@ -347,7 +347,7 @@ def test_equal_expressions_are_one_node() -> None:
     assert x + 0.0 is x
     assert x * 1.0 is x
     assert x / 1.0 is x
-    assert len(needed([x * y + x * y])) == 4
+    assert len(needed_nodes([x * y + x * y])) == 4
 
 
 def test_what_depends_on_fixed_inputs_is_fixed() -> None:

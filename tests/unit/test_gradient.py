@@ -8,7 +8,7 @@ import pytest
 from kinetostat.algebra.scalar import cos, sin, smaller, sqrt, where
 from kinetostat.engine.gradient import Interpreted, gradient, share_of, with_gradients
 from kinetostat.engine.machine_code import Program, machine_code_of
-from kinetostat.engine.trace import Body, Graph, needed
+from kinetostat.engine.trace import Body, Graph, needed_nodes
 
 RULES = {
     "sum": lambda x, y: x + y + 2.0,
@@ -115,7 +115,7 @@ def test_equal_derivatives_are_one_node():
     shared = sqrt(x * x + y * y)
     first, again = gradient(shared, [x, y]), gradient(shared, [x, y])
     assert first == again
-    assert len(needed(first)) <= 14
+    assert len(needed_nodes(first)) <= 14
     assert gradient(x * y, [x, y]) == [y, x]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, where
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed
+from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes
 
 TURN_OPERATION = "turn"
 """Operation of a cosine or sine as derivatives see it; its operands are the angle and the derivative by it."""
@@ -154,7 +154,7 @@ class Interpreted:
         self.rows = len(body.results) * (1 + len(inputs))
         self._active = active_nodes((result for result in body.results if isinstance(result, Node)), inputs)
         rates = [operand for node in self._active for operand in rule(node)[1]]
-        self._lines = [node for node in needed([*body.results, body.code, *rates]) if node.operation != "input"]
+        self._lines = [node for node in needed_nodes([*body.results, body.code, *rates]) if node.operation != "input"]
 
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
         """Evaluate points, see `trace.Runnable`."""

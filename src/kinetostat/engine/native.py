@@ -12,7 +12,7 @@ from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
-from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed
+from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes
 
 
 def object_file_of(body: Body) -> bytes:
@@ -98,7 +98,7 @@ def source(body: Body, lanes: int) -> str:
         before += _pointer("column", k)
         inside.append(f"%at.column{k} = getelementptr double, ptr %column{k}, i64 %i")
         inside.append(f"%v{given.number} = load {numbers}, ptr %at.column{k}, align 8")
-    used = needed([*body.results, body.code])
+    used = needed_nodes([*body.results, body.code])
     for node in used:
         if node.fixed and node.operation != "input":
             before.append(line(node, [name_of(operand, 1) for operand in node.operands], 1))

@@ -13,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed
+from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed_nodes
 from kinetostat.frozen import dataclass
 
 LONGEST_EXPRESSION = 92
@@ -69,7 +69,7 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
         ValueError: a result needs another input.
     """
     written = {given.number: name for given, name in zip(inputs, names, strict=True)}
-    used = needed(results)
+    used = needed_nodes(results)
     uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
     uses.update(result.number for result in results if isinstance(result, Node))
     lines: list[str] = []
@@ -149,7 +149,7 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
     Raises:
         ValueError: a result needs another input.
     """
-    used = needed(results)
+    used = needed_nodes(results)
     uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
     uses.update(result.number for result in results if isinstance(result, Node))
     letters = {operation: chr(ord("a") + place) for place, operation in enumerate(NOTATION)}

@@ -238,7 +238,7 @@ class Runnable(Protocol):
         """
 
 
-def needed(results: Iterable[Operand]) -> list[Node]:
+def needed_nodes(results: Iterable[Operand]) -> list[Node]:
     """The nodes on which some results depend, in the order in which they were traced: operands first."""
     seen: set[Node] = set()
     waiting = list(results)

@@ -83,7 +83,7 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
         freed = iter(turned[len(passive) :])
         given = [next(freed) if twist is None else twist for twist in elastic]
         bodies = _bodies(leg, iter(turned[: len(passive)]), iter(given))
-        links += leg_links(leg, partial(_moved, bodies, response.reference))
+        links += leg_links(leg, partial(_twist_at, bodies, response.reference))
     return links
 
 
@@ -126,7 +126,7 @@ def _bodies(leg: Leg, turned: Iterator[Twist], given: Iterator[Twist]) -> list[T
     return motions
 
 
-def _moved(bodies: Sequence[Twist], reference: Vector, body: int, point: Vector) -> Twist:
+def _twist_at(bodies: Sequence[Twist], reference: Vector, body: int, point: Vector) -> Twist:
     return bodies[body].moved(point - reference)
 
 

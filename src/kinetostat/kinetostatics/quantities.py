@@ -151,7 +151,7 @@ def _under_load(response: Response, what: str, row: int | None = None) -> Scalar
     return values if row is None else values[row]
 
 
-def _moved(response: Response, row: int) -> Scalar:
+def _displacement(response: Response, row: int) -> Scalar:
     """A displacement under load, without what round-off leaves where nothing moves."""
     amount = _under_load(response, "displacement", row)
     return where(amount * amount < UNMOVED_TOOL * UNMOVED_TOOL, 0.0, amount)
@@ -312,7 +312,7 @@ def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
-        moved = partial(_moved, row=i)
+        moved = partial(_displacement, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
         stiff = _stiffness_unit(i, i)
         entries += [
@@ -437,8 +437,8 @@ GROUPS = {
 """Names that stand for several quantities: diagonals of C and of K, 1/C_ii, frequencies, and those under load."""
 
 
-def spoken(name: str) -> str:
-    """The name of a quantity as people say it."""
+def plain_name(name: str) -> str:
+    """The name of a quantity in words, such as "stiffness x"."""
     return name.replace("_", " ")
 
 

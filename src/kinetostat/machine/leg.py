@@ -408,10 +408,10 @@ def two_force_legs(
 ) -> list[Leg]:
     """Actuated U-P-S legs "leg 1", "leg 2", ... between joint centres (base frame, m) with their actuators (N/m)."""
     pairs = zip(base_joints, platform_joints, stiffness, strict=True)
-    return numbered(two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1))
+    return with_numbers(two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1))
 
 
-def numbered(legs: Iterable[Leg]) -> list[Leg]:
+def with_numbers(legs: Iterable[Leg]) -> list[Leg]:
     """Return the actuated legs of a family with their numbers, which drawings write beside them."""
     return [replace(leg, number=i, short=leg.short or str(i)) for i, leg in enumerate(legs, 1)]
 

@@ -316,7 +316,7 @@ def limits_loads(limits: object) -> bool:
     return any(limit.about is About.LOAD for limit in limits_set(limits))
 
 
-def unlimited(limits: object) -> str:
+def no_limits_sentence(limits: object) -> str:
     """A sentence for an answer that rests on no limit; empty if the table [limits] sets one."""
     return "" if limits_set(limits) else "No limits are set: strokes, joint angles and loads are not checked."
 

@@ -23,7 +23,7 @@ from kinetostat.machine.parameters import Given, check_contrast, read_numbers, w
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
-from kinetostat.spec.immutable import FixedDict, Immutable, fixed
+from kinetostat.spec.immutable import FixedDict, Immutable, immutable_data
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.requirements import Requirement
 from kinetostat.spec.tolerance_table import Tolerance
@@ -200,8 +200,8 @@ class Family:
     recipe: tuple[Callable[..., "Family"], tuple[Any, ...]] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tables", fixed(self.tables))
-        object.__setattr__(self, "literals", fixed(self.literals))
+        object.__setattr__(self, "tables", immutable_data(self.tables))
+        object.__setattr__(self, "literals", immutable_data(self.literals))
 
     @property
     def components(self) -> tuple[int, ...]:

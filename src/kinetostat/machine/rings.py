@@ -21,9 +21,9 @@ from kinetostat.machine.leg import (
     Line,
     PartName,
     Spring,
-    numbered,
     revolutes,
     two_force_legs,
+    with_numbers,
 )
 from kinetostat.machine.links import LinkKind, in_each_leg, straight_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
@@ -140,7 +140,7 @@ def crank_legs(
         crank_leg(f"leg {i}", base, tip, Z_AXIS.cross(side), k, links)
         for i, (base, tip, side, k) in enumerate(zip(*ends, sides, stiffness, strict=True), 1)
     ]
-    return numbered(leg for leg, _ in placed), [limit for _, limits in placed for limit in limits]
+    return with_numbers(leg for leg, _ in placed), [limit for _, limits in placed for limit in limits]
 
 
 Three = tuple[float, float, float]

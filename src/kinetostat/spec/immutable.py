@@ -53,7 +53,7 @@ class Immutable:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            object.__setattr__(self, name, fixed(value))
+            object.__setattr__(self, name, immutable_data(value))
 
     def __eq__(self, other: object) -> bool:
         return same(self, other) if type(self) is type(other) else NotImplemented
@@ -62,14 +62,14 @@ class Immutable:
         return _hash_of(self)
 
 
-def fixed(value: Any) -> Any:
+def immutable_data(value: Any) -> Any:
     """Return data with fixed lists and dictionaries in place of those that could be changed, and read-only arrays."""
     if isinstance(value, _Fixed):
         return value
     if isinstance(value, dict | MappingProxyType):
-        return FixedDict({key: fixed(entry) for key, entry in value.items()})
+        return FixedDict({key: immutable_data(entry) for key, entry in value.items()})
     if type(value) in (list, tuple):
-        return (FixedList if type(value) is list else tuple)(fixed(entry) for entry in value)
+        return (FixedList if type(value) is list else tuple)(immutable_data(entry) for entry in value)
     arrays = [variable.values for variable in value.data_vars.values()] if hasattr(value, "data_vars") else [value]
     for array in arrays:
         if hasattr(array, "setflags"):

@@ -32,7 +32,7 @@ from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator
-from kinetostat.machine.limits import unlimited
+from kinetostat.machine.limits import no_limits_sentence
 from kinetostat.machine.loads import Mass
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
@@ -357,5 +357,5 @@ def _message(
     if load and load.unheld:
         sentences.append(load.unheld)
     sentences = sentences or [Status.OK.sentence]
-    more = (state.left_out, unlimited(state.machine.tables["limits"]))
+    more = (state.left_out, no_limits_sentence(state.machine.tables["limits"]))
     return " ".join([*sentences, *(sentence for sentence in more if sentence)])

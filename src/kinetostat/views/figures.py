@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
-from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import entry_name, names_entries
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import failures, field_of
@@ -343,7 +343,7 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
     about = dataset[names[0]].attrs.get("long_name") or ", ".join(
-        spoken(group) for group in dict.fromkeys(group_of([name]) or name for name in names)
+        plain_name(group) for group in dict.fromkeys(group_of([name]) or name for name in names)
     )
     panel.set(xlabel=x_label, ylabel=scale.label(about))
     panel.margins(x=0.0)

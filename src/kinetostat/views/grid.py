@@ -10,7 +10,7 @@ import xarray as xr
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import shown
@@ -126,9 +126,9 @@ def _curve_table(dataset: xr.Dataset, names: Sequence[str]) -> FittedTable:
     coordinate, display = dataset[across], display_of(dataset)
     group = group_of(names)
     scales = {name: display.fitting(QUANTITIES[name].unit, _of_unit(dataset, name, names)) for name in names}
-    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{scales[name].head}" for name in names]
+    heads = [f"{plain_name(name.removeprefix(f'{group}_'))}\n{scales[name].head}" for name in names]
     unit, field = coordinate.attrs["units"], shown(field_of(coordinate))
-    table = numeric_table(spoken(group) or f"Along {field}", f"{field}\n{display.scale(unit).head}", heads)
+    table = numeric_table(plain_name(group) or f"Along {field}", f"{field}\n{display.scale(unit).head}", heads)
     for i, value in enumerate(coordinate.values):
         cells = (number(float(dataset[name].values[i]) * scales[name].factor) for name in names)
         table.add_row(display.number(float(value), unit), *cells)

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
@@ -131,7 +131,7 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
             every = (v for name in members for v in answers.values[name])
             scale = answers.machine.display.fitting(unit, every)
             curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
-            _panel(panel, answers, curves, scale.label(spoken(group_of(members) or members[0])))
+            _panel(panel, answers, curves, scale.label(plain_name(group_of(members) or members[0])))
         for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
             shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
             scale = answers.machine.display.scale(shown[0][0].unit)

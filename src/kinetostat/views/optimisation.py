@@ -16,7 +16,7 @@ from rich.text import Text
 
 from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display, number
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.saving import as_file
 from kinetostat.studies.optimisation.assessment import DesignVerdict, Outcome, Robustness
 from kinetostat.studies.optimisation.log import ROWS
@@ -45,7 +45,7 @@ def print_study(console: Console, problem: Problem) -> None:
 def aims(problem: Problem) -> list[str]:
     """Objectives and constraints, a line each."""
     objectives = [
-        f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
+        f"Objective: {term.goal} {plain_name(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
         for term in problem.objectives
     ]
     return objectives + [f"Constraint: {bound.in_words(problem.machine.display)}" for bound in problem.constraints]

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kinetostat.display import Display, Scale
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.optimisation.assessment import Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
@@ -189,7 +189,7 @@ def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
 
 
 def _axis(objective: Objective, scale: Scale) -> str:
-    return scale.label(spoken(objective.term.label))
+    return scale.label(plain_name(objective.term.label))
 
 
 def _limits(front_values: np.ndarray, every: np.ndarray) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes, sensitivity
 from kinetostat.units import KINDS, RIGID
@@ -24,8 +24,8 @@ NEGLIGIBLE = 0.0005
 def influence_table(answer: Sensitivity, count: int) -> FittedTable:
     """Return the first parameters by rank, with their values and their effect on each index."""
     group, machine = group_of(answer.quantities), answer.machine
-    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{spoken(group)}, {PER}" if group else PER
+    heads = [plain_name(name.removeprefix(f"{group}_")) for name in answer.quantities]
+    title = f"{plain_name(group)}, {PER}" if group else PER
     table = numeric_table(f"{machine.name}: {title}", "parameter", ["value", *heads])
     for influence in answer.parameters[:count]:
         value = machine.display.show(influence.value, KINDS[influence.kind].unit, RIGID, DIGITS_OF_PARAMETERS)

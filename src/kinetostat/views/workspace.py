@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from operator import attrgetter
 from typing import Any
 
-from kinetostat.machine.limits import Limits, unlimited
+from kinetostat.machine.limits import Limits, no_limits_sentence
 from kinetostat.machine.parameters import dimension, shown
 from kinetostat.studies.grid import field_of
 from kinetostat.studies.workspace import FEWEST_CELLS, METHOD, Workspace, workspace
@@ -50,7 +50,7 @@ def _lines(answer: Workspace) -> Lines:
             "The machine keeps to the assembly mode of its home pose, the one in which its legs are written down.",
         )
     if not answer.limits:
-        yield "Limits", unlimited(Limits())
+        yield "Limits", no_limits_sentence(Limits())
     if not answer.exists:
         yield "Inside", "No pose of the box is in the workspace; the table shows why."
     elif answer.connected is None:

@@ -19,7 +19,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy import ndimage
 
 from kinetostat.arrays import Array
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.grid import field_of
 from kinetostat.studies.workspace import BORDER_VARIABLES, COLOURING_QUANTITY, Workspace
 from kinetostat.studies.workspace_borders import depth, surface
@@ -233,7 +233,7 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) 
         panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
         extremes = int((values < low).any()) + 2 * int((values > high).any())
         bar = figure.colorbar(
-            ScalarMappable(norm, "viridis"), ax=panel, shrink=0.6, pad=0.12, label=scale.label(spoken(quantity)),
+            ScalarMappable(norm, "viridis"), ax=panel, shrink=0.6, pad=0.12, label=scale.label(plain_name(quantity)),
             extend=("neither", "min", "max", "both")[extremes],
         )  # fmt: skip
         slim_bar(bar)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, with_numbers
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
@@ -59,7 +59,9 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
         for i, (low, high, outward, k) in enumerate(zip(base, top, radial, stiffness.actuator, strict=True), 1)
     ]
     limits = tuple(limit for _, conditions in placed for limit in conditions)
-    return Configuration(Displacement(IDENTITY, tip), tuple(numbered(leg for leg, _ in placed)), limits, geometry.size)
+    return Configuration(
+        Displacement(IDENTITY, tip), tuple(with_numbers(leg for leg, _ in placed)), limits, geometry.size
+    )
 
 
 def _leg(

@@ -10,7 +10,7 @@ from typing import Annotated
 from kinetostat.algebra.lines import slide_travel
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, with_numbers
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
@@ -84,7 +84,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
     """
     tip = Vector(pose.x, pose.y, pose.z)
     placed = [_leg(i, tip, geometry, stiffness) for i in range(LEGS)]
-    legs = tuple(numbered(replace(leg, short=name) for name, (leg, _) in zip("ABC", placed, strict=True)))
+    legs = tuple(with_numbers(replace(leg, short=name) for name, (leg, _) in zip("ABC", placed, strict=True)))
     return Configuration(Displacement(IDENTITY, tip), legs, tuple(limit for _, limit in placed), geometry.size)
 
 

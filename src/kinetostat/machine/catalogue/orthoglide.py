@@ -11,7 +11,7 @@ from typing import Annotated
 from kinetostat.algebra.lines import slide_travel
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, with_numbers
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
@@ -59,7 +59,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
         for i, (name, k) in enumerate(zip("xyz", stiffness.actuator, strict=True))
     ]
     legs, limits = (
-        tuple(numbered(replace(leg, short=axis) for axis, (leg, _) in zip("xyz", placed, strict=True))),
+        tuple(with_numbers(replace(leg, short=axis) for axis, (leg, _) in zip("xyz", placed, strict=True))),
         tuple(limit for _, limit in placed),
     )
     return Configuration(Displacement(IDENTITY, tip), legs, limits, geometry.bar_length)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector, rotation_z
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, with_numbers
 from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Configuration, Family, Plane
 from kinetostat.machine.parts import if_elastic, per_length
@@ -58,7 +58,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
         planar_leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
-    return Configuration(platform, tuple(numbered(legs)), (), geometry.size, Plane())
+    return Configuration(platform, tuple(with_numbers(legs)), (), geometry.size, Plane())
 
 
 def planar_leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar) -> Leg:

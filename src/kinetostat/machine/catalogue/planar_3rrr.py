@@ -10,7 +10,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, platform_and_joints
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, with_numbers
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length
@@ -52,7 +52,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
     limits = tuple(limit for _, conditions in built for limit in conditions)
-    return Configuration(platform, tuple(numbered(leg for leg, _ in built)), limits, geometry.size, Plane())
+    return Configuration(platform, tuple(with_numbers(leg for leg, _ in built)), limits, geometry.size, Plane())
 
 
 def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLinks) -> tuple[Leg, tuple[Closure, ...]]:

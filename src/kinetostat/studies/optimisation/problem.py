@@ -9,7 +9,7 @@ from typing import Any
 
 from kinetostat.display import Display
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
@@ -69,7 +69,7 @@ class Constraint:
 
     def in_words(self, display: Display) -> str:
         """As people read it."""
-        return f"{spoken(self.term.label)} {self._relation} {display.show(self.bound, self.term.unit)}"
+        return f"{plain_name(self.term.label)} {self._relation} {display.show(self.bound, self.term.unit)}"
 
     @property
     def _relation(self) -> str:

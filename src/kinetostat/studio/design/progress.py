@@ -11,7 +11,7 @@ from typing import Any
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Objective, Problem
@@ -60,7 +60,7 @@ class Progress:
 
     def label(self, objective: Objective) -> str:
         """The label of an objective with the unit in which its values are shown."""
-        return self.scale(objective).label(spoken(objective.term.label))
+        return self.scale(objective).label(plain_name(objective.term.label))
 
     def exact(self, objective: Objective, value: float) -> str:
         """The value of an objective with all its digits and its unit; a sum of several kinds has none."""

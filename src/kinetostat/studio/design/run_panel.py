@@ -11,7 +11,7 @@ from nicegui.events import GenericEventArguments
 
 from kinetostat.display import Scale
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.design.progress import Follower, Progress, failure
@@ -337,5 +337,5 @@ def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[
         goals = [display.number(value, aim.term.unit) for value, aim in zip(objectives, aims, strict=True)]
         sizes = [v.in_words(size, display) for v, size in zip(space.searched, design, strict=True)]
         texts.append([*goals, *sizes])
-    names = [spoken(variable.name.removeprefix("geometry.")) for variable in space.searched]
+    names = [plain_name(variable.name.removeprefix("geometry.")) for variable in space.searched]
     return [*(f"{aim.goal} {progress.label(aim)}" for aim in aims), *names], values, texts

@@ -20,7 +20,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, read_history
-from kinetostat.studio.design.state_folder import RUNS, numbered, slug
+from kinetostat.studio.design.state_folder import RUNS, numbered_entries, slug
 from kinetostat.studio.processes import make_modest
 from kinetostat.views.optimisation import write_result
 
@@ -89,7 +89,7 @@ class Runs:
             InputError: the folder of all searches cannot be read.
         """
         try:
-            folders = numbered(self._folder)
+            folders = numbered_entries(self._folder)
         except OSError as error:
             raise InputError(f'the searches in "{self._folder}" cannot be read: {error.strerror}.') from None
         listed = (self._entry(number, path) for number, path in folders.items())
@@ -101,7 +101,7 @@ class Runs:
         Raises:
             InputError: it has been deleted.
         """
-        path = numbered(self._folder).get(number)
+        path = numbered_entries(self._folder).get(number)
         run = None if path is None else self._entry(number, path)
         if run is None:
             raise InputError(f"search {number} has been deleted; choose another one.")
@@ -126,7 +126,7 @@ class Runs:
         """
         with self._lock:
             self._check_free(tab)
-            present = numbered(self._folder)
+            present = numbered_entries(self._folder)
             if len(present) >= MOST_RUNS:
                 raise InputError(f"{MOST_RUNS} searches are kept, the most there may be; delete one of them.")
             number = max(present, default=0) + 1

@@ -60,7 +60,7 @@ def slug(name: str, otherwise: str) -> str:
     return "-".join(part for part in kept.split("-") if part)[:40] or otherwise
 
 
-def numbered(folder: Path) -> dict[int, Path]:
+def numbered_entries(folder: Path) -> dict[int, Path]:
     """Return the entries of a folder whose names begin with a number of four digits, the latest first.
 
     A folder that is not there has none, and one that cannot be read shows none.
@@ -108,7 +108,7 @@ class Favourites:
     def every(self) -> list[Favourite]:
         """All favourites, the latest first; files that cannot be read are left out."""
         favourites = []
-        for number, path in numbered(self._folder).items():
+        for number, path in numbered_entries(self._folder).items():
             try:
                 name = str(read(path).get("name", path.stem))
                 first = path.read_text("utf-8").partition("\n")[0]
@@ -129,7 +129,7 @@ class Favourites:
             raise InputError(f"the name has {len(name)} characters; the name of a favourite has 1 to {LONGEST_NAME}.")
         if len(note) > LONGEST_NOTE:
             raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_NOTE}.")
-        present = numbered(self._folder)
+        present = numbered_entries(self._folder)
         if len(present) >= MOST:
             raise InputError(f"{MOST} favourites are kept, the most there may be; delete one that you no longer need.")
         number = max(present, default=0) + 1
@@ -141,7 +141,7 @@ class Favourites:
 
     def delete(self, number: int) -> None:
         """Delete a favourite; nothing happens if it is gone already."""
-        path = numbered(self._folder).get(number)
+        path = numbered_entries(self._folder).get(number)
         if path is not None:
             path.unlink(missing_ok=True)
 

@@ -11,7 +11,7 @@ from html import escape
 from typing import Any
 
 from kinetostat.display import DASH, Display, Scale, number
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.comparison import Comparison, SoftDirection
 from kinetostat.studies.design_numbers import Better, DesignRow
 from kinetostat.studies.optimisation.problem import Problem
@@ -47,7 +47,7 @@ def _so_far(progress: Progress) -> str:
         count = len(progress.objectives)
         return paragraph(f"The Pareto front has {count} designs so far. Click one in the plot to load it.")
     aim, display = progress.problem.objectives[0], progress.problem.machine.display
-    rows = [[f"{aim.goal} {spoken(aim.term.label)}", progress.exact(aim, progress.objectives[0][0])]]
+    rows = [[f"{aim.goal} {plain_name(aim.term.label)}", progress.exact(aim, progress.objectives[0][0])]]
     if progress.genes is not None:
         space = progress.problem.space
         pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)

@@ -142,7 +142,7 @@ class VibrationPanel(Panel):
         """Offer the components of the machine, and across the cut where the file says where that is."""
         machine = new.answer.machine
         names = [*new.answer.components, *([CUT] if any(machine.tables["cutting"].direction) else [])]
-        options, first = {name: spoken(name) for name in names}, new.answer.modes[0].direction
+        options, first = {name: direction_phrase(name) for name in names}, new.answer.modes[0].direction
         for field in (self.moved, self.pushed):
             if field.options != options:
                 field.set_options(options, value=field.value if field.value in options else first)
@@ -188,11 +188,11 @@ class VibrationPanel(Panel):
         answer, across = self._ringing.answer, self._ringing.frequencies
         moved, pushed = str(self.moved.value), str(self.pushed.value)
         ways = [_way(answer.machine, name) for name in (moved, pushed)]
-        curve = _between(ways[0], self._ringing.receptance, ways[1])
-        direct = [np.abs(_between(way, self._ringing.receptance, way)).max() for way in ways]
+        curve = _response_between(ways[0], self._ringing.receptance, ways[1])
+        direct = [np.abs(_response_between(way, self._ringing.receptance, way)).max() for way in ways]
         coupled = bool(np.abs(curve).max() > COUPLED * math.sqrt(direct[0] * direct[1]))
         self.none.set_visibility(not coupled)
-        self.none.set_text(f"A load {spoken(pushed)} does not move the tool {spoken(moved)}.")
+        self.none.set_text(f"A load {direction_phrase(pushed)} does not move the tool {direction_phrase(moved)}.")
         for view in (self.size, self.phase):
             view.set_visibility(coupled)
         unit = entry_unit("compliance", *("x" if name == CUT else name for name in (moved, pushed)))
@@ -223,7 +223,7 @@ def about(new: Ringing) -> str:
     return paragraph(answer.message, "lead") + paragraph(more.rstrip())
 
 
-def spoken(name: str) -> str:
+def direction_phrase(name: str) -> str:
     """Return a component as a direction: "along x", "about x", "across the cut"."""
     if name == CUT:
         return f"across {CUT}"
@@ -284,7 +284,7 @@ def _way(machine: Machine, name: str) -> Array:
     return np.concatenate([np.zeros(3), direction / np.linalg.norm(direction)])
 
 
-def _between(moved: Array, receptance: Complex, pushed: Array) -> Complex:
+def _response_between(moved: Array, receptance: Complex, pushed: Array) -> Complex:
     """Return the motion along one unit twist per unit of a wrench [frequencies]."""
     return np.asarray(np.einsum("i,fij,j->f", moved, receptance, pushed))
 

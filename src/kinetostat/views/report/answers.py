@@ -8,7 +8,7 @@ from typing import Any
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.identification.record import FitRecord, RecordedFit
@@ -205,7 +205,7 @@ def gains(result: Result) -> Iterator[str]:
         before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
         unit, show = objective.term.unit, result.problem.machine.display.show
         before, after = (show(value, "1" if unit == "SI" else unit) for value in (before, after))
-        label = spoken(objective.term.label)
+        label = plain_name(objective.term.label)
         yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {before} before, {after} now."
 
 
