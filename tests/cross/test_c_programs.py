@@ -248,18 +248,25 @@ def test_matlab_is_told_how_to_call(tmp_path):
         mex("forward", np.zeros((3, 2)), np.zeros((3, 1)))
 
 
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_the_model_is_valid_and_gives_what_python_computes(kind, tmp_path):
-    machine = load("hexapod", LOADED)
-    path = export(machine, tmp_path / "hexapod.fmu", inputs=["tool.offset.2"], outputs=["compliance_x"])[0]
+@pytest.fixture(scope="module")
+def hexapod_fmu(tmp_path_factory):
+    """A valid model of a loaded hexapod, for both kinds of simulation."""
+    path = tmp_path_factory.mktemp("model") / "hexapod.fmu"
+    export(load("hexapod", LOADED), path, inputs=["tool.offset.2"], outputs=["compliance_x"])
     assert fmpy.validation.validate_fmu(str(path)) == []
+    return path
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_the_model_is_valid_and_gives_what_python_computes(kind, hexapod_fmu):
+    machine = load("hexapod", LOADED)
     reached = with_values(machine, {"pose.x": 0.003, "pose.roll": 0.02})
     starts = {f"driven.{a.name}": float(a.coordinate) for a in stand(reached)}
     outputs = ["K", "C", "coordinate.leg 3 actuator", "command.leg 3 actuator", "compliance_x", "status"]
     outputs += ["displacement", "reached.x", "reached.roll", "reached.status"]
     starts |= {"pose.x": 0.003, "pose.roll": 0.02}
     rows = fmpy.simulate_fmu(
-        str(path), fmi_type=kind, stop_time=1.0, output_interval=1.0, start_values=starts, output=outputs
+        str(hexapod_fmu), fmi_type=kind, stop_time=1.0, output_interval=1.0, start_values=starts, output=outputs
     )
     row = rows[-1]
     analysis = analyze(reached)
