@@ -172,6 +172,21 @@ def test_an_impossible_pose_says_why_and_keeps_the_last_picture():
     on_page(steps)
 
 
+def test_picture_and_sentence_agree_beyond_a_limit_and_out_of_reach():
+    """Beyond a limit the machine can be drawn, and is; out of reach it cannot."""
+
+    async def steps(page):
+        await page.send("control pose.z", "write", "200 mm")
+        assert page.one("status").text == "joint limit"
+        height = page.shown("MachineView", "show")["solids"]
+        assert "The picture shows this pose" in page.one("message").text
+        assert page.shown("MachineView", "overlay") == []
+        await page.send("control geometry.platform_radius", "write", "91 mm")
+        assert page.shown("MachineView", "show")["solids"] != height
+
+    on_page(steps, "hexapod")
+
+
 def test_an_analysis_that_fails_is_said_and_the_next_answer_takes_its_place(monkeypatch):
     async def steps(page):
         original = answers.analyze

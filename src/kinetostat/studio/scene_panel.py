@@ -40,6 +40,7 @@ UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity i
 COMPUTING = "The next pose is being computed ..."
 LOOKING = "The legs cannot close at this pose on the branch of the home pose; the nearest pose is being looked for ..."
 KEPT = "The picture and the figures still show the last good pose."
+PICTURED = "The picture shows this pose; the figures still show the last good one."
 UNLOADED = "The picture shows the machine without its loads, and the figures still show the last state of rest."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
 
@@ -59,7 +60,7 @@ class ScenePanel:
         """
         self._load, self._exaggerate, self._name = load, exaggerate, name
         self._shown: dict[str, Any] | None = None
-        self._ghost = False
+        self._ghost = self._pictured = False
         self._hidden: set[str] = set()
         with ui.element("div").classes("stage"):
             self._stage()
@@ -119,6 +120,7 @@ class ScenePanel:
 
     def draw(self, picture: Picture) -> None:
         """Show a pose, if there is something to draw."""
+        self._pictured = picture.scene is not None
         if picture.scene is not None:
             self._shown = picture.scene
             self.view.run_method("show", picture.scene)
@@ -133,9 +135,10 @@ class ScenePanel:
         status, message = _verdict(report)
         sound = report.loaded is None or report.loaded.rest is Rest.OK
         placed = report.analysis.status is Status.OK
-        self._tell(report.answered, status, message, sound, UNLOADED if placed else KEPT)
+        kept = UNLOADED if placed else PICTURED if self._pictured else KEPT
+        self._tell(report.answered, status, message, sound, kept)
         if not report.answered:
-            if placed:
+            if placed or self._pictured:
                 self.view.run_method("overlay", [], [])
             return
         self.view.run_method("overlay", report.solids, [])

@@ -128,10 +128,10 @@ class FavouritesPanel:
             button.tooltip("keep the present machine as a favourite").mark("favourite-keep")
         self._list = ui.element("div").classes("favourites")
         with ui.element("div").classes("keep-row"):
-            self.quantities = ui.input("numbers, e.g. frequency_1, stable_width").mark("favourite-quantities")
-            self.over = ui.input("over, e.g. x=-2 cm:2 cm:5").mark("favourite-over")
+            self.quantities = ui.input("numbers", placeholder="frequency_1, mass").mark("favourite-quantities")
+            self.over = ui.input("over", placeholder="x=-2 cm:2 cm:5").mark("favourite-over")
             for box in (self.quantities, self.over):
-                box.props(f"dense outlined maxlength={LONGEST_NOTE}").classes("field grow")
+                box.props(f"dense outlined stack-label maxlength={LONGEST_NOTE}").classes("field grow")
         with ui.element("div").classes("design-foot"):
             ui.label("Tick two to five machines to compare them.").classes("note grow")
             self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)
