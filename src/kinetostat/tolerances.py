@@ -131,6 +131,9 @@ legs together, beyond which it counts as rigid where legs are eliminated: the su
 UNRESISTED = 1e-12
 """Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
 
+SURE_PIVOT = 1e-9
+"""Share of a diagonal entry below which its pivot says too little about stability."""
+
 COMMANDED = 1e-14
 """Change of an actuator, rad or in units of the machine's length, below which a correction is round-off."""
 EXACT_LAW = 1e-9

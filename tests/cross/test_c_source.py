@@ -160,7 +160,7 @@ def test_coordinates_that_no_pose_has_are_refused(functions_of):
     assert forward(np.full(6, math.nan), start) != Status.OK
 
 
-@pytest.mark.parametrize("name", ["hexapod", "hexapod-cubic", "tricept"])
+@pytest.mark.parametrize("name", ["hexapod", "hexapod-cubic", "tricept", "delta", "tripteron"])
 def test_rest_and_command_are_those_of_the_solver_for_any_machine(name, tmp_path):
     machine = load(name, LOADED)
     functions = Functions(machine, tmp_path)
@@ -176,7 +176,9 @@ def test_rest_and_command_are_those_of_the_solver_for_any_machine(name, tmp_path
     targets = actuator_targets(machine, points.columns(0, len(poses)), len(poses))
     ends, coordinates = functions.at("command", poses, targets.coordinates.shape[1])
     assert (ends[ok] == Status.OK).all()
-    assert coordinates[ok] == pytest.approx(targets.coordinates[ok], rel=1e-12, abs=1e-13)
+    # The stiffness of the Delta's bars depends on the pose, which C takes where the loaded machine is commanded to.
+    second_order = np.nanmax(targets.corrections**2) if name == "delta" else 0.0
+    assert coordinates[ok] == pytest.approx(targets.coordinates[ok], rel=1e-12, abs=1e-13 + second_order)
 
 
 def test_quantities_and_their_derivatives_are_those_of_the_engine(tmp_path):

@@ -1,4 +1,4 @@
-"""Loaded states of many poses: programs in the coordinates of one leg against the solver for any machine."""
+"""Loaded states of many poses: programs of machines whose loops are cut against the solver for any machine."""
 
 import numpy as np
 import pytest
@@ -20,6 +20,8 @@ CUT = {
     *("passive-leg-5dof", "passive-leg-5dof-driven"),
 }
 """Bundled machines whose loops are cut at rods."""
+WITH_LEGS = {"delta", "delta-linear", "orthoglide", "planar-3rrr", "tripteron", "hexapod-hardware"}
+"""Those with legs that close loops and are condensed onto the platform."""
 
 
 def moved_by_about(name, amount, *settings):
@@ -70,8 +72,10 @@ def poses_near(machine, count, share=0.01):
     return {path: getattr(pose, path[5:]) + row for path, row in zip(paths, drawn, strict=True)}
 
 
-def test_which_machines_are_cut_at_rods():
-    assert {name for name in bundled() if cut_machine(load_without_limits(name)) is not None} == CUT | {"cogiro"}
+def test_which_machines_are_cut_and_which_of_them_have_legs_that_close_loops():
+    cuts = {name: cut_machine(load_without_limits(name)) for name in bundled()}
+    assert {name for name, found in cuts.items() if found is not None} == CUT | WITH_LEGS | {"cogiro"}
+    assert {name for name, found in cuts.items() if found is not None and found.legs} == WITH_LEGS
 
 
 def test_legs_of_a_file_are_rods_while_their_slides_point_along_them():
@@ -116,8 +120,63 @@ def test_rigid_links_and_springs_in_a_row():
 
 
 def test_machines_with_other_loops_are_left_to_the_solver():
-    machine = moved_by_about("planar-3rrr", 1e-3)
+    machine = moved_by_about("hexapod-rus", 1e-3)
     compare(machine, poses_near(machine, 3), quantities_of(machine), agreed=0.0)
+
+
+def of_programs(monkeypatch):
+    """See to it that no point is left to the solver for any machine."""
+    from kinetostat.engine import loaded
+
+    chosen = loaded._fill_with_unknowns
+    monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
+    return chosen
+
+
+AT_REST = ("tangent_free_stiffness", "tangent_stiffness", "displacement")
+SLOW = {"orthoglide", "hexapod-hardware", "delta-linear"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in sorted(WITH_LEGS)]
+)
+def test_programs_condense_legs_that_close_loops(name):
+    """Loads move the tool by 5 mm; masses of links, where the file has them, weigh as in the solver."""
+    machine = moved_by_about(name, 5e-3)
+    others = ["actuator_moment" if name in ("delta", "planar-3rrr") else "actuator_force", "slack_springs"]
+    programs, solver = both_ways(machine, poses_near(machine, 8), [*quantities_of(machine), *others])
+    assert (programs[1] == Status.OK).all()
+    assert (solver[1] == Status.OK).all()
+    assert not np.array_equal(programs[0], solver[0])  # they are two routes
+    sizes = np.abs(solver[0])
+    parts = len(machine.family.components)
+    sizes[:parts] = sizes[:parts].max(axis=0)
+    same = (programs[0] == solver[0]) | (np.abs(programs[0] - solver[0]) <= 1e-10 * sizes)
+    assert same.all()
+
+
+def test_legs_with_rigid_links_share_what_rigid_parts_hold():
+    """The bars and arms of a Delta are rigid unless its file says otherwise: three springs hold nine wrenches."""
+    rigid = ["stiffness.bar_axial=rigid", "stiffness.arm_bending=rigid", "stiffness.arm_torsion=rigid"]
+    machine = load_without_limits(
+        "delta", ["load.force=[200, 100, -300]", "tool.mass=2", "load.gravity=[0, 0, -9.81]", *rigid]
+    )
+    quantities = [f"{kind}_{c}" for kind in ("displacement", "tangent_free_stiffness") for c in "xyz"]
+    (fast, status), (slow, expected) = both_ways(machine, poses_near(machine, 8), [*quantities, "actuator_moment"])
+    assert status.tolist() == expected.tolist() == [Status.OK] * 8
+    assert np.allclose(fast, slow, rtol=1e-9, atol=0.0)
+    assert not np.array_equal(fast, slow)
+
+
+def test_vibration_at_rest_of_a_platform_that_is_alone_massive():
+    machine = load_without_limits(
+        "delta", ["tool.mass=2 kg", "load.force=[100, 0, -200]", "load.gravity=[0, 0, -9.81]"]
+    )
+    names = [f"loaded_frequency_{k}" for k in (1, 2, 3)]
+    (fast, status), (slow, _) = both_ways(machine, poses_near(machine, 8), names)
+    assert (status == Status.OK).all()
+    assert np.allclose(fast, slow, rtol=1e-9, atol=0.0)
+    assert not np.array_equal(fast, slow)
 
 
 def test_many_points_go_through_programs(monkeypatch):

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, weighted, where
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import CLOSING_ROUND_OFF, SURELY_MORE, ZERO_PIVOT
+from kinetostat.tolerances import CLOSING_ROUND_OFF, SURE_PIVOT, SURELY_MORE, UNRESISTED, ZERO_PIVOT
 
 Row = list[Scalar]
 
@@ -34,14 +34,11 @@ class _Triangular:
     @property
     def images(self) -> list[Row]:
         """Q^T by columns: the images of the unit vectors."""
-        columns = _identity(len(self.vectors[0]))
-        for reflection in self.reflections:
-            for column in columns:
-                reflection.apply(column)
-        return columns
+        columns = [self.column(row) for row in range(len(self.vectors[0]))]
+        return [list(image) for image in zip(*columns, strict=True)]
 
     def column(self, row: int) -> Row:
-        """The column of Q of one row, by the reflections in reverse: less work than all columns of Q^T."""
+        """The column of Q of one row: in reverse, the first reflections meet most zeros."""
         result = _identity(len(self.vectors[0]))[row]
         for reflection in reversed(self.reflections):
             reflection.apply(result)
@@ -346,3 +343,28 @@ def elimination(rows: Sequence[Sequence[Scalar]], symmetric: bool = True) -> Eli
             for j in range(i if symmetric else k + 1, size):
                 left[i][j] = left[i][j] - share * left[k][j]
     return Eliminated(lower, left, shrink)
+
+
+def definite(factors: Eliminated, rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Whether a symmetric matrix is surely positive definite, by the pivots of its elimination."""
+    good: Scalar = True
+    for k, pivot in enumerate(factors.pivots):
+        good = good & (pivot > SURE_PIVOT * abs(rows[k][k]))
+    return good
+
+
+def semidefinite_root(rows: Sequence[Sequence[Scalar]]) -> list[Row]:
+    """The lower triangle G with G G^T = A of a matrix that may be semidefinite, by Cholesky's factorisation."""
+    size = range(len(rows))
+    left: list[Row] = [list(row) for row in rows]
+    result: list[Row] = [[0.0 for _ in size] for _ in size]
+    for k in size:
+        pivot = left[k][k]
+        good = pivot > UNRESISTED * abs(rows[k][k])
+        root = sqrt(where(good, pivot, 1.0))
+        result[k][k] = where(good, root, 0.0)
+        for i in range(k + 1, len(rows)):
+            result[i][k] = where(good, left[i][k] / root, 0.0)
+            for j in range(k + 1, i + 1):
+                left[i][j] = left[i][j] - result[i][k] * result[j][k]
+    return result

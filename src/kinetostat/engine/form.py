@@ -179,6 +179,7 @@ def objectives_of(
     modes: int = 0,
     limited: bool = True,
     plan: MotionPlan | None = None,
+    stepping: bool = False,
 ) -> TracedFormula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
 
@@ -193,6 +194,8 @@ def objectives_of(
         limited: whether the limits of a machine meant under its loads judge its points at rest.
         plan: which motions there are, where quantities are about accelerations, see `plan_for`.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
+        stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
+            of its size, so that the program can be repeated until this is small.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
@@ -220,6 +223,8 @@ def objectives_of(
         response = replace(response, acceleration_loads=loads_by_acceleration(here))
     accepted = response.status < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
+    if stepping and response.loaded is not None:
+        results += [result_of(value) for value in response.loaded["after"]]
     return formula_of(given, columns, results, result_of(response.status), paths, coordinates)
 
 
@@ -254,13 +259,13 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
         kind: of a machine whose equations can be reduced.
         form: how its parameters enter.
         closed: as for `objectives_of`.
-        first: whether to begin at the free state, with two steps and without columns of coordinates.
+        first: whether to begin at the free state, without columns of coordinates.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
     equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
     coordinates = () if first else new_inputs(given.graph, equations.size)
-    stepped, square = equations.step(equations.start() if first else [*coordinates])
+    stepped, square = equations.start() if first else equations.step([*coordinates])
     results = [result_of(value) for value in (*stepped, square)]
     return formula_of(given, columns, results, 0.0, coordinates=coordinates)
 

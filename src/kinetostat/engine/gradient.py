@@ -41,7 +41,7 @@ def gradient(result: Operand, inputs: Sequence[Traced]) -> list[Operand]:
     Returns:
         A node of the same graph for each input, or a float where the derivative is the same everywhere.
     """
-    if not isinstance(result, Node):
+    if not isinstance(result, Node) or not inputs:  # without inputs, no graph has to be gone through
         return [0.0] * len(inputs)
     slopes: dict[Node, Operand] = {result: 1.0}
     active = active_nodes([result], inputs)

@@ -65,15 +65,6 @@ class FallingBack:
             fill_some(left, self.other(), columns, results, status)
 
 
-Further = Callable[[Array, Sequence[Array], int], Sequence[Array]]
-"""From fixed inputs and columns of a program, at a number of points, to the columns that it takes after these."""
-
-
-def nothing_further(_fixed: Array, _columns: Sequence[Array], _count: int) -> Sequence[Array]:
-    """Give no further columns."""
-    return ()
-
-
 class Identical:
     """A key of caches that equals another only if both hold the very same object: neither has to be gone through."""
 
@@ -149,7 +140,6 @@ class ProgramFill:
         program: the program.
         closed: whether the program computes joint coordinates itself, in closed form. Otherwise they are found slab by
             slab and are further columns, unless the family places the joints.
-        further: gives the columns after those, as coordinates of states of rest.
     """
 
     machine: Machine
@@ -157,17 +147,15 @@ class ProgramFill:
     fixed: Array
     program: Runnable
     closed: bool
-    further: Further = nothing_further
 
     @property
     def alone(self) -> bool:
         """Whether the program needs no columns beside the parameters that vary."""
-        return self.further is nothing_further and (self.closed or self.machine.family.chains is None)
+        return self.closed or self.machine.family.chains is None
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
         given = program_columns(self.machine, self.form, columns, len(status), self.closed)
-        given = [*given, *self.further(self.fixed, given, len(status))]
         self.program.run(self.fixed, given, results, status)
 
 
@@ -185,18 +173,12 @@ def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str
     return FallingBack(inside, lambda: program_fill(machine, varying, quantities, closed=False))
 
 
-def program_fill(
-    machine: Machine,
-    varying: Sequence[str],
-    quantities: Sequence[str],
-    closed: bool,
-    further: Further = nothing_further,
-) -> ProgramFill:
+def program_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool) -> ProgramFill:
     """Return the fill of quantities by a single program, see `ProgramFill`.
 
     Args:
         machine, varying, quantities: as for `slab_fill`.
-        closed, further: see `ProgramFill`.
+        closed: see `ProgramFill`.
     """
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
@@ -205,7 +187,7 @@ def program_fill(
     if plan is not None:
         arguments = (*arguments, 0, True, plan)
     program = program_of(Recipe(objectives_of, Specimen(machine), form, arguments))
-    return ProgramFill(machine, form, fixed, program, closed, further)
+    return ProgramFill(machine, form, fixed, program, closed)
 
 
 def program_columns(

@@ -1,7 +1,7 @@
-"""Loaded states of slabs of points: Newton's steps as a program that is repeated, then one for the quantities.
+"""Loaded states of slabs of points: a program for the first steps, then one for a step and the quantities, repeated.
 
-No formula lives here. The coordinates of the states are columns of both programs. Points at which this does not end
-surely in a stable state of rest, and machines whose equations cannot be reduced, are left to the solver for any
+No formula lives here. The coordinates of the states are columns of the second program. Points at which this does not
+end surely in a stable state of rest, and machines whose equations cannot be reduced, are left to the solver for any
 machine.
 """
 
@@ -14,14 +14,14 @@ from threading import Lock
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, form_of, plan_for, step_of
+from kinetostat.engine.form import Form, Specimen, form_of, objectives_of, plan_for, step_of
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
     FallingBack,
     Fill,
     Recipe,
     closes_inside,
-    nothing_further,
+    program_columns,
     program_fill,
     program_of,
 )
@@ -42,9 +42,12 @@ from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
 
 MOST_NEWTON_STEPS = 8
-"""Of Newton's method after the first two; each point takes as many as it needs, whatever its neighbours need."""
+"""Of Newton's method after the first ones; each point takes as many as it needs, whatever its neighbours need."""
 ONE_STEP_AWAY = 1e-7
 """Size of a step, rad or in units of the machine's length, after which another one is exact to round-off."""
+LAST_STEP = 1e-12
+"""Size of a step, in the same units, by which what resists at its two ends does not differ: the stiffness of slender
+machines changes by a thousand times as much."""
 
 
 class Way(Enum):
@@ -71,6 +74,9 @@ class Way(Enum):
 
 NATIVE_FROM = 200
 """Points from which machine code pays, which is compiled once for a form of machines and then kept on disk."""
+NATIVE_FROM_WITH_LEGS = 3000
+"""The same at rest where legs close loops: programs of some ten thousand operations take seconds, the solver for any
+machine some thousandths of a second for each point."""
 COLUMNS_TO = 10_000
 """Points up to which columns do for the vibrations of a platform alone: they take as long as compiling."""
 
@@ -89,9 +95,11 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
-    if count < NATIVE_FROM or not _over_scalars(machine, tuple(paths), quantities):
-        return Way.ANY_MACHINE if loaded else Way.MODES
-    return Way.NATIVE
+    native = count >= NATIVE_FROM and over_scalars(machine, tuple(paths), quantities)
+    if native and count < NATIVE_FROM_WITH_LEGS and rest_numbers(machine, quantities):
+        machine_cut = _cut(machine, tuple(paths))
+        native = machine_cut is not None and not machine_cut.legs
+    return Way.NATIVE if native else Way.ANY_MACHINE if loaded else Way.MODES
 
 
 def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
@@ -122,16 +130,13 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
         return partial(_fill_of_cables, machine, tuple(quantities))
     plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
-    if plain or not _over_scalars(machine, tuple(paths), quantities):
+    if plain or not over_scalars(machine, tuple(paths), quantities):
         return solved
     closed = closes_inside(machine)
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
-    further = (
-        StatePrograms(machine, form_of(machine, paths)[0], closed, native=True).rest_coordinates
-        if cut
-        else nothing_further
+    directly: Fill = (
+        RestFill(machine, paths, quantities, closed) if cut else program_fill(machine, paths, quantities, closed)
     )
-    directly = program_fill(machine, paths, quantities, closed, further)
     every = FallingBack(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
@@ -199,6 +204,53 @@ def _response_with_states(
     return response
 
 
+POINTS_TOGETHER = 2048
+"""Points whose coordinates at rest, up to some hundred of each, stay in the second cache level between two steps."""
+
+
+class RestFill:
+    """The fill of quantities at rest by two programs: first steps, and a step with the quantities where it begins."""
+
+    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool) -> None:
+        """Trace both; arguments as for `program_fill`, of a machine whose loops can be cut."""
+        self._machine, self._closed, self._count = machine, closed, len(quantities)
+        self._form, self._fixed = form_of(machine, paths)
+        kind, objectives = Specimen(machine), tuple(((name, 1.0),) for name in quantities)
+        self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
+        plan = plan_for(machine, quantities)
+        self._step = program_of(
+            Recipe(objectives_of, kind, self._form, (objectives, None, closed, 0, True, plan, True))
+        )
+
+    def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Evaluate a slab, see `Fill`."""
+        given = program_columns(self._machine, self._form, columns, len(status), self._closed)
+        most = min(len(status), POINTS_TOGETHER)
+        memory = [np.empty((self._step.rows, most)) for _ in range(2)]
+        for start in range(0, len(status), POINTS_TOGETHER):
+            part = slice(start, start + POINTS_TOGETHER)
+            self._fill([column[part] for column in given], results[:, part], status[part], memory)
+
+    def _fill(self, given: list[Array], results: Array, status: Codes, memory: Sequence[Array]) -> None:
+        """Evaluate some points, with memory for what two steps give."""
+        before, after = memory
+        rows, states = np.arange(len(status)), before[self._count :, : len(status)]
+        self._first.run(self._fixed, given, states, np.empty_like(status))
+        for _ in range(MOST_NEWTON_STEPS):
+            stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
+            self._step.run(self._fixed, [*given, *states[:-1]], stepped, codes)
+            results[:, rows], status[rows] = stepped[: self._count], codes
+            moving = stepped[-1] > LAST_STEP**2
+            if not moving.any():
+                break
+            if moving.all():
+                states = stepped[self._count :]
+            else:
+                rows, given = rows[moving], [part[moving] for part in given]
+                states = np.compress(moving, stepped[self._count :], axis=1)
+            before, after = after, before
+
+
 class StatePrograms:
     """Programs that find states of rest of machines of one kind and form."""
 
@@ -251,14 +303,16 @@ _cut = lru_cache(PROGRAMS_KEPT)(cut_machine)
 _reducible = lru_cache(PROGRAMS_KEPT)(reducible)
 
 
-def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
-    """Whether programs can compute all that these quantities need."""
+def over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
+    """Whether programs can compute all that these quantities need, wherever parameters at these leaf paths are."""
     wanted, needed = [QUANTITIES[name] for name in quantities], rest_numbers(machine, quantities)
     if any(quantity.cut or quantity.cables for quantity in wanted):
         return False
     machine_cut = _cut(machine, paths) if needed else None
     at_rest = not needed or machine_cut is not None
-    if machine_cut is not None and "frequency" in needed:
+    if machine_cut is not None and machine_cut.legs:
+        at_rest = "factor" not in needed and ("frequency" not in needed or platform_alone(machine, paths))
+    elif machine_cut is not None and "frequency" in needed:
         at_rest = not leaves_plane(machine, machine_cut)
     rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
     return at_rest and rings

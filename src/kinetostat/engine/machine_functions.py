@@ -23,6 +23,7 @@ from kinetostat.engine.form import (
     step_of,
 )
 from kinetostat.engine.kernel import closes_inside
+from kinetostat.engine.loaded import over_scalars
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.frozen import dataclass
@@ -141,13 +142,14 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     wanted = [choice(name, [q for q, row in QUANTITIES.items() if not row.cut], "--outputs") for name in outputs]
     paths = tuple(dict.fromkeys([*pose, *chosen]))
     acting = any(value or path in paths for path, value in known.items() if LOADS.intersection(path.split(".")))
-    cut = cut_machine(machine, paths) is not None
-    rests = acting and cut
-    needing = [name for name in wanted if not (rests if QUANTITIES[name].loaded else cut or not QUANTITIES[name].modal)]
+    rests = acting and cut_machine(machine, paths) is not None
+    needing = [
+        name for name in wanted if not (over_scalars(machine, paths, [name]) and (rests or not QUANTITIES[name].loaded))
+    ]
     if needing:
         raise InputError(
-            f"{needing[0]} has no program for {machine.name}: nothing loads it, or legs that are no rods close its "
-            "loops; leave it out of --outputs, or give the machine a load."
+            f"{needing[0]} has no program for {machine.name}: nothing loads it, or it is a load factor or a frequency "
+            "of a machine with legs that are no rods; leave it out of --outputs, or give the machine a load."
         )
     if machine.loaded and not rests:  # what no program brings to rest is the free machine in all of them
         machine = replace(machine, loaded=False)

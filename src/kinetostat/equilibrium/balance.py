@@ -19,7 +19,7 @@ from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import largest, with_rows
 from kinetostat.numerics.motions import (
     Motions,
-    brackets,
+    brackets_by,
     cross,
     exponential,
     logarithm,
@@ -108,6 +108,7 @@ def leg_terms(
     amounts: Array,
     gravity: Array,
     placed: PlacedChain | None = None,
+    symmetric: bool = False,
 ) -> LegTerms:
     """Evaluate a leg.
 
@@ -118,13 +119,23 @@ def leg_terms(
         amounts: the amounts that are given: of all actuators of the machine, then of its links that grow [n x amounts].
         gravity: [n x 3].
         placed: where its parts are, if that is known.
+        symmetric: whether `geometric` and `by_given` shall be those of the symmetric part alone.
     """
     placed = placed or leg.chain.place(coordinates, amounts)
     screws = placed.screws
-    weight, change = _weight(leg, placed.before, screws, gravity)
-    # A screw changes with the motions before it, so that the work of the wrench on it does.
-    changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
-    change = change - np.tril(changing, -1)
+    weight, pulling = _weight(leg, placed.before, screws, gravity)
+    # A screw changes with the motions before it, so that the work of the wrench and of the weight on it does.
+    turning = brackets_by(wrench, screws)
+    if symmetric:
+        turning = 0.5 * turning
+        turning[..., :3] += pulling
+        change = -np.einsum("njc,nkc->nkj", screws, turning)
+        change = np.tril(change, -1) + np.swapaxes(np.tril(change, -1), 1, 2)
+        change -= np.einsum("nkc,nkc->nk", screws[..., :3], pulling)[:, :, None] * np.eye(screws.shape[1])
+    else:
+        weighing = np.tril(np.einsum("njc,nkc->nkj", screws[..., :3], pulling))
+        change = -weighing - np.swapaxes(np.tril(weighing, -1), 1, 2)
+        change -= np.tril(np.einsum("njc,nkc->nkj", screws, turning), -1)
     follows, drives = leg.chain.follows, leg.chain.follows_given(amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     stiffness = leg.stiffness
@@ -146,20 +157,21 @@ def leg_terms(
 
 
 def _weight(leg: ElasticLeg, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
-    """Gradient of the potential of a leg's weight by its motions [n x motions], and the gradient's rates."""
+    """Gradient of the potential of a leg's weight by its motions [n x motions], and how it changes.
+
+    The gradient of motion k falls by the product of what is given for it [n x motions x 3] and the turn of a motion j
+    that is nearer to the base, and as much that of j by k.
+    """
     count, motions = screws.shape[:2]
     kind = np.result_type(screws, gravity, leg.masses.mass)
-    gradient, rates = np.zeros((count, motions), dtype=kind), np.zeros((count, motions, motions), dtype=kind)
+    first, mass = np.zeros((count, motions, 3), dtype=kind), np.zeros((count, motions, 1), dtype=kind)
     for i, carried in enumerate(leg.masses.carried):
-        force = gravity * leg.masses.mass[:, i, None]
-        at = placed[carried].point(leg.masses.point[:, i])
-        moving = cross(screws[:, :carried, :3], at[:, None]) + screws[:, :carried, 3:]
-        gradient[:, :carried] -= np.einsum("nc,nfc->nf", force, moving)
-        # Of two motions, the one nearer to the base turns the path on which the other one moves the mass.
-        turned = cross(screws[:, :carried, None, :3], moving[:, None])
-        both = np.triu(np.einsum("nc,njkc->njk", force, turned))
-        rates[:, :carried, :carried] -= both + np.swapaxes(np.triu(both, 1), 1, 2)
-    return gradient, rates
+        moment = placed[carried].point(leg.masses.point[:, i]) * leg.masses.mass[:, i, None]
+        first[:, :carried] += moment[:, None]
+        mass[:, :carried] += leg.masses.mass[:, i, None, None]
+    moving = cross(screws[..., :3], first) + mass * screws[..., 3:]
+    # Of two motions, the one nearer to the base turns the path on which the other one moves the masses.
+    return -np.einsum("nc,nfc->nf", gravity, moving), cross(moving, gravity[:, None])
 
 
 def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array]:

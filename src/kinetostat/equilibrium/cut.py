@@ -1,7 +1,8 @@
-"""Machines whose loops are cut at rods: a leg that only carries a force between two joints is a spring between points.
+"""Machines whose loops are cut: at rods, each a spring between two points, or where legs meet the platform.
 
-What remains is one chain that carries the platform: the leg that is not a rod, or six free motions. Its coordinates are
-all the unknowns of `reduced`. Machines with several legs that are not rods cannot be cut.
+A leg that only carries a force between two joints is such a rod. If at most one leg is none, its coordinates, or six
+free motions of the platform, are all the unknowns of `reduced`. If there are more, the platform moves freely, and these
+legs have coordinates and wrenches of their own, with which `legwise` closes them again.
 
 Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
@@ -54,24 +55,27 @@ class ElasticRod:
 
 @dataclass(frozen=True)
 class Cut:
-    """A mechanism whose loops are cut at rods.
+    """A mechanism whose loops are cut.
 
     Attributes:
         mechanism: the mechanism with the masses of rods on its platform.
         carrier: the chain that carries the platform.
         rods: the rods that hold it.
+        legs: the legs that hold it and are no rods; none if the only one is the carrier.
     """
 
     mechanism: Mechanism
     carrier: ElasticLeg
     rods: tuple[ElasticRod, ...]
+    legs: tuple[ElasticLeg, ...] = ()
 
 
 def cut(mechanism: Mechanism) -> Cut | None:
-    """Cut the loops of a mechanism; None if legs that are no rods close some, or its form does not allow it."""
+    """Cut the loops of a mechanism; None if its form does not allow it."""
     chains = [leg for leg in mechanism.legs if leg.rod is None]
-    carrier = chains[0] if chains else _free_motions(mechanism)
-    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any() or any(leg.hinged.any() for leg in mechanism.legs):
+    legs = chains if len(chains) > 1 else []
+    carrier = chains[0] if len(chains) == 1 else _free_motions(mechanism)
+    if any(leg.sign.any() or leg.idle.any() for leg in chains) or any(leg.hinged.any() for leg in mechanism.legs):
         return None
     rods, masses = [], [mechanism.platform]
     for leg in mechanism.legs:
@@ -98,7 +102,19 @@ def cut(mechanism: Mechanism) -> Cut | None:
             driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
             sign = signs[0] if signs else 0.0
             rods.append(ElasticRod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
-    return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods))
+    wrenches = len(rods) + sum(mechanism.ways.shape[1] - leg.springs.count(None) for leg in legs)
+    if legs and (
+        any(rod.sign for rod in rods)
+        or wrenches < mechanism.ways.shape[1]
+        or any(_is_loose(leg, mechanism) for leg in legs)
+    ):
+        return None
+    return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods), tuple(legs))
+
+
+def _is_loose(leg: ElasticLeg, mechanism: Mechanism) -> bool:
+    """Whether the passive motions of a leg are more than those of the platform, which then does not tell them all."""
+    return leg.springs.count(None) > mechanism.ways.shape[1]
 
 
 def _free_motions(mechanism: Mechanism) -> ElasticLeg:
@@ -127,7 +143,10 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
         return None
     state = state_of(machine)
     with np.errstate(all="ignore"):
-        machine_cut = cut(mechanism_of(machine, state.configuration, state.joints))
+        mechanism, form = (mechanism_of(machine, state.configuration, state.joints, count) for count in (1, None))
+        if any((a.rod is None) != (b.rod is None) for a, b in zip(mechanism.legs, form.legs, strict=True)):
+            return None  # by its form a leg is a rod, which its numbers do not let it be
+        machine_cut = cut(mechanism)
     # Legs of a file are rods by their numbers, which must then stay as they are.
     if any(not leg.lines for leg in state.configuration.legs) and any(
         PLACES.intersection(p.split(".")) for p in varying
@@ -136,5 +155,7 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
-    known = all(driven[n] in carrier.springs for n in carrier.chain.given if 0 <= n < len(driven))
+    known = bool(machine_cut.legs) or all(
+        driven[n] in carrier.springs for n in carrier.chain.given if 0 <= n < len(driven)
+    )
     return machine_cut if known else None  # no coordinate says what a rigid actuator carries

@@ -1,26 +1,28 @@
-"""Equilibrium in the coordinates of one leg, over scalars: what machine code does for many poses, and derivatives.
+"""Equilibrium of machines whose loops are cut, over scalars: what machine code does for many poses, and derivatives.
 
-Loops are cut at the rods (`cut`), so that the coordinates of one chain are all the unknowns. Machines that cannot be
-cut, and what is chosen by inequalities, are left to `solving`; so are poses at which these steps do not end at rest.
+Where loops are cut at rods alone (`cut`), the coordinates of one chain are all the unknowns; the steps of other legs
+are those of `legwise`. Machines that cannot be cut, and what is chosen by inequalities, are left to `solving`; so are
+poses at which these steps do not end at rest.
 
 Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, where
-from kinetostat.algebra.solve import Eliminated, Row, elimination
-from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.solve import Eliminated, Row, definite, elimination
+from kinetostat.algebra.symmetric import greatest_eigenvalue
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
-from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
+from kinetostat.equilibrium.cut import Cut, cut
+from kinetostat.equilibrium.legwise import LegwiseTangent
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits
+from kinetostat.equilibrium.pulls import RodPull, loads_of_rods, pull_of, sum_of_dyads, wrench_of_rods
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.equilibrium.state import HELD_BY_LOADS
 from kinetostat.frozen import dataclass
@@ -30,92 +32,12 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import Motions, cross, of_scalars, skew_of
-from kinetostat.tolerances import AT_REST, UNRESISTED
+from kinetostat.tolerances import AT_REST, UNRESISTED, ZERO_PIVOT
 
 LARGEST_TURN = 0.2
 """Sine of the turn of the platform up to which the series of the arc sine keeps all digits."""
 ARC_SINE = (1.0, 1 / 6, 3 / 40, 15 / 336, 105 / 3456, 945 / 42240, 10395 / 599040, 135135 / 9676800)
 """Coefficients of asin(s) / s in powers of s²."""
-SURE_PIVOT = 1e-9
-"""Share of a diagonal entry below which its pivot says too little about stability."""
-
-
-@dataclass(frozen=True)
-class _Pull:
-    """Pull of a rod from a point b of the base to a point a of the platform.
-
-    Attributes:
-        near, at: b and a.
-        moment: a x b.
-        length: length of the rod.
-        tension: the tension with which it pulls.
-        density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
-        stretching, elastic: k - c and k over the square of its length, with its stiffness k.
-        slack: 1 where it carries nothing, else 0.
-    """
-
-    near: Vector
-    at: Vector
-    moment: Vector
-    length: Scalar
-    tension: Scalar
-    density: Scalar
-    stretching: Scalar
-    elastic: Scalar
-    slack: Scalar
-
-    @property
-    def line(self) -> tuple[Scalar, ...]:
-        """The gradient of half the square of its length by a twist of the platform."""
-        return (*(-self.moment).components(), *(self.at - self.near).components())
-
-
-def _pull(rod: ElasticRod, platform: Motions | None) -> _Pull:
-    """A rod at a place of the platform, or in the free state."""
-    near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
-    at = far if platform is None else Vector(*platform.point(rod.far)[0])
-    span, rest = at - near, far - near
-    square, longer = span.dot(span), 0.0
-    length = sqrt(square)
-    if platform is not None:  # the difference of both lengths, without the round-off of their size
-        longer = (at - far).dot(span + rest) * (1.0 / (length + rest.norm()))
-    stiffness = 1.0 / rod.softness
-    tension, slack = (longer + rod.given) * stiffness, 0.0
-    if rod.sign:
-        carries = rod.sign * tension >= 0.0
-        tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
-    density, shrink = tension * (1.0 / length), 1.0 / square
-    stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
-    return _Pull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
-
-
-def _wrench_of_rods(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
-    """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6]."""
-    pulled = [pull.at * pull.density for pull in pulls]
-    ends = _sum(pulled)
-    starts = _sum([pull.near * pull.density for pull in pulls])
-    turned = [
-        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(pulled, pulls, strict=True)]) for j in "xyz"]
-        for i in "xyz"
-    ]
-    moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
-    trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
-    fall = _sum_of_dyads(pulls, [pull.stretching for pull in pulls])[None]
-    for i in range(3):
-        for j in range(3):
-            fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
-        fall[0, 3 + i, 3 + i] = fall[0, 3 + i, 3 + i] + density
-    fall[:, :3, 3:] = fall[:, :3, 3:] + skew_of(of_scalars(starts.components()))
-    fall[:, 3:, :3] = fall[:, 3:, :3] - skew_of(of_scalars(ends.components()))
-    return of_scalars([*moment, *(starts - ends).components()]), fall
-
-
-def _sum(vectors: Sequence[Vector]) -> Vector:
-    return (
-        Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))
-        if vectors
-        else ZERO
-    )
 
 
 @dataclass(frozen=True)
@@ -132,7 +54,7 @@ class Place:
     """
 
     platform: Motions
-    pulls: tuple[_Pull, ...]
+    pulls: tuple[RodPull, ...]
     terms: LegTerms
     rates: Array
     elastic: Array
@@ -148,23 +70,15 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     platform = placed.end
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
-    pulls = [_pull(rod, None if free else platform) for rod in machine.rods]
-    (load, change), (hold, fall) = platform_load(mechanism, platform), _wrench_of_rods(pulls)
+    pulls = [pull_of(rod, None if free else platform) for rod in machine.rods]
+    hold, fall = wrench_of_rods(pulls, [pull.stretching for pull in pulls])
+    load, change = platform_load(mechanism, platform)
     terms = leg_terms(carrier, moved, load + hold, amounts, mechanism.gravity, placed)
     twists = terms.rates[0]
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
-    elastic = springs + twists.T @ _sum_of_dyads(pulls, [pull.elastic for pull in pulls]) @ twists
+    elastic = springs + twists.T @ sum_of_dyads(pulls, [pull.elastic for pull in pulls]) @ twists
     return Place(platform, tuple(pulls), terms, rates, elastic, total([pull.slack for pull in pulls]))
-
-
-def _sum_of_dyads(pulls: Sequence[_Pull], weights: Row) -> Array:
-    """The weighted sum of the dyads of all lines [6 x 6]."""
-    result = np.zeros((6, 6), dtype=object)
-    for i, j in POSITIONS:
-        pairs = zip(pulls, weights, strict=True)
-        result[i, j] = result[j, i] = total([pull.line[i] * pull.line[j] * weight for pull, weight in pairs])
-    return result
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":
@@ -177,7 +91,7 @@ def reduced_machine(machine: Machine, response: Response, joints: Joints | None)
     """
     machine_cut = cut(mechanism_of(machine, response.configuration, joints, None))
     if machine_cut is None:
-        raise ValueError("loops that rods do not cut have no equations over scalars")
+        raise ValueError("loops that cannot be cut have no equations over scalars")
     return Reduced(machine, machine_cut, machine.family.components)
 
 
@@ -197,19 +111,27 @@ class Reduced:
 
     @property
     def size(self) -> int:
-        """Number of coordinates."""
-        return self.cut.carrier.size
+        """Number of coordinates; those of legs that close loops are followed by the wrenches that act on these."""
+        ways = self.cut.mechanism.ways.shape[1]
+        return self.cut.carrier.size + sum(leg.size + ways for leg in self.cut.legs)
 
-    def start(self) -> Row:
-        """The coordinates after the first step, which linear equations give; NaN where it is too long."""
-        return self.step([0.0] * self.size)[0]
+    def start(self) -> tuple[Row, Scalar]:
+        """The coordinates after the first steps from the free state, and the square of the last one's size, as `step`.
+
+        The first one is linear and takes few operations; where loops are cut at rods, so does another one.
+        """
+        first = self.step([0.0] * self.size)
+        return first if self.cut.legs else self.step(first[0])
 
     def step(self, coordinates: Row) -> tuple[Row, Scalar]:
         """The coordinates after a step of Newton's method, and the square of its size; NaN where it is too long."""
-        step = Tangent(self.cut, place_of(self.cut, coordinates)).step
-        square = _square(step)
-        near = square < LONGEST_STEP**2
-        return [where(near, a + b, math.nan) for a, b in zip(coordinates, step, strict=True)], square
+        return _after(coordinates, self.tangent(coordinates))
+
+    def tangent(self, coordinates: Row) -> "Tangent | LegwiseTangent":
+        """The machine's resistance at some coordinates."""
+        if self.cut.legs:
+            return LegwiseTangent(self.cut, coordinates)
+        return Tangent(self.cut, place_of(self.cut, coordinates))
 
     def numbers(self, coordinates: Row, wanted: Collection[str], response: Response) -> tuple[dict[str, Any], Scalar]:
         """The numbers of the loaded state, see `numbers.loaded_numbers`.
@@ -220,25 +142,29 @@ class Reduced:
             response: the response of the pose without loads.
 
         Returns:
-            The numbers by name, and the status of the pose: NOT_CONVERGED where this is not surely a stable state of
-            rest.
+            The numbers by name, with the coordinates after this step and the square of its size as "after"; and the
+            status of the pose: NOT_CONVERGED where this is not surely a stable state of rest.
         """
-        tangent, mechanism = Tangent(self.cut, place_of(self.cut, coordinates)), self.cut.mechanism
-        displacement, good = tangent.displacement()
-        good = (_square(tangent.step) < AT_REST**2) & tangent.stable & good
+        tangent, mechanism = self.tangent(coordinates), self.cut.mechanism
+        displacement, good = _displacement(tangent.platform, tangent.twist)
+        after, square = _after(coordinates, tangent)
+        good = (square < AT_REST**2) & tangent.stable & good
         compliance, units = tangent.compliance(), mechanism.compliance_units[0]
         result: dict[str, Any] = {
-            "slack": tangent.place.slack,
+            "slack": tangent.slack,
+            "after": [*after, square],
             "displacement": [a * b for a, b in zip(displacement, mechanism.twist_units[0], strict=True)],
             "compliance": [compliance[i][i] * units[i, i] for i in range(6)],
         }
         if "stiffness" in wanted:
             parts = [part for part in self.components if not is_zero(compliance[part][part])]
-            stiffness, sure = _inverse_diagonal([[compliance[i][j] for j in parts] for i in parts], self.size)
+            moving = [[compliance[i][j] for j in parts] for i in parts]
+            by_form = isinstance(tangent, Tangent)
+            stiffness, sure = (_inverse_diagonal if by_form else _free_inverse_diagonal)(moving, tangent.rank)
             by_part = dict.fromkeys(self.components, math.inf)
             by_part |= {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
             result["stiffness"], good = [by_part.get(part, math.nan) for part in range(6)], good & sure
-        if "factor" in wanted:
+        if "factor" in wanted and isinstance(tangent, Tangent):
             result["factor"], sure = tangent.factor()
             good = good & sure
         at_rest: Scalar = int(Status.OK)
@@ -254,8 +180,11 @@ class Reduced:
         return result, code
 
 
-def _square(step: Row) -> Scalar:
-    return total([part * part for part in step])
+def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, Scalar]:
+    """The coordinates after Newton's step, and the square of its size; NaN where it is too long."""
+    square = total([part * part for part in tangent.motion])
+    near = square < LONGEST_STEP**2
+    return [where(near, a + b, math.nan) for a, b in zip(coordinates, tangent.step, strict=True)], square
 
 
 class Tangent:
@@ -266,36 +195,26 @@ class Tangent:
         self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
         self._factors = elimination(place.rates.tolist(), self._symmetric)
         self.step: Row = self._factors.solve((-place.terms.left[0]).tolist())
+        self.motion, self.rank, self.platform, self.slack = self.step, len(self.step), place.platform, place.slack
+
+    @property
+    def twist(self) -> Row:
+        """The step of the platform, at the origin."""
+        return np.einsum("nck,nk->nc", self.place.terms.rates, of_scalars(self.step))[0].tolist()
 
     @property
     def stable(self) -> Scalar:
         """Whether the tangent stiffness is positive definite by a margin."""
         if self._symmetric:
-            return definite(self._factors, self.place.rates)
-        rows = 0.5 * (self.place.rates + self.place.rates.T)
-        return definite(elimination(rows.tolist()), rows)
-
-    def displacement(self) -> tuple[Row, Scalar]:
-        """Rotation vector and displacement of the tool point after the step, and whether the turn is small enough."""
-        step = of_scalars(self.step)
-        moved = np.einsum("nck,nk->nc", self.place.terms.rates, step)[0]
-        rotation, shift = self.place.platform.rotation[0], self.place.platform.translation[0]
-        sines = [0.5 * (rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))]
-        square, ratio = total([s * s for s in sines]), 0.0
-        for coefficient in reversed(ARC_SINE):
-            ratio = ratio * square + coefficient
-        turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
-        return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
+            return definite(self._factors, self.place.rates.tolist())
+        rows = (0.5 * (self.place.rates + self.place.rates.T)).tolist()
+        return definite(elimination(rows), rows)
 
     def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
         """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""
         mechanism, carrier, terms = self.mechanism, self.carrier, self.place.terms
-        twist, force = (terms.rates[0] @ of_scalars(self.step)[0]).tolist(), mechanism.force[0]
-        loads = []
-        for rod, pull in zip(self.rods, self.place.pulls, strict=True):
-            along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
-            stretched = pull.tension + pull.elastic * pull.length * along
-            loads += [(spring, stretched * force) for spring in rod.driven]
+        force = mechanism.force[0]
+        loads = loads_of_rods(self.rods, self.place.pulls, self.twist, force)
         for number, spring in enumerate(carrier.springs):
             if spring is not None and spring.actuated:
                 load = terms.loads[0, number] + terms.carrying[0, number] * self.step[number]
@@ -322,7 +241,18 @@ class Tangent:
         half = elimination((0.5 * (elastic + elastic.T)).tolist())
         greatest = greatest_eigenvalue(relative(half, elastic - 0.5 * (rates + rates.T)))
         grows = greatest > UNRESISTED
-        return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
+        return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic.tolist())
+
+
+def _displacement(platform: Motions, twist: Row) -> tuple[Row, Scalar]:
+    """Rotation vector and displacement of the tool point after a step, and whether the turn is small enough."""
+    moved, rotation, shift = of_scalars(twist)[0], platform.rotation[0], platform.translation[0]
+    sines = [0.5 * (rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))]
+    square, ratio = total([s * s for s in sines]), 0.0
+    for coefficient in reversed(ARC_SINE):
+        ratio = ratio * square + coefficient
+    turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
+    return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
 
 
 def _without_round_off(compliance: Scalar) -> Scalar:
@@ -338,14 +268,6 @@ def relative(factors: Eliminated, matrix: Array) -> list[Row]:
     return [[roots[i] * twice[i][j] * roots[j] for j in size] for i in size]
 
 
-def definite(factors: Eliminated, rows: Array) -> Scalar:
-    """Whether a symmetric matrix is surely positive definite, by the pivots of its elimination."""
-    good: Scalar = True
-    for k, pivot in enumerate(factors.pivots):
-        good = good & (pivot > SURE_PIVOT * abs(rows[k, k]))
-    return good
-
-
 def _inverse_diagonal(rows: list[Row], rank: int) -> tuple[Row, Scalar]:
     """The diagonal of the inverse of a symmetric matrix, infinite if its rank is less, and whether it is sure."""
     if rank < len(rows):
@@ -354,4 +276,20 @@ def _inverse_diagonal(rows: list[Row], rank: int) -> tuple[Row, Scalar]:
     units = np.eye(len(rows)).tolist()
     solved = [factors.forward(unit) for unit in units]
     diagonal = [total([a * a * b for a, b in zip(row, factors.shrink, strict=True)]) for row in solved]
-    return diagonal, definite(factors, np.array(rows, dtype=object))
+    return diagonal, definite(factors, rows)
+
+
+def _free_inverse_diagonal(rows: list[Row], most: int) -> tuple[Row, Scalar]:
+    """The same where numbers, and not the form, say which components have no compliance: they are rigid.
+
+    Args:
+        rows: of the matrix.
+        most: its rank at most; all is rigid where more components than these move.
+    """
+    size = range(len(rows))
+    fixed = [rows[i][i] < ZERO_PIVOT for i in size]
+    moving: Scalar = total([where(part, 0.0, 1.0) for part in fixed])
+    rigid = [where(moving > most + 0.5, 1.0, where(part, 1.0, 0.0)) > 0.5 for part in fixed]
+    apart = [[where(rigid[i], float(i == j), where(rigid[j], float(i == j), rows[i][j])) for j in size] for i in size]
+    diagonal, sure = _inverse_diagonal(apart, len(rows))
+    return [where(part, math.inf, k) for part, k in zip(rigid, diagonal, strict=True)], sure

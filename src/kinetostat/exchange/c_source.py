@@ -35,12 +35,14 @@ from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.formats import ascii_line
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
@@ -55,6 +57,9 @@ PLACE = 12
 """Numbers that place the tool: T and the columns of Q."""
 STEPS_OF_COMMAND = 30
 """Poses that are tried until the loaded tool is where it should be."""
+NEARLY_COMMANDED, ASIDE = 1e-6, 1e-4
+"""Correction, rad or in units of the machine's length, below which the rates of the loaded tool are computed if it only
+comes near its pose, and the displacement of the coordinates whose differences they are."""
 AGREED = 1e-10
 """Share of the largest number of its kind by which C and Python may differ in the test."""
 
@@ -206,6 +211,7 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     if functions.rests:
         numbers |= {"STATES": functions.states, "STEPS_AT_REST": MOST_NEWTON_STEPS, "ONE_STEP_AWAY": ONE_STEP_AWAY}
         numbers |= {"COMMANDED": COMMANDED, "STEPS_OF_COMMAND": STEPS_OF_COMMAND}
+        numbers |= {"NEARLY_COMMANDED": NEARLY_COMMANDED, "ASIDE": ASIDE}
     constants += [f"#define {name} {number!r}" for name, number in numbers.items()]
     words = {
         "note": note(functions, "Made by"),
@@ -224,7 +230,8 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     work["forward"] = STEPS_FORWARD * (work["actuator_slopes_at"] + trials * work["actuators_at"])
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
-        work["command"] = STEPS_OF_COMMAND * (work["rest"] + work["placement_at"])
+        poses = STEPS_OF_COMMAND + 2 * functions.coordinates
+        work["command"] = poses * (work["rest"] + 2 * work["placement_at"])
     given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.arguments)]
     driven = [f"[{k}]: {in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
@@ -266,7 +273,7 @@ def ascii_units(text: str) -> str:
 def _test(functions: MachineFunctions) -> str:
     """NAME_test.c: poses, and what Python computes there one by one, without the printed formulas."""
     columns = sample_points(functions)
-    count = len(next(iter(columns.values())))
+    count, scale = len(next(iter(columns.values()))), 1.0
     rows = np.array(list(columns.values())).T
     machines = [with_values(functions.machine, dict(zip(functions.inputs, row.tolist(), strict=True))) for row in rows]
     responses = [respond(machine) for machine in machines]
@@ -275,7 +282,9 @@ def _test(functions: MachineFunctions) -> str:
     blocks["COORDINATES"] = np.array([[a.coordinate for a in stand(machine)] for machine in machines], dtype=float)
     if functions.rests:
         blocks["DISPLACEMENT"] = quantities_at(functions, columns, DISPLACEMENTS)
-        blocks["COMMAND"] = _command_coordinates(functions, columns, count)
+        targets = _targets(functions, columns, count)
+        blocks["COMMAND"] = targets[0]
+        scale = max(1.0, targets[1] / AGREED)
     if functions.quantities:
         blocks["QUANTITIES"] = quantities_at(functions, columns, functions.quantities)
         points = PointTable(columns)
@@ -286,17 +295,27 @@ def _test(functions: MachineFunctions) -> str:
         "note": note(functions, "Test of the functions, made by"),
         "arrays": "\n".join(arrays),
         "agreed": AGREED,
+        "command_scale": scale,
         "rows": count,
     }
     return filled_template(functions, "test.c", words)
 
 
-def _command_coordinates(functions: MachineFunctions, columns: dict[str, Array], count: int) -> Array:
-    """Coordinates of the actuators of the loaded machine [n x actuators]; NaN where it comes to no rest."""
+def _targets(functions: MachineFunctions, columns: dict[str, Array], count: int) -> tuple[Array, float]:
+    """Coordinates of the actuators of the loaded machine [n x actuators], and by how much commands may differ.
+
+    NaN where it comes to no rest. The stiffness of a parallelogram depends on the pose, which C takes where the loaded
+    machine is commanded to, and Python where it shall be: they differ by the square of the correction.
+    """
     try:
-        return actuator_targets(functions.machine, columns, count).coordinates
+        targets = actuator_targets(functions.machine, columns, count)
     except InputError:
-        return np.full((count, len(functions.actuators)), np.nan)
+        return np.full((count, len(functions.actuators)), np.nan), 0.0
+    chains = [leg.chain for leg in state_of(functions.machine).configuration.legs]
+    if not any(isinstance(element, Parallelogram) for chain in chains for element in chain):
+        return targets.coordinates, 0.0
+    units = [functions.length if actuator.unit == "m" else 1.0 for actuator in functions.actuators]
+    return targets.coordinates, float(np.nanmax((targets.corrections / units) ** 2, initial=0.0))
 
 
 def _array(name: str, rows: Array) -> str:

@@ -129,9 +129,11 @@ class Beam:
             *_springs(
                 self.name,
                 [(what, Joint(axis, middle)) for what, axis in turning],
-                [k * shrink for k in (rigidity.torsion, rigidity.bending_y, rigidity.bending_z)],
+                [_times(k, shrink) for k in (rigidity.torsion, rigidity.bending_y, rigidity.bending_z)],
             ),
-            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [rigidity.axial * shrink, *shear]),
+            *_springs(
+                self.name, [(what, Joint(a)) for what, a in sliding_along], [_times(rigidity.axial, shrink), *shear]
+            ),
         )
 
     @property
@@ -164,6 +166,16 @@ def lumped_springs(name: str, start: Vector, end: Vector, up: Vector, rigidity: 
     ]
     bending = (rigidity.bending_y * (3.0 * shrink), rigidity.bending_z * (3.0 * shrink))
     return _springs(name, joints, (rigidity.torsion * shrink, *bending, rigidity.axial * shrink))
+
+
+def is_rigid(stiffness: Scalar) -> bool:
+    """Tell whether a stiffness or rigidity is rigid by form: the Python float infinity, not an array."""
+    return type(stiffness) is float and stiffness == RIGID
+
+
+def _times(stiffness: Scalar, factor: Scalar) -> Scalar:
+    """A stiffness times a positive factor; it stays rigid by form if it is."""
+    return stiffness if is_rigid(stiffness) else stiffness * factor
 
 
 def _springs(name: str, joints: Sequence[tuple[str, Joint]], stiffness: Sequence[Scalar]) -> tuple[Spring, ...]:
@@ -229,7 +241,7 @@ class Parallelogram:
         along, normal = self.along, self.normal
         arm = self.width * normal.cross(self.side).dot(along)
         joints = [("tension", Joint(along)), ("turning", Joint(normal, (self.near + self.far) * 0.5))]
-        return _springs(self.name, joints, (2.0 * self.bar, 0.5 * self.bar * (arm * arm)))
+        return _springs(self.name, joints, (2.0 * self.bar, _times(0.5 * self.bar, arm * arm)))
 
     @property
     def path(self) -> tuple[Vector, ...]:

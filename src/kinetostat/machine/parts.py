@@ -14,7 +14,7 @@ from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, Line, PartName, Spring, series
-from kinetostat.machine.link import Parallelogram, link_axes
+from kinetostat.machine.link import Parallelogram, is_rigid, link_axes
 from kinetostat.spec.fields import Quantity, table
 
 
@@ -25,11 +25,6 @@ class Translations:
     x: Annotated[float, Quantity("length", "x of the platform point P")]
     y: Annotated[float, Quantity("length", "y of the platform point P")]
     z: Annotated[float, Quantity("length", "z of the platform point P")]
-
-
-def is_rigid(stiffness: Scalar) -> bool:
-    """Tell whether a stiffness or rigidity is rigid by form: the Python float infinity, not an array."""
-    return type(stiffness) is float and stiffness == RIGID
 
 
 def if_elastic(*springs: Spring) -> tuple[Spring, ...]:

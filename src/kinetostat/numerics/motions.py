@@ -231,9 +231,11 @@ def skew_of(vectors: Array) -> Array:
     return result
 
 
-def brackets(twists: Array) -> Array:
-    """The change [n x m x m x 6] of each screw [n x m x 6], second index, by a unit motion along each, first index."""
-    first, second = twists[:, :, None], twists[:, None, :]
-    turning = cross(first[..., :3], second[..., :3])
-    moving = cross(first[..., :3], second[..., 3:]) + cross(first[..., 3:], second[..., :3])
-    return np.concatenate([turning, moving], axis=-1)
+def brackets_by(wrench: Array, twists: Array) -> Array:
+    """The covectors c_k [n x m x 6] with t . c_k = w . [t, t_k], by a wrench w [n x 6], for twists t_k [n x m x 6].
+
+    The bracket [t, t_k] is the change of the screw t_k by a unit motion along t.
+    """
+    moment, force = wrench[:, None, :3], wrench[:, None, 3:]
+    turning, moving = twists[..., :3], twists[..., 3:]
+    return np.concatenate([cross(turning, moment) + cross(moving, force), cross(turning, force)], axis=-1)

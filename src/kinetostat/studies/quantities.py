@@ -127,7 +127,8 @@ def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence
     if unknown:
         return unknown[0]
     loaded = [name for name in known if rest_numbers(machine, [name], limited=False)]
-    return loaded[0] if loaded and cut_machine(machine, varied) is None else None
+    machine_cut = cut_machine(machine, varied) if loaded else None
+    return None if machine_cut is not None and not machine_cut.legs else next(iter(loaded), None)
 
 
 def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> None:

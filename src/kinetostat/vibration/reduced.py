@@ -14,10 +14,11 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
-from kinetostat.algebra.solve import Row, elimination
+from kinetostat.algebra.solve import Row, elimination, semidefinite_root
 from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
+from kinetostat.equilibrium.legwise import LegwiseTangent
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
@@ -45,7 +46,7 @@ def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
         if platform_alone(state, varying):
             return True
         machine_cut = cut(state.free_equations.mechanism)
-        return machine_cut is not None and not leaves_plane(machine, machine_cut)
+        return machine_cut is not None and not machine_cut.legs and not leaves_plane(machine, machine_cut)
 
 
 def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
@@ -79,7 +80,7 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
     if legs_without_mass(machine, response.configuration):
         return lowest_frequencies(eigenvalues(platform_matrix(machine, response), sloped))
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
-    if machine_cut is None:
+    if machine_cut is None or machine_cut.legs:
         raise ValueError("loops that rods do not cut have no frequencies over scalars")
     return frequencies_at(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
 
@@ -111,7 +112,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
     inertia = _platform_inertia(machine, response)
     soft = [[response.compliance.entry(i, j) * units[i] * units[j] for j in parts] for i in parts]
     heavy = [[inertia[i][j] * (1.0 / (units[i] * units[j])) for j in parts] for i in parts]
-    factor = np.array(_root(soft), dtype=object)
+    factor = np.array(semidefinite_root(soft), dtype=object)
     return (factor.T @ np.array(heavy, dtype=object) @ factor).tolist()
 
 
@@ -136,31 +137,19 @@ def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
     return result
 
 
-def _root(rows: Sequence[Sequence[Scalar]]) -> list[Row]:
-    """The lower triangle G with G G^T = A of a matrix that may be semidefinite, by Cholesky's factorisation."""
-    size = range(len(rows))
-    left: list[Row] = [list(row) for row in rows]
-    result: list[Row] = [[0.0 for _ in size] for _ in size]
-    for k in size:
-        pivot = left[k][k]
-        good = pivot > UNRESISTED * abs(rows[k][k])
-        root = sqrt(where(good, pivot, 1.0))
-        result[k][k] = where(good, root, 0.0)
-        for i in range(k + 1, len(rows)):
-            result[i][k] = where(good, left[i][k] / root, 0.0)
-            for j in range(k + 1, i + 1):
-                left[i][j] = left[i][j] - result[i][k] * result[j][k]
-    return result
-
-
 def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list[Scalar]:
     """The lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
 
     Args:
-        machine: the machine with its loops cut.
+        machine: the machine with its loops cut; where legs close some, the platform alone is massive.
         coordinates: coordinates of its carrier at rest.
         sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
     """
+    if machine.legs:
+        tangent, mechanism = LegwiseTangent(machine, coordinates), machine.mechanism
+        inertia = platform_inertia(mechanism.platform, tangent.platform, mechanism.length)[0]
+        stiff, mass = tangent.over_springs(inertia)
+        return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
     place, mechanism = place_of(machine, coordinates), machine.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
     placed = machine.carrier.chain.place(of_scalars(coordinates), amounts)

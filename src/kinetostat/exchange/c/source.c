@@ -210,43 +210,93 @@ static void rotate(const double *vector, const double *columns, double *rotated)
     }
 }
 
+/* Point and columns of the orientation of the loaded tool. */
+static int loaded_place(const double *at, double *loaded)
+{
+    double out[MACHINE_ACTUATORS + 12 * (1 + MACHINE_INPUTS)], state[STATES], moved[6];
+    int status = placement_at(at, out);
+    if (status != MACHINE_OK) {
+        return status;
+    }
+    rest_of(at, state);
+    status = displacement_at(at, state, moved);
+    for (int k = 0; k < 3; k++) {
+        loaded[k] = out[MACHINE_ACTUATORS + k] + moved[3 + k];
+    }
+    rotate(moved, out + MACHINE_ACTUATORS + 3, loaded + 3);
+    return status;
+}
+
+/* Motion of the loaded tool by each coordinate, from central differences: turns times LENGTH, then displacements. */
+static int loaded_rates(const double *at, double *rates)
+{
+    for (int j = 0; j < MACHINE_COORDINATES; j++) {
+        const double aside = IS_ANGLE[j] ? ASIDE : ASIDE * LENGTH;
+        double next[MACHINE_INPUTS], ends[2][12], turn[3];
+        for (int end = 0; end < 2; end++) {
+            for (int k = 0; k < MACHINE_INPUTS; k++) {
+                next[k] = at[k];
+            }
+            next[j] += end ? aside : -aside;
+            const int status = loaded_place(next, ends[end]);
+            if (status != MACHINE_OK) {
+                return status;
+            }
+        }
+        rotation_between(ends[0] + 3, ends[1] + 3, turn);
+        for (int k = 0; k < 3; k++) {
+            rates[k * MACHINE_COORDINATES + j] = LENGTH * turn[k] / (2.0 * aside);
+            rates[(3 + k) * MACHINE_COORDINATES + j] = (ends[1][k] - ends[0][k]) / (2.0 * aside);
+        }
+    }
+    return MACHINE_OK;
+}
+
+/* The same of the tool without loads, from the slopes of its place: point, then columns of the orientation. */
+static void free_rates(const double *place, const double *slopes, double *rates)
+{
+    for (int j = 0; j < MACHINE_COORDINATES; j++) {
+        for (int axis = 0; axis < 3; axis++) {
+            const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+            double turn = 0.0;
+            for (int c = 3; c < 12; c += 3) {
+                turn += 0.5 * place[c + next] * slopes[(c + last) * MACHINE_INPUTS + j];
+                turn -= 0.5 * place[c + last] * slopes[(c + next) * MACHINE_INPUTS + j];
+            }
+            rates[axis * MACHINE_COORDINATES + j] = LENGTH * turn;
+            rates[(3 + axis) * MACHINE_COORDINATES + j] = slopes[axis * MACHINE_INPUTS + j];
+        }
+    }
+}
+
 int machine_command(const machine_real in[], machine_real coordinates[])
 {
-    double wanted[12], at[MACHINE_INPUTS], out[MACHINE_ACTUATORS + 12 * (1 + MACHINE_INPUTS)];
-    double state[STATES], moved[6], turned[9], off[6], rates[6 * MACHINE_COORDINATES];
-    double square[MACHINE_COORDINATES * MACHINE_COORDINATES], change[MACHINE_COORDINATES];
+    double wanted[12], loaded[12], at[MACHINE_INPUTS], out[MACHINE_ACTUATORS + 12 * (1 + MACHINE_INPUTS)], off[6];
+    double rates[6 * MACHINE_COORDINATES], square[MACHINE_COORDINATES * MACHINE_COORDINATES];
+    double change[MACHINE_COORDINATES];
     const double *place = out + MACHINE_ACTUATORS, *slopes = place + 12;
     take(in, at);
     for (int k = 0; k < MACHINE_ACTUATORS; k++) {
         coordinates[k] = (machine_real)NAN;
     }
     int status = placement_at(at, out);
+    /* Where six coordinates bring the tool to its place exactly, any rates do; the nearest place depends on them. */
+    int sloped = MACHINE_COORDINATES == 6;
     for (int k = 0; k < 12; k++) {
         wanted[k] = place[k];
     }
     for (int step = 0; step < STEPS_OF_COMMAND && status == MACHINE_OK; step++) {
-        rest_of(at, state);
-        status = displacement_at(at, state, moved);
+        status = loaded_place(at, loaded);
         if (status != MACHINE_OK) {
             return status;
         }
-        rotate(moved, place + 3, turned);
-        rotation_between(turned, wanted + 3, off);
+        rotation_between(loaded + 3, wanted + 3, off);
         for (int k = 0; k < 3; k++) {
             off[k] *= LENGTH;
-            off[3 + k] = wanted[k] - (place[k] + moved[3 + k]);
+            off[3 + k] = wanted[k] - loaded[k];
         }
-        for (int j = 0; j < MACHINE_COORDINATES; j++) {
-            for (int axis = 0; axis < 3; axis++) {
-                const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-                double turn = 0.0;
-                for (int c = 3; c < 12; c += 3) {
-                    turn += 0.5 * place[c + next] * slopes[(c + last) * MACHINE_INPUTS + j];
-                    turn -= 0.5 * place[c + last] * slopes[(c + next) * MACHINE_INPUTS + j];
-                }
-                rates[axis * MACHINE_COORDINATES + j] = LENGTH * turn;
-                rates[(3 + axis) * MACHINE_COORDINATES + j] = slopes[axis * MACHINE_INPUTS + j];
-            }
+        if (MACHINE_COORDINATES == 6 || !sloped) {
+            free_rates(place, slopes, rates);
         }
         for (int i = 0; i < MACHINE_COORDINATES; i++) {
             change[i] = 0.0;
@@ -270,11 +320,15 @@ int machine_command(const machine_real in[], machine_real coordinates[])
             largest = fmax(largest, IS_ANGLE[j] ? fabs(change[j]) : fabs(change[j]) / LENGTH);
         }
         status = placement_at(at, out);
-        if (status == MACHINE_OK && largest <= COMMANDED) {
+        if (status == MACHINE_OK && sloped && largest <= COMMANDED) {
             for (int k = 0; k < MACHINE_ACTUATORS; k++) {
                 coordinates[k] = (machine_real)out[k];
             }
             return MACHINE_OK;
+        }
+        if (status == MACHINE_OK && !sloped && largest <= NEARLY_COMMANDED) {
+            status = loaded_rates(at, rates);
+            sloped = 1;
         }
     }
     return status == MACHINE_OK ? MACHINE_NOT_CONVERGED : status;

@@ -78,7 +78,7 @@ int main(void)
                     fmax(1e-3, largest(6, REFERENCE_DISPLACEMENT[row])));
         }
         if (machine_command(in, coordinates) == MACHINE_OK) {
-            compare("command", row, MACHINE_ACTUATORS, coordinates, REFERENCE_COMMAND[row], 1.0);
+            compare("command", row, MACHINE_ACTUATORS, coordinates, REFERENCE_COMMAND[row], $command_scale);
         }
 /* section: quantities */
         machine_real quantities[MACHINE_QUANTITIES], slopes[MACHINE_QUANTITIES * MACHINE_INPUTS];

@@ -1,0 +1,322 @@
+"""Newton's step of machines whose legs close loops, over scalars: each leg is condensed onto the platform by itself.
+
+What is left of a leg are the wrenches that it can exert on the platform, with a compliance of their own. The step is
+then that of a free machine: statics with the wrenches of all legs, and least energy where there are more of them than
+the load needs. Rigid parts are wrenches without a compliance, so that no stiffness is infinite.
+
+Source: theory (44) and what follows it. Units, axes and origin are those of `mechanism`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
+from kinetostat.algebra.solve import (
+    Eliminated,
+    Row,
+    conjugate,
+    definite,
+    elimination,
+    right_inverse,
+    semidefinite_root,
+)
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.balance import leg_terms, platform_load
+from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.cut import Cut
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.pulls import loads_of_rods, pull_of, wrench_of_rods
+from kinetostat.frozen import dataclass
+from kinetostat.machine.leg import Spring
+from kinetostat.numerics.motions import Motions, brackets_by, cross, of_scalars, skew_of
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, SURELY_MORE, ZERO_PIVOT
+
+
+def array_of(rows: Sequence[Sequence[Scalar]], *shape: int) -> Array:
+    """Scalars of any kind as a matrix of this shape, which may be empty."""
+    result = np.full(shape, 0.0, dtype=object)
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            result[i, j] = entry
+    return result
+
+
+def product(left: Array, right: Array) -> Array:
+    """The product of matrices of scalars, or of a matrix and a vector; NumPy has integers where nothing is summed."""
+    return left @ right if left.shape[1] else np.full((len(left), *right.shape[1:]), 0.0, dtype=object)
+
+
+def symmetric_product(left: Array, right: Array) -> Array:
+    """The product of two matrices where it is symmetric: only its upper triangle is computed."""
+    size = len(left)
+    result = np.full((size, size), 0.0, dtype=object)
+    for i in range(size):
+        result[i, i:] = product(left[i : i + 1], right[:, i:])[0]
+        result[i:, i] = result[i, i:]
+    return result
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Blocks one below the other, each beside those before it."""
+    result = np.full((sum(len(b) for b in blocks), sum(b.shape[1] for b in blocks)), 0.0, dtype=object)
+    row = column = 0
+    for block in blocks:
+        result[row : row + len(block), column : column + block.shape[1]] = block
+        row, column = row + len(block), column + block.shape[1]
+    return result
+
+
+class CondensedLeg:
+    """A leg at some coordinates and under some wrench: what it adds to the equations of the platform.
+
+    With p for its passive motions and s for its springs, its closing conditions give dp = P (d + g - J_s ds), where d
+    is the twist of the platform, g the gap and P J_p = 1. W spans the wrenches that do no work on passive motions, and
+    v are those by which the leg's wrench changes: C v - A d = h, and A^T v + S d is what the leg takes of the load.
+
+    Attributes:
+        terms: its contribution to the equations at the place.
+        lines: rows of A: W^T, and what turning wrenches add to it [wrenches x ways].
+        roots: rows of a root of C [wrenches x at most as many].
+        turning: S [ways x ways].
+        taken: what it takes of the load without a step [ways].
+        gap: h [wrenches].
+        sure: whether its passive motions are independent, and whether its springs hold it by a margin.
+    """
+
+    def __init__(self, leg: ElasticLeg, mechanism: Mechanism, row: Row, wrench: Row, platform: Motions) -> None:
+        self._ways, count = mechanism.ways.astype(object), len(mechanism.actuators)
+        amounts = np.concatenate([np.zeros((1, count)), mechanism.growth], axis=1)
+        coordinates, acting = of_scalars(row), self._ways @ of_scalars(wrench)[0]
+        placed = leg.chain.place(coordinates, amounts)
+        self.terms = terms = leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
+        self._driven = terms.driven[0][:, :count].astype(object)
+        self._elastic, self._passive = (
+            [k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1)
+        )
+        rates, size = self._ways.T @ terms.rates[0].astype(object), len(self._ways.T)
+        springs, left = len(self._elastic), terms.left[0].astype(object)
+        self.sure: Scalar = True
+        self._closes, self._across = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
+        if self._passive:
+            solution, rest, margin = right_inverse(rates[:, self._passive].T.tolist())
+            self._closes, self._across = array_of(solution, size, len(self._passive)).T, array_of(rest, len(rest), size)
+            self.sure = margin > SURELY_MORE
+        self._gap = self._ways.T @ _gap(platform, terms.end)
+        # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
+        geometric = terms.geometric[0].astype(object)
+        self._bracket = turning_of(acting, self._ways)
+        self._inner = geometric[np.ix_(self._passive, self._passive)]
+        self._mixed = geometric[np.ix_(self._passive, self._elastic)]
+        self._follows = product(self._closes, rates[:, self._elastic])
+        pushed = product(self._inner, self._follows)
+        part = product(self._follows.T, self._mixed - 0.5 * pushed)
+        stiff = geometric[np.ix_(self._elastic, self._elastic)] - part - part.T
+        for place, number in enumerate(self._elastic):
+            stiff[place, place] = stiff[place, place] + terms.carrying[0, number]
+        self._factors = elimination(stiff.tolist())
+        self.sure = self.sure & definite(self._factors, stiff.tolist())
+        self._coupling = self._mixed - pushed
+        self._left, self._held = (
+            left[self._elastic] - product(self._follows.T, left[self._passive]),
+            left[self._passive],
+        )
+        self._felt = product(self._across, rates[:, self._elastic])
+        # With E = L D L^T of the springs, products with its inverse are those of rows that L has been taken from.
+        felt, coupled, remaining = (
+            array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), springs)
+            for rows in (self._felt, self._coupling, self._left[None])
+        )
+        shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
+        solved, driven = felt * shrink, coupled * shrink
+        self.lines = self._across + product(product(solved, coupled.T), self._closes)
+        self.gap = self.lines @ self._gap + product(solved, remaining[0])
+        if len(felt) < springs:
+            soft = symmetric_product(felt, solved.T).tolist()
+            self.roots = array_of(semidefinite_root(soft), len(felt), len(felt))
+        else:
+            self.roots = felt * np.array([*(sqrt(abs(part)) for part in shrink), None], dtype=object)[:-1]
+        stiffening = self._inner - symmetric_product(driven, coupled.T)
+        self.turning = symmetric_product(self._closes.T, product(stiffening, self._closes)) + self._bracket
+        pressed = product(self._closes.T, self._held - product(driven, remaining[0]))
+        self.taken = of_scalars(wrench)[0] + pressed + self.turning @ self._gap
+
+    def step(self, twist: Array, change: Array) -> tuple[Row, Row]:
+        """The steps of its coordinates and of its wrench.
+
+        Args:
+            twist: step of the platform [ways].
+            change: changes of the wrenches that it can exert [wrenches].
+        """
+        moved = twist + self._gap
+        following = product(self._closes, moved)
+        pushed = product(self._felt.T, change) - product(self._coupling.T, following) - self._left
+        springs = of_scalars(self._factors.solve(pushed.tolist()))[0]
+        passive = following - product(self._follows, springs)
+        result = np.zeros(len(springs) + len(passive), dtype=object)
+        result[self._elastic], result[self._passive] = springs, passive
+        pressed = self._held + product(self._inner, passive) + product(self._mixed, springs)
+        wrench = product(self._across.T, change) + product(self._closes.T, pressed) + self._bracket @ moved
+        return result.tolist(), wrench.tolist()
+
+    def holding(self, change: Row) -> Array:
+        """The loads that keep the machine's actuators after its wrench has changed so [actuators]; 0 of other legs."""
+        count = self._driven.shape[1]
+        return self.terms.holding[0, :count] + self._driven.T @ (self._ways @ of_scalars(change)[0])
+
+
+def _gap(platform: Motions, end: Motions) -> Array:
+    """The screw from the end of a leg to the platform, to first order [6]: 0 where the leg closes."""
+    turned = platform.rotation[0] @ end.rotation[0].T
+    sines = of_scalars([0.5 * (turned[i, j] - turned[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))])
+    return np.concatenate([sines, platform.translation - end.translation - cross(sines, end.translation)], axis=1)[0]
+
+
+def turning_of(wrench: Array, ways: Array) -> Array:
+    """Half of the work of a wrench [6] on the brackets of two twists each [ways x ways]; it is antisymmetric."""
+    return 0.5 * (ways.T @ brackets_by(wrench[None], ways.T[None])[0].T)
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """The platform, held by the wrenches of legs and rods.
+
+    Attributes:
+        root: G, where G G^T is the compliance of springs alone at the place [ways x ways].
+        twist: step of the platform [ways].
+        changes: of all wrenches [wrenches].
+        rates: the symmetric part of 1 + G^T S G [ways x ways].
+        factors: of 1 + G^T S G.
+        stable: whether the tangent stiffness is positive definite by a margin, and no rank is in doubt.
+    """
+
+    root: Array
+    twist: Array
+    changes: Array
+    rates: Array
+    factors: Eliminated
+    stable: Scalar
+
+
+def solve_condensed(lines: Array, roots: Array, turning: Array, load: Array, gaps: Array) -> Condensed:
+    """Solve A^T v + S d = f and C v - A d = h for the twist d of the platform and the changes v of wrenches.
+
+    Args:
+        lines: A, at least as many rows as there are ways.
+        roots: R with C = R R^T, as many rows.
+        turning: S.
+        load: f.
+        gaps: h.
+    """
+    size = lines.shape[1]
+    balanced, internal, margin = right_inverse(lines.T.tolist())
+    mixes = np.array([*zip(*balanced, strict=True), *internal], dtype=object)
+    felt, count = product(mixes, roots), roots.shape[1]
+    squares = [total([part * part for part in column]) for column in roots.T.tolist()]
+    squares = [1.0 if is_zero(square) else where(square > ZERO_PIVOT, square, 1.0) for square in squares]
+    whole = np.concatenate([felt, mixes], axis=1)
+    modes = conjugate(whole[size:].tolist(), [1.0] * count, squares)
+    answers, hidden = whole[:size], np.full(len(lines), 0.0, dtype=object)
+    for row, inverse in zip(modes.columns, modes.inverses, strict=True):
+        mode = np.array(row, dtype=object)
+        shares = product(answers[:, :count], mode[:count]) * inverse
+        answers = answers - shares[:, None] * mode
+        hidden = hidden + mode[count:] * (mode[count:] @ gaps * inverse)
+    shares = answers[:, count:]
+    soft = symmetric_product(answers[:, :count], answers[:, :count].T)
+    root, closing = np.array(semidefinite_root(soft.tolist()), dtype=object), -(shares @ gaps)
+    rates = np.eye(size) + root.T @ turning @ root
+    factors = elimination(rates.tolist(), symmetric=False)
+    twist = closing + root @ of_scalars(factors.solve((root.T @ (load - turning @ closing)).tolist()))[0]
+    changes = shares.T @ (load - turning @ twist) + hidden
+    middle = 0.5 * (rates + rates.T)
+    stays = definite(elimination(middle.tolist()), middle.tolist())
+    return Condensed(root, twist, changes, middle, factors, (margin > SURELY_MORE) & (modes.doubt < 0.5) & stays)
+
+
+class LegwiseTangent:
+    """Resistance of a machine with legs that close loops at some coordinates, and Newton's step from there."""
+
+    def __init__(self, machine: Cut, coordinates: Row) -> None:
+        self.mechanism, self._rods = machine.mechanism, machine.rods
+        mechanism, carrier = machine.mechanism, machine.carrier
+        self._ways = ways = mechanism.ways.astype(object)
+        size, start = ways.shape[1], carrier.size
+        moved = of_scalars(coordinates[:start])
+        placed = carrier.chain.place(
+            moved, np.concatenate([np.zeros((1, len(mechanism.driven))), mechanism.growth], axis=1)
+        )
+        self.platform = placed.end
+        free = all(is_zero(coordinate) for coordinate in coordinates)
+        self._pulls = [pull_of(rod, None if free else self.platform) for rod in machine.rods]
+        self.slack: Scalar = 0.0
+        self.rank = len(machine.rods) + sum(len(leg.springs) - leg.springs.count(None) for leg in machine.legs)
+        turned = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self._pulls]
+        (load, change), (hold, fall) = platform_load(mechanism, self.platform), wrench_of_rods(self._pulls, turned)
+        force, turning = ways.T @ (load + hold)[0], ways.T @ (fall - change)[0] @ ways
+        self._legs: list[CondensedLeg] = []
+        for leg in machine.legs:
+            row = coordinates[start : start + leg.size]
+            start += leg.size + size
+            self._legs.append(CondensedLeg(leg, mechanism, row, coordinates[start - size : start], self.platform))
+            force, turning = force - self._legs[-1].taken, turning + self._legs[-1].turning
+        lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self._pulls]
+        rows = [array_of(lines, len(lines), 6) @ ways, *(leg.lines for leg in self._legs)]
+        gaps = np.concatenate([np.full(len(lines), 0.0, dtype=object), *(leg.gap for leg in self._legs)])
+        roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods] + [leg.roots for leg in self._legs]
+        self._solved = solve_condensed(np.concatenate(rows), block_diagonal(roots), turning, force, gaps)
+        self.twist: Row = (ways @ self._solved.twist).tolist()
+        self.step, self.motion, self._changes = self._steps(ways.T @ placed.screws[0].T)
+
+    def _steps(self, rates: Array) -> tuple[Row, Row, list[Row]]:
+        """Steps of all coordinates and wrenches; those that are motions; and those of each leg's wrench."""
+        # Slides come first among the coordinates, and last in the twist.
+        moving = elimination(rates[::-1].tolist(), symmetric=False).solve(self._solved.twist[::-1].tolist())
+        step, motion, changes, place = [*moving], self._solved.twist.tolist(), [], len(self._pulls)
+        for leg in self._legs:
+            count = len(leg.gap)
+            moved, wrench = leg.step(self._solved.twist, self._solved.changes[place : place + count])
+            place += count
+            step, motion = [*step, *moved, *wrench], [*motion, *moved]
+            changes.append(wrench)
+        return step, motion, changes
+
+    @property
+    def stable(self) -> Scalar:
+        """Whether the tangent stiffness is positive definite by a margin, and all ranks are sure."""
+        good = self._solved.stable
+        for leg in self._legs:
+            good = good & leg.sure
+        return good
+
+    def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
+        """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""
+        force, length = self.mechanism.force[0], self.mechanism.length[0]
+        loads = loads_of_rods(self._rods, self._pulls, self.twist, force)
+        holding = total([leg.holding(change) for leg, change in zip(self._legs, self._changes, strict=True)])
+        done = [spring for spring, _ in loads]
+        for spring, load in zip(self.mechanism.driven, holding.tolist(), strict=True):
+            if spring not in done:
+                loads.append((spring, load * (force if spring.joint.point is None else force * length)))
+        return loads
+
+    def over_springs(self, matrix: Array) -> tuple[Array, Array]:
+        """The tangent stiffness and another matrix by twists of the platform [6 x 6], in coordinates of the springs.
+
+        The deflections y of springs move the platform by G y; in them the stiffness is 1 + G^T S G, and what is rigid
+        does not occur. Symmetric parts [ways x ways].
+        """
+        root = self._ways @ self._solved.root
+        return self._solved.rates, root.T @ matrix @ root
+
+    def compliance(self) -> list[Row]:
+        """C at the loaded tool point [6][6], 0 of what is the square of round-off."""
+        back = np.eye(6, dtype=object)
+        back[3:, :3] = -skew_of(self.platform.translation)[0]
+        rows = back @ self._ways @ self._solved.root
+        solved = [of_scalars(self._solved.factors.solve(row))[0] for row in rows.tolist()]
+        whole = np.array([[row @ column for column in solved] for row in rows], dtype=object)
+        whole = 0.5 * (whole + whole.T)
+        least = ROUND_OFF_OF_COMPLIANCE * (1.0 + total([abs(whole[i, i]) for i in range(6)]))
+        moves = [abs(whole[i, i]) > least for i in range(6)]
+        return [[where(moves[i] & moves[j], whole[i, j], 0.0) for j in range(6)] for i in range(6)]

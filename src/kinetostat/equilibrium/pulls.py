@@ -1,0 +1,122 @@
+"""Rods at a place of the platform: the force with which each pulls, and how all of them resist its motion.
+
+Source: theory (44). Units, axes and origin are those of `mechanism`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, sqrt, total, where
+from kinetostat.algebra.solve import Row
+from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.cut import ElasticRod
+from kinetostat.frozen import dataclass
+from kinetostat.machine.leg import Spring
+from kinetostat.numerics.motions import Motions, of_scalars, skew_of
+
+
+@dataclass(frozen=True)
+class RodPull:
+    """Pull of a rod from a point b of the base to a point a of the platform.
+
+    Attributes:
+        near, at: b and a.
+        moment: a x b.
+        length: length of the rod.
+        tension: the tension with which it pulls.
+        density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
+        stretching, elastic: k - c and k over the square of its length, with its stiffness k.
+        slack: 1 where it carries nothing, else 0.
+    """
+
+    near: Vector
+    at: Vector
+    moment: Vector
+    length: Scalar
+    tension: Scalar
+    density: Scalar
+    stretching: Scalar
+    elastic: Scalar
+    slack: Scalar
+
+    @property
+    def line(self) -> tuple[Scalar, ...]:
+        """The gradient of half the square of its length by a twist of the platform."""
+        return (*(-self.moment).components(), *(self.at - self.near).components())
+
+
+def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
+    """A rod at a place of the platform, or in the free state."""
+    near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
+    at = far if platform is None else Vector(*platform.point(rod.far)[0])
+    span, rest = at - near, far - near
+    square, longer = span.dot(span), 0.0
+    length = sqrt(square)
+    if platform is not None:  # the difference of both lengths, without the round-off of their size
+        longer = (at - far).dot(span + rest) * (1.0 / (length + rest.norm()))
+    stiffness = 1.0 / rod.softness
+    tension, slack = (longer + rod.given) * stiffness, 0.0
+    if rod.sign:
+        carries = rod.sign * tension >= 0.0
+        tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
+    density, shrink = tension * (1.0 / length), 1.0 / square
+    stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
+    return RodPull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
+
+
+def wrench_of_rods(pulls: Sequence[RodPull], stretching: Row) -> tuple[Array, Array]:
+    """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6].
+
+    Args:
+        pulls: of the rods.
+        stretching: their own, or what is to be counted in its place.
+    """
+    pulled = [pull.at * pull.density for pull in pulls]
+    ends = _sum(pulled)
+    starts = _sum([pull.near * pull.density for pull in pulls])
+    turned = [
+        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(pulled, pulls, strict=True)]) for j in "xyz"]
+        for i in "xyz"
+    ]
+    moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
+    fall = sum_of_dyads(pulls, stretching)[None]
+    for i in range(3):
+        for j in range(3):
+            fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
+        fall[0, 3 + i, 3 + i] = fall[0, 3 + i, 3 + i] + density
+    fall[:, :3, 3:] = fall[:, :3, 3:] + skew_of(of_scalars(starts.components()))
+    fall[:, 3:, :3] = fall[:, 3:, :3] - skew_of(of_scalars(ends.components()))
+    return of_scalars([*moment, *(starts - ends).components()]), fall
+
+
+def _sum(vectors: Sequence[Vector]) -> Vector:
+    return (
+        Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))
+        if vectors
+        else ZERO
+    )
+
+
+def sum_of_dyads(pulls: Sequence[RodPull], weights: Row) -> Array:
+    """The weighted sum of the dyads of all lines [6 x 6]."""
+    result = np.zeros((6, 6), dtype=object)
+    for i, j in POSITIONS:
+        pairs = zip(pulls, weights, strict=True)
+        result[i, j] = result[j, i] = total([pull.line[i] * pull.line[j] * weight for pull, weight in pairs])
+    return result
+
+
+def loads_of_rods(
+    rods: Sequence[ElasticRod], pulls: Sequence[RodPull], twist: Row, force: Scalar
+) -> list[tuple[Spring, Scalar]]:
+    """The actuators of rods with what they carry after a step of the platform, N; `force` is the unit of force."""
+    loads = []
+    for rod, pull in zip(rods, pulls, strict=True):
+        along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
+        stretched = pull.tension + pull.elastic * pull.length * along
+        loads += [(spring, stretched * force) for spring in rod.driven]
+    return loads
