@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 
 def add_compare_commands(commands: "Commands") -> None:
     """Add `compare` and `validate`."""
+    _add_compare(commands)
+    _add_validate(commands)
+
+
+def _add_compare(commands: "Commands") -> None:
     compare = add_command(
         commands, "compare", _compare, "compare designs side by side: differences, stiffness, gains",
         'kinetostat compare zhang-gosselin-4dof "zhang-gosselin-4dof:geometry.base_radius=26 cm;pose.z=66 cm"',
@@ -58,6 +63,9 @@ def add_compare_commands(commands: "Commands") -> None:
     )  # fmt: skip
     takes_figures(compare, "the figure and JSON")
     takes_json(compare)
+
+
+def _add_validate(commands: "Commands") -> None:
     validate = add_command(
         commands, "validate", _validate,
         "compare the machine with an independent engine, or with a measured stiffness",
@@ -94,8 +102,8 @@ def add_compare_commands(commands: "Commands") -> None:
 def _compare(options: argparse.Namespace) -> int:
     from kinetostat.studies.comparison import compare, read_design
 
-    shown = [f"display.units={options.units}"] if options.units else []
-    designs = [read_design(text, [*options.settings, *shown]) for text in options.designs]
+    units = [f"display.units={options.units}"] if options.units else []
+    designs = [read_design(text, [*options.settings, *units]) for text in options.designs]
     with progress_bar("computing") as progress:
         result = compare(designs, options.ranges, progress, options.quantities, options.poses)
     return show_answer(options, result)
@@ -113,7 +121,7 @@ def _validate(options: argparse.Namespace) -> int:
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
     lines = [f"tolerances.{line}" for line in options.tolerances]
     machines = [load_machine(options, [*pose, *lines]) for pose in poses]
-    _check_words(options)
+    _refuse_other_options(options)
     for machine in machines:
         analysis = analyze(machine)
         if analysis.status is not Status.OK:
@@ -130,15 +138,15 @@ def _validate(options: argparse.Namespace) -> int:
     return give(options, agreed, lambda: [json_of(VALIDATION, validation) for validation in validations], show)
 
 
-def _check_words(options: argparse.Namespace) -> None:
+def _refuse_other_options(options: argparse.Namespace) -> None:
     """Refuse options that belong to the other kind of validation."""
     from kinetostat.spec.errors import InputError
 
-    of_measured = {
+    options_of_measured = {
         "--fit": options.fit, "--tolerance": options.tolerances, "--sigma": options.sigma,
         "--sigma-angle": options.sigma_angle, "-o": options.output,
     }  # fmt: skip
-    wrong = [name for name, given in of_measured.items() if given]
+    wrong = [name for name, given in options_of_measured.items() if given]
     if wrong and not options.measured:
         raise InputError(f"{wrong[0]} is about a measured stiffness; give its file with --measured, or leave it out.")
     if options.measured and options.engine:
@@ -154,5 +162,5 @@ def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
     answer = validate_measured(
         machine, options.measured, fit=options.fit, sigma=options.sigma, sigma_angle=options.sigma_angle
     )
-    shown = show_answer(options, answer)
-    return shown if answer.agrees else NO_ANSWER
+    exit_code = show_answer(options, answer)
+    return exit_code if answer.agrees else NO_ANSWER

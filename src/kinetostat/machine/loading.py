@@ -21,7 +21,7 @@ from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
-from kinetostat.machine.orientation import form_of, make_room, with_angles
+from kinetostat.machine.orientation import form_of, remove_replaced_form, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, numbered_entry, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
@@ -184,7 +184,7 @@ def _with_overrides(
     """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
     tables = [key for key in ("pose", *COMMON) if isinstance(document.get(key), dict)]
     ready = {**document, **{key: copy.deepcopy(document[key]) for key in tables}}
-    make_room(ready, settings, coordinates, origin)
+    remove_replaced_form(ready, settings, coordinates, origin)
     for setting in settings:
         _write_out(ready, setting.partition("=")[0].strip())
     return with_angles(documents.override(ready, settings, counts), coordinates, origin)

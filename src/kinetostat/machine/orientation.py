@@ -34,23 +34,23 @@ PARTS = {
 }
 """The numbers of each form in order, by the names that they have as columns of a table: "quaternion.w"."""
 ANGLE = Quantity("angle", "an angle of an orientation")
-PURE = Quantity("direction", "a number of an orientation")
+COMPONENT = Quantity("direction", "a number of an orientation")
 
 
 def form_of(name: str) -> str:
-    """Return the form that a path leads to or into, "pose.tilt.angle" or "quaternion"; empty if it leads to none."""
+    """Return the form in a path such as "pose.tilt.angle" or "quaternion"; empty if it has none."""
     head = _bare(name).partition(".")[0]
     return head if head in FORMS else ""
 
 
 def part_of(name: object) -> tuple[str, str]:
-    """Return form and part that a column of a table stands for, ("tilt", "angle"); two empty texts if it is neither."""
+    """Return the form and the part of a column of a table, such as ("tilt", "angle"); two empty texts for others."""
     form, _, part = _bare(str(name)).replace("_", ".").partition(".")
     return (form, part) if part in PARTS.get(form, ()) else ("", "")
 
 
 def from_parts(form: str, parts: Mapping[str, Array]) -> Any:
-    """Put the columns of a table together: orientations as `angles_of` takes them.
+    """Join the columns of a table to orientations as `angles_of` takes them.
 
     Args:
         form: a key of `PARTS`.
@@ -77,7 +77,7 @@ def angles_of(form: str, value: object, where: str) -> dict[str, Array]:
     Args:
         form: a key of `FORMS`.
         value: one orientation, or an array of several; of a tilt a table whose entries may be arrays.
-        where: names it in messages.
+        where: name of the value in messages.
 
     Raises:
         InputError: it is not of this form, not of unit length, not orthogonal, or a mirror image.
@@ -164,7 +164,7 @@ def _angle_values(value: Any, where: str) -> Array:
 
 
 def _refuse(off: Array, sentence: Any) -> None:
-    """Refuse the first orientation that is further off than rounded digits explain."""
+    """Refuse the first orientation whose error is larger than rounded digits explain."""
     wrong = np.flatnonzero(~(off <= ROUNDED_ORIENTATION))
     if wrong.size:
         at = f" (pose {wrong[0] + 1})" if len(off) > 1 else ""
@@ -244,10 +244,10 @@ def single_angles(form: str, value: object, where: str) -> dict[str, float]:
     return {name: float(values[0]) for name, values in angles.items()}
 
 
-def make_room(document: Any, settings: Iterable[str], coordinates: Sequence[str], origin: str) -> None:
-    """Take out of a document the orientation that overrides replace by another form; the document is changed.
+def remove_replaced_form(document: Any, settings: Iterable[str], coordinates: Sequence[str], origin: str) -> None:
+    """Remove from a document the orientation that overrides replace by another form; the document is changed.
 
-    An override of one angle of a pose by quaternion leaves the other two angles as the quaternion has them.
+    If one angle of a pose with a quaternion is overridden, the other two angles are those of the quaternion.
 
     Args:
         document: the document of a machine.
@@ -273,7 +273,7 @@ def make_room(document: Any, settings: Iterable[str], coordinates: Sequence[str]
 def numbers_for(
     coordinates: Iterable[str], given: Mapping[str, Any], read: Callable[[str, object, str], Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """The values of a Python program with roll, pitch and yaw in the place of another form; see `with_values`.
+    """Return values from Python with roll, pitch and yaw in the place of another form; see `with_values`.
 
     Args:
         coordinates: the coordinates of the machine's pose.

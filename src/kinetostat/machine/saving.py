@@ -14,7 +14,7 @@ from tomlkit.items import Item
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, Written
-from kinetostat.machine.orientation import ANGLES, FORMS, make_room
+from kinetostat.machine.orientation import ANGLES, FORMS, remove_replaced_form
 from kinetostat.machine.parameters import values
 from kinetostat.spec.document import setting_value
 from kinetostat.spec.errors import InputError
@@ -46,7 +46,7 @@ def _edited_text(written: Written, machine: Machine) -> str | None:
     """Return the text with the numbers of the machine; None where editing does not lead to it."""
     try:
         document = tomlkit.parse(written.text)
-        make_room(document, written.settings, tuple(quantities(machine.family.tables["pose"])), machine.name)
+        remove_replaced_form(document, written.settings, tuple(quantities(machine.family.tables["pose"])), machine.name)
         for setting in (text for text in written.settings if not text.startswith(TOLERANCES)):
             path, _, text = setting.partition("=")
             *table, key = path.strip().split(".")
@@ -91,7 +91,7 @@ def _write_differences(document: Any, present: Machine, machine: Machine) -> Non
         for key in (key for key, value in literals.items() if known.get(key) != value):
             _put(_place(document, table.split(".") if table else []), key, literals[key])
     if any(form in document.get("pose", {}) for form in FORMS) and machine.tables["pose"] != present.tables["pose"]:
-        make_room(document, [f"pose.{name}=" for name in ANGLES], ANGLES, machine.name)
+        remove_replaced_form(document, [f"pose.{name}=" for name in ANGLES], ANGLES, machine.name)
     for table, name, quantity in _fields(machine):
         new = getattr(machine.tables[table], name)
         old = getattr(present.tables.get(table), name, None)

@@ -18,7 +18,7 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.orientation import ANGLE, ANGLES, PURE, angles_of, from_parts, numbers_for, part_of
+from kinetostat.machine.orientation import ANGLE, ANGLES, COMPONENT, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, quantities
@@ -126,7 +126,7 @@ def _with_angles(machine: Machine, columns: Sequence[GivenColumn], where: Where)
             continue
         if part in parts.setdefault(form, {}):
             raise InputError(f"{form}.{part} is given by two columns of the poses; remove one of them.")
-        parts[form][part] = column_values(column, ANGLE if form == "tilt" else PURE, where)
+        parts[form][part] = column_values(column, ANGLE if form == "tilt" else COMPONENT, where)
     if not parts:
         return columns
     given = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
