@@ -172,7 +172,7 @@ one_of_each = pytest.mark.parametrize("case", [case for case in CASES if case.na
 every_machine = pytest.mark.parametrize("case", CASES, ids=repr)
 two_sided = pytest.mark.parametrize("case", [case for case in CASES if case.name not in ONE_SIDED], ids=repr)
 """For what holds where every leg pulls and pushes."""
-few = settings(max_examples=max(8, settings.default.max_examples * 2 // 5))
+few = settings(max_examples=min(settings.default.max_examples, max(8, settings.default.max_examples * 2 // 5)))
 """For a test over every machine: what one machine hides, another shows."""
 
 
