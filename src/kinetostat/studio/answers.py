@@ -7,6 +7,7 @@ The formulas are elsewhere.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, parameters, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.studies.drives import DriveLoads, drives
+from kinetostat.studies.motions import read_motion, required_motion
 from kinetostat.studies.quantities import without_derivatives
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.studies.under_load import LoadedState, under_load
@@ -352,3 +355,34 @@ def swing(request: SwingRequest) -> list[dict[str, Any]]:
     if shape is None:
         return []
     return swing_data(machine, request.answer.state.configuration, request.sizes, shape)
+
+
+MOTION_FILE = Path("motion.csv")
+"""Name of a motion in messages."""
+MOTION_POINTS = 300
+"""Points of a motion that is looked at, about."""
+
+
+@dataclass(frozen=True)
+class MotionRequest:
+    """A motion of a machine.
+
+    Attributes:
+        machine: the machine.
+        text: of the CSV file of the motion; that of the requirements of the machine's file if empty.
+    """
+
+    machine: Machine
+    text: str
+
+
+def drives_along(request: MotionRequest) -> DriveLoads | str:
+    """Compute what a motion asks of the drives, or say what is missing; an empty text if there is no motion."""
+    machine = request.machine
+    try:
+        if request.text:
+            return drives(machine, read_motion(machine, MOTION_FILE, MOTION_POINTS, request.text))
+        motion = required_motion(machine, MOTION_POINTS)
+        return "" if motion is None else drives(machine, motion)
+    except InputError as error:
+        return str(error)

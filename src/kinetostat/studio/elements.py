@@ -67,7 +67,7 @@ class MapView(Labelled, component=COMPONENTS / "map_view.js"):
 
 
 class CurveView(Labelled, component=COMPONENTS / "curve_view.js"):
-    """Curves over one number; method `show`; event `pick` with the number of the mark next to a click."""
+    """Curves over one number; methods `show`, `mark`; event `pick` with the number of the mark next to a click."""
 
 
 class FrontView(Labelled, component=COMPONENTS / "front_view.js"):

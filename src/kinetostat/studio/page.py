@@ -20,6 +20,7 @@ from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.menus import FilesMenu, Gallery
 from kinetostat.studio.panels import Panel
+from kinetostat.studio.panels.drives import DrivesPanel
 from kinetostat.studio.panels.influences import ContributionsPanel, LinkPanel, SensitivityPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel, RequirementsPanel
 from kinetostat.studio.panels.vibration import VibrationPanel
@@ -35,7 +36,7 @@ from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
     ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel, VibrationPanel,
-    RequirementsPanel,
+    DrivesPanel, RequirementsPanel,
 )  # fmt: skip
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"

@@ -12,6 +12,12 @@ export default {
   emits: ["pick"],
   template: `<div class="plot" role="img" :aria-label="label" @click="pick"></div>`,
   methods: {
+    // Moves the line of the present value.
+    mark(here) {
+      if (!this.shown) return;
+      this.shown.here = here;
+      this.draw();
+    },
     option(width, height) {
       const { x, lines, label, here, log, signed, tall, marks, unit, across } = this.shown;
       const drawable = (value) => value !== null && (signed || value > 0);
