@@ -22,9 +22,9 @@ from kinetostat.studio.wording import paragraph
 from kinetostat.views.drives import DRIVES
 
 FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
-FRAMES = 150
+FRAMES = 100
 """Steps of a motion that is played."""
-PERIOD = 0.08
+PERIOD = 0.12
 """Seconds between two of them, if the computer keeps up."""
 SHOWN = 300
 """Points of a curve."""
