@@ -35,7 +35,7 @@ NO_MOTION = (
 
 
 class DrivesPanel(Panel):
-    """What a motion asks of the drives, over time; the machine follows a slider, or the motion is played."""
+    """Demands of a motion on the drives over time; the machine follows a slider, or the motion is played."""
 
     name = "Drives"
 
