@@ -71,7 +71,8 @@ class Analysis(Immutable):
         stiffness: K [n x n], None where a direction is rigid (K has no finite value there).
         compliance: C [n x n], None where a direction is free.
         finite_compliance: of a singular pose, C with NaN in the entries that are not finite; None at others.
-        stiffness_diagonal, compliance_diagonal: their diagonals, infinity where rigid or free.
+        stiffness_diagonal, compliance_diagonal: their diagonals [n], infinity where rigid or free; empty without an
+            answer.
         rank: of C, or of K where a direction is free.
         rigid, free: names of the springs with infinite and with zero stiffness.
         attribution: what each spring contributes to K and C.
@@ -102,8 +103,8 @@ class Analysis(Immutable):
     stiffness: Rows | None = None
     compliance: Rows | None = None
     finite_compliance: Rows | None = None
-    stiffness_diagonal: tuple[float, ...] = ()
-    compliance_diagonal: tuple[float, ...] = ()
+    stiffness_diagonal: Array = field(default_factory=lambda: np.zeros(0))
+    compliance_diagonal: Array = field(default_factory=lambda: np.zeros(0))
     rank: int | None = None
     rigid: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
@@ -258,8 +259,8 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
         axes=axes,
         stiffness=stiffness_rows,
         compliance=compliance_rows,
-        stiffness_diagonal=tuple(stiffness.entry(i, i) for i in kept),
-        compliance_diagonal=tuple(compliance.entry(i, i) for i in kept),
+        stiffness_diagonal=np.array([float(stiffness.entry(i, i)) for i in kept]),
+        compliance_diagonal=np.array([float(compliance.entry(i, i)) for i in kept]),
         rank=_rank(response, statics, compliance_rows is None),
         attribution=contributions(all_springs, statics, stiffness, compliance, kept),
         indices=indices,

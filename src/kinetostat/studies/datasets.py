@@ -39,6 +39,10 @@ ABOUT_STATUS = {
 """Attributes of the variable of statuses."""
 
 
+ABOUT_POSES = {"units": "", "kind": "", "log": 0, "field": "pose.number of the pose"}
+"""Attributes of the coordinate that numbers the poses of a list."""
+
+
 def about_quantity(name: str) -> dict[str, str]:
     """Attributes of the variable of a quantity."""
     quantity = QUANTITIES[name]
@@ -150,7 +154,7 @@ def _layout(
     Fields are variables in it, because copies take the values of variables alone.
     """
     nothing, parts = np.broadcast_to(0.0, count), machine.value.family.component_names
-    coordinates: dict[str, Any] = {"pose": np.arange(count)}
+    coordinates: dict[str, Any] = {"pose": ("pose", np.arange(count), ABOUT_POSES)}
     for field in (each.value for each in fields):
         coordinates[field.dimension] = ("pose", nothing, {**about_field(field), "path": field.path})
     variables: dict[str, Any] = {name: ("pose", nothing, about_quantity(name)) for name in names}

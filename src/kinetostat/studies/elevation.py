@@ -113,6 +113,9 @@ class Elevation(Immutable):
     corrections: CorrectionTable
     requirements: tuple[Verdict, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Elevation of {self.machine.name!r}: {len(self.elevations)} elevations>"
+
     @property
     def machine(self) -> Machine:
         """The machine as it stands upright, under its loads."""

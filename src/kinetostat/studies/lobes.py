@@ -79,6 +79,9 @@ class Lobes(Immutable):
     worst: tuple[tuple[str, float], ...] = ()
     tool: FreeTool | None = None
 
+    def __repr__(self) -> str:
+        return f"<Lobes of {self.machine.name!r}: {len(self.speeds)} speeds>"
+
     @property
     def machine(self) -> Machine:
         """The machine with its pose."""

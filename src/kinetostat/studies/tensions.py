@@ -75,6 +75,9 @@ class Tensions(Immutable):
     wrench_closure: float
     required: int
 
+    def __repr__(self) -> str:
+        return f"<Tensions of {self.machine.name!r}: {self.status.word}, {len(self.cables)} cables>"
+
     @property
     def sag_message(self) -> str:
         """A sentence on the sag of the cables; on what says it where they are straight."""

@@ -78,9 +78,9 @@ def _matrices(machine: Machine, response: Response, turn: Rotation) -> dict[str,
     diagonal = np.where(free, math.inf, np.diag(compliance))
     return {
         "stiffness": stiffness,
-        "stiffness_diagonal": tuple(stiffness[i][i] for i in range(len(kept))),
+        "stiffness_diagonal": np.array([stiffness[i][i] for i in range(len(kept))]),
         "finite_compliance": clean_matrix(compliance.tolist()),
-        "compliance_diagonal": tuple(float(entry) for entry in diagonal),
+        "compliance_diagonal": np.array([float(entry) for entry in diagonal]),
         "rank": int(resisted.sum()),
     }
 

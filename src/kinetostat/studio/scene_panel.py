@@ -200,7 +200,7 @@ def headline(report: Report) -> str:
             value, _, unit = display.show_deflection(moved, "rad" if name.startswith("r") else "m").partition(" ")
             tiles.append(_tile(f"u {name}", value, unit))
         return f"<dl>{''.join(tiles)}</dl>"
-    for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal, strict=True):
+    for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal.tolist(), strict=True):
         value, _, unit = display.show(compliance, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
         tiles.append(_tile(f"C {name}", value, unit))
     return f"<dl>{''.join(tiles)}</dl>"

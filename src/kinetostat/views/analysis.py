@@ -70,7 +70,7 @@ def analyze_in_state(
 
 def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
     """Reasons in tables, remarks, K and C last; all springs if `full`."""
-    if analysis.platform is None:
+    if analysis.platform is None or not analysis.compliance_diagonal.size:
         return
     display, names = analysis.machine.display, analysis.components
     yield free.along_table(analysis.directions, display)
@@ -176,8 +176,14 @@ ANALYSIS = Description(
         Field("tool_offset", lambda analysis: analysis.machine.tables["tool"].offset),
         Field("stiffness"),
         Field("compliance", lambda analysis: analysis.compliance or analysis.finite_compliance),
-        Field("stiffness_diagonal", lambda analysis: analysis.stiffness_diagonal or None),
-        Field("compliance_diagonal", lambda analysis: analysis.compliance_diagonal or None),
+        Field(
+            "stiffness_diagonal",
+            lambda analysis: analysis.stiffness_diagonal if analysis.stiffness_diagonal.size else None,
+        ),
+        Field(
+            "compliance_diagonal",
+            lambda analysis: analysis.compliance_diagonal if analysis.compliance_diagonal.size else None,
+        ),
         Field("rank"),
         Field("rigid"),
         Field("free"),

@@ -31,14 +31,14 @@ def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
 def stiffness_table(analysis: Analysis) -> FittedTable:
     """K, or its diagonal where a direction is rigid."""
     display = analysis.machine.display
-    rows: Sequence[Sequence[float]] = analysis.stiffness or [analysis.stiffness_diagonal]
+    rows: Sequence[Sequence[float]] = analysis.stiffness or [analysis.stiffness_diagonal.tolist()]
     return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
 def compliance_table(analysis: Analysis) -> FittedTable:
     """C, or its diagonal where a direction is free."""
     display = analysis.machine.display
-    rows: Sequence[Sequence[float]] = analysis.compliance or [analysis.compliance_diagonal]
+    rows: Sequence[Sequence[float]] = analysis.compliance or [analysis.compliance_diagonal.tolist()]
     return matrix_table("Compliance C", "compliance", analysis.components, rows, display, "free")
 
 

@@ -91,7 +91,7 @@ def _finite(value: float) -> float | None:
 
 
 SETS = (
-    Field("set", "name", long_name="force, moment, speed, rate or acceleration"),
+    Field("set", "name", long_name="force, moment, speed, rate or acceleration", column="quantity"),
     Field("unit"),
     Field("least", lambda part: _finite(part.least), long_name="in whichever direction, SI"),
     Field("greatest", lambda part: _finite(part.greatest), long_name="in the best direction, SI"),

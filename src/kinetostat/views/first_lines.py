@@ -21,8 +21,8 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     """Return label and text of each line: pose and verdict, stiffness, softest direction, margin, and the load."""
     pose = pose_of(analysis.machine)
     lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
-    if analysis.compliance_diagonal:
-        felt = stiffness_sentence(analysis.components, analysis.compliance_diagonal, analysis.machine.display)
+    if analysis.compliance_diagonal.size:
+        felt = stiffness_sentence(analysis.components, analysis.compliance_diagonal.tolist(), analysis.machine.display)
         lines.append(("Stiffness", f"{felt} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
     if analysis.softest:
         lines.append(("Softest", softest_sentence(analysis.softest, analysis.machine.display)))

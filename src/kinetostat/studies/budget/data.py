@@ -7,7 +7,7 @@ import xarray as xr
 
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.budget.budget import STATISTICS, Budget
-from kinetostat.studies.datasets import ABOUT_STATUS, origin_of
+from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.units import KINDS
 
@@ -73,8 +73,7 @@ def budget_dataset(answer: Budget) -> xr.Dataset:
 
 def _labels(answer: Budget) -> xr.Dataset:
     """Coordinates and attributes of a list of poses."""
-    about = {"units": "", "kind": "", "log": 0, "field": "pose.number of the pose"}
-    coordinates: dict[str, Any] = {"pose": ("pose", np.arange(1, len(answer.status) + 1), about)}
+    coordinates: dict[str, Any] = {"pose": ("pose", np.arange(1, len(answer.status) + 1), ABOUT_POSES)}
     varied = [] if answer.poses is None else list(answer.poses.leaves)
     pairs = [] if answer.poses is None else zip(answer.poses.fields, answer.poses.values, strict=True)
     for field, values in pairs:

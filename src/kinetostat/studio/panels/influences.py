@@ -71,7 +71,7 @@ def contributions_text(report: Report, component: str) -> str:
     """
     analysis = report.analysis
     index = analysis.components.index(component)
-    compliance = analysis.compliance_diagonal[index]
+    compliance = float(analysis.compliance_diagonal[index])
     shares: dict[str, float] = {}
     for spring in analysis.attribution:
         shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance_share[index] or 0.0)

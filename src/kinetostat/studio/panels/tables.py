@@ -64,7 +64,7 @@ def _rows(analysis: Analysis, kind: str) -> list[list[float]] | None:
 
 
 def _diagonal(analysis: Analysis, kind: str) -> Sequence[float]:
-    return analysis.compliance_diagonal if kind == "C" else analysis.stiffness_diagonal
+    return (analysis.compliance_diagonal if kind == "C" else analysis.stiffness_diagonal).tolist()
 
 
 def matrix_table(analysis: Analysis, kind: str) -> str:

@@ -147,8 +147,8 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield as_table(springs_of(state, display), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
         yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
-    free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal]
-    tangent = tangent_table(state, free, analysis.stiffness_diagonal)
+    free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal.tolist()]
+    tangent = tangent_table(state, free, analysis.stiffness_diagonal.tolist())
     if tangent is not None:
         caption = (
             "Stiffness that further loads meet, beside that of the free state: 1/C with all other motions free, K with "

@@ -117,7 +117,7 @@ def _directions(answers: Answers) -> Table:
     heads = ("direction", "compliance C", "stiffness 1/C", "stiffness K", "mainly from")
     rows = []
     for i, name in enumerate(analysis.components):
-        soft, stiff = analysis.compliance_diagonal[i], analysis.stiffness_diagonal[i]
+        soft, stiff = float(analysis.compliance_diagonal[i]), float(analysis.stiffness_diagonal[i])
         free = math.inf if soft == 0.0 else 1.0 / soft
         values = [_shown_value(soft, f"compliance_{name}", "free", display)]
         values += [_shown_value(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
