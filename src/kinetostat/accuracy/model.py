@@ -303,8 +303,7 @@ def error_model(
     machine, others = given.machine, [path for path in columns if not path.startswith((POSE, LOAD))]
     if others:
         raise InputError(
-            f'"{others[0]}" is not a coordinate of the pose of {machine.name}, nor a load; '
-            "errors are of one machine."
+            f'"{others[0]}" is not a coordinate of the pose of {machine.name}, nor a load; errors are of one machine.'
         )
     posed = states_at(machine, columns, count) if columns else given
     with np.errstate(all="ignore"):  # poses without a place
