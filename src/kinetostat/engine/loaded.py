@@ -1,7 +1,7 @@
-"""Loaded states of slabs of points: a program for the first steps, then one for a step and the quantities, repeated.
+"""Loaded states of slabs of points: Newton's steps as a program that is repeated, and the quantities at their end.
 
-No formula lives here. The coordinates of the states are columns of the second program. Points at which this does not
-end surely in a stable state of rest, and machines whose equations cannot be reduced, are left to the solver for any
+No formula lives here. The coordinates of the states are columns of the programs. Points at which this does not end
+surely in a stable state of rest, and machines whose equations cannot be reduced, are left to the solver for any
 machine.
 """
 
@@ -135,7 +135,9 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
     closed = closes_inside(machine)
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
     directly: Fill = (
-        RestFill(machine, paths, quantities, closed) if cut else program_fill(machine, paths, quantities, closed)
+        RestFill(machine, paths, quantities, closed, bool(cut.legs))
+        if cut
+        else program_fill(machine, paths, quantities, closed)
     )
     every = FallingBack(directly, lambda: solved)
 
@@ -204,31 +206,47 @@ def _response_with_states(
     return response
 
 
-POINTS_TOGETHER = 2048
-"""Points whose coordinates at rest, up to some hundred of each, stay in the second cache level between two steps."""
+NUMBERS_TOGETHER = 2**18
+"""Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
+step takes them, and there are enough points for the call of a program to cost nothing beside them."""
 
 
 class RestFill:
-    """The fill of quantities at rest by two programs: first steps, and a step with the quantities where it begins."""
+    """The fill of quantities at rest.
 
-    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool) -> None:
-        """Trace both; arguments as for `program_fill`, of a machine whose loops can be cut."""
+    Where loops are cut at rods, small programs find the state, and one gives the quantities. Where legs close loops, a
+    step takes as long as the quantities, so that one program does both and is repeated.
+    """
+
+    def __init__(
+        self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool, legs: bool
+    ) -> None:
+        """Trace the programs.
+
+        Args:
+            machine, paths, quantities, closed: as for `program_fill`, of a machine whose loops can be cut.
+            legs: whether legs close loops.
+        """
         self._machine, self._closed, self._count = machine, closed, len(quantities)
         self._form, self._fixed = form_of(machine, paths)
         kind, objectives = Specimen(machine), tuple(((name, 1.0),) for name in quantities)
+        self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
         self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
-        plan = plan_for(machine, quantities)
-        self._step = program_of(
-            Recipe(objectives_of, kind, self._form, (objectives, None, closed, 0, True, plan, True))
-        )
+        arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities), legs)
+        self._step = program_of(Recipe(objectives_of, kind, self._form, arguments))
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
-        given = program_columns(self._machine, self._form, columns, len(status), self._closed)
-        most = min(len(status), POINTS_TOGETHER)
-        memory = [np.empty((self._step.rows, most)) for _ in range(2)]
-        for start in range(0, len(status), POINTS_TOGETHER):
-            part = slice(start, start + POINTS_TOGETHER)
+        count = len(status)
+        given = program_columns(self._machine, self._form, columns, count, self._closed)
+        if self._states is not None:
+            given += self._states.rest_coordinates(self._fixed, given, count)
+            self._step.run(self._fixed, given, results, status)
+            return
+        together = min(count, NUMBERS_TOGETHER // self._step.rows)
+        memory = [np.empty((self._step.rows, together)) for _ in range(2)]
+        for start in range(0, count, max(together, 1)):
+            part = slice(start, start + together)
             self._fill([column[part] for column in given], results[:, part], status[part], memory)
 
     def _fill(self, given: list[Array], results: Array, status: Codes, memory: Sequence[Array]) -> None:
@@ -239,7 +257,10 @@ class RestFill:
         for _ in range(MOST_NEWTON_STEPS):
             stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
             self._step.run(self._fixed, [*given, *states[:-1]], stepped, codes)
-            results[:, rows], status[rows] = stepped[: self._count], codes
+            if len(rows) == len(status):
+                results[:], status[:] = stepped[: self._count], codes
+            else:
+                results[:, rows], status[rows] = stepped[: self._count], codes
             moving = stepped[-1] > LAST_STEP**2
             if not moving.any():
                 break
