@@ -102,6 +102,7 @@ WORDS = {
     "bounds": 'a dictionary of limits, e.g. {"zeros": "1 mm"}',
     "more": "a whole number from 0",
     "tool_receptance": "the path of a CSV file",
+    "elevations": 'a range of angles, e.g. "0 deg:90 deg:7"',
     "tell": "a function of the steps done, of all steps, and of words on them",
 }
 """Words for an argument, by its name, which means the same in every function."""
