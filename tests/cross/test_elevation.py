@@ -131,10 +131,9 @@ def test_a_range_that_says_too_little_is_refused(telescope, over, word):
         elevation(telescope, over)
 
 
-def test_its_programs_are_those_of_the_free_machine_where_bearings_close_loops(telescope):
+def test_its_programs_are_about_the_state_that_has_programs(telescope):
     functions = functions_of(telescope, (), ())
-    assert not functions.rests
-    assert not functions.machine.loaded
+    assert functions.machine.loaded == functions.rests
     assert len(functions.shares.parts) > 0
 
 

@@ -41,6 +41,8 @@ SPOKEN = {
     "condition of K": "stiffness_condition",
     "singularity margin": "singularity_margin",
     "moving mass": "mass",
+    "first natural frequency": "frequency_1",
+    "displacement under load": "displacement",
 }
 """The quantity that each row of `compare` shows."""
 
@@ -111,9 +113,14 @@ def test_analyze_path_requirements_and_compare_show_the_same_numbers(capsys, tmp
             agree(quantity, verdict["worst"], numbers[quantity])
             assert verdict["unit"] == QUANTITIES[quantity].unit
     numbers["stiffness_condition"] = data["stiffness_condition"]
+    numbers["frequency_1"] = answer(capsys, "modes", name, *changes)["modes"][0]["frequency"]
+    rest = answer(capsys, "analyze", name, "--loaded", *changes)
+    moved = zip(rest["components"], rest["displacement"], strict=True)
+    numbers["displacement"] = math.hypot(*(value for part, value in moved if not part.startswith("r")))
     for row in answer(capsys, "compare", name, f"{name}:tool.mass=6 kg", *changes)["rows"]:
         agree(row["name"], row["values"][0], numbers.get(SPOKEN[row["name"]]))
-        assert row["units"] == (QUANTITIES[SPOKEN[row["name"]]].unit if SPOKEN[row["name"]] in QUANTITIES else "1")
+        unit = {"stiffness_condition": "1", "displacement": "m"}.get(SPOKEN[row["name"]])
+        assert row["units"] == (unit or QUANTITIES[SPOKEN[row["name"]]].unit)
 
 
 @each_machine
