@@ -58,8 +58,10 @@ class DrivesPanel(Panel):
                 self.place = ui.slider(min=0, max=FRAMES, value=0, on_change=self._go).props("dense")
                 self.place.props('aria-label="time"').classes("grow").mark("drives-place")
                 self.time = ui.label("").classes("note").mark("drives-time")
-            self.curves = CurveView("curves of the drives over the time of the motion").mark("drives-curves")
-        self.further = ui.html("", sanitize=False).mark("drives-further")
+            self.curves = (
+                CurveView("curves of the drives over the time of the motion").style("flex: none").mark("drives-curves")
+            )
+            self.further = ui.html("", sanitize=False).style("flex: none").mark("drives-further")
         self.content.set_visibility(False)
 
     def shows(self, report: Report) -> bool:
