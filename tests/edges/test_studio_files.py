@@ -1,13 +1,16 @@
 """What goes into the studio and out of it: the text of a machine, files, links, tabs and what a server refuses."""
 
 import asyncio
+import gc
 import io
 import re
+import weakref
 import zipfile
 from pathlib import Path
 
 import httpx
 import pytest
+from nicegui import background_tasks, ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse
@@ -235,6 +238,25 @@ def test_a_page_that_is_gone_computes_nothing_more():
             client.delete()
         await page.settled()
         assert len(page.calls) == count
+
+    on_page(steps)
+
+
+def test_a_page_that_is_gone_is_not_kept_in_memory():
+    async def steps(page):
+        before = set(background_tasks.running_tasks)
+        other = await page.another()
+        client = other.user.client
+        elements = [weakref.ref(element) for element in client.elements.values() if not isinstance(element, ui.upload)]
+        with client:
+            client.delete()
+        del other, client
+        while of_the_page := set(background_tasks.running_tasks) - before:
+            await asyncio.wait(of_the_page)
+        assert page.user.client  # the stand-ins of NiceGUI's functions are those of this tab again, and keep it
+        gc.collect()
+        assert len(elements) > 100
+        assert not [kept for element in elements if (kept := element())]
 
     on_page(steps)
 

@@ -166,11 +166,17 @@ def in_quotes(text: str) -> str:
 def upload_field(
     on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str, suffix: str = ".toml"
 ) -> ui.upload:
-    """A hidden field that takes one file from the browser, by default TOML; `pickFiles` of it opens the dialogue."""
+    """A hidden field that takes one file from the browser, by default TOML; `pickFiles` of it opens the dialogue.
+
+    FastAPI keeps the function of every field that it has served. What is called by it is therefore let go with the
+    page, which would stay in memory otherwise.
+    """
     too_large = f"The file is larger than {LARGEST_FILE >> 20} MiB, the limit for a file."
+    called = {"upload": on_upload, "refuse": refuse}
+    ui.context.client.on_delete(lambda: called.clear())
     field = ui.upload(
-        on_upload=on_upload, on_rejected=lambda: refuse(too_large), auto_upload=True,
-        max_file_size=LARGEST_FILE, max_files=1,
+        on_upload=lambda event: called["upload"](event), on_rejected=lambda: called["refuse"](too_large),
+        auto_upload=True, max_file_size=LARGEST_FILE, max_files=1,
     )  # fmt: skip
     return field.props(f'accept="{suffix}" aria-hidden="true"').classes("unseen").mark(mark)
 
