@@ -31,7 +31,7 @@ PATIENCE = 300
 
 def _of_the_studio(task: str) -> bool:
     """Whether a task ends by itself once what was asked for is done; a timer never does."""
-    return "studio" in task and "RunPanel.refresh" not in task
+    return ("studio" in task or "upload_field" in task) and "RunPanel.refresh" not in task
 
 
 class Page:
