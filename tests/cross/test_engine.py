@@ -29,7 +29,7 @@ from numeric import lost
 
 Columns = dict[str, Array]
 
-UNLOADED = [quantity for quantity in QUANTITIES.values() if not (quantity.loaded or quantity.modal)]
+UNLOADED = [q for q in QUANTITIES.values() if not (q.loaded or q.modal or q.driven == "acceleration")]
 NAMES = tuple(quantity.name for quantity in UNLOADED)
 DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
 AGREEMENT = 5e-12

@@ -255,31 +255,30 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path, new
 
 
 @needs_chromium
-def test_machines_whose_legs_close_loops_rest_in_a_page(tmp_path):
+def test_machines_whose_legs_close_loops_rest_in_a_page(tmp_path, new_tab):
     names = [f"displacement_{component}" for component in ("rx", "ry", "rz", "x", "y", "z")]
-    with browser() as new_tab:
-        for name in ("delta", "tripteron"):
-            machine = load(name, ["load.force=[5, -3, -40]"])
-            page = export(machine, tmp_path / f"{name}.html")[0]
-            assert page.stat().st_size < LARGEST_PAGE
-            home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
-            rows = np.array([*home.values()]) + np.random.default_rng(4).uniform(-0.03, 0.03, (20, 3))
-            table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
-            expected = np.stack([evaluate(machine, table, names).values[each] for each in names], axis=1)
-            watched = new_tab()
-            ready(watched, page.as_uri())
-            found = watched.tab.evaluate(
-                """rows => rows.map(row => {
-                    const loaded = new Float64Array(6);
-                    opened.programs.loaded(row, loaded, restOf(row, opened.data.rest, opened.programs));
-                    return Array.from(loaded);
-                })""",
-                rows.tolist(),
-            )
-            sizes = np.abs(expected).max(axis=0)
-            assert np.isfinite(expected).all()
-            assert (np.abs(np.array(found) - expected) / sizes).max() < 1e-9, name
-            assert not watched.complaints
+    for name in ("delta", "tripteron"):
+        machine = load(name, ["load.force=[5, -3, -40]"])
+        page = export(machine, tmp_path / f"{name}.html")[0]
+        assert page.stat().st_size < LARGEST_PAGE
+        home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
+        rows = np.array([*home.values()]) + np.random.default_rng(4).uniform(-0.03, 0.03, (20, 3))
+        table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
+        expected = np.stack([evaluate(machine, table, names).values[each] for each in names], axis=1)
+        watched = new_tab()
+        ready(watched, page.as_uri())
+        found = watched.tab.evaluate(
+            """rows => rows.map(row => {
+                const loaded = new Float64Array(6);
+                opened.programs.loaded(row, loaded, restOf(row, opened.data.rest, opened.programs));
+                return Array.from(loaded);
+            })""",
+            rows.tolist(),
+        )
+        sizes = np.abs(expected).max(axis=0)
+        assert np.isfinite(expected).all()
+        assert (np.abs(np.array(found) - expected) / sizes).max() < 1e-9, name
+        assert not watched.complaints
 
 
 @needs_chromium
