@@ -95,7 +95,7 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
-    native = count >= NATIVE_FROM and over_scalars(machine, tuple(paths), quantities)
+    native = count >= NATIVE_FROM and have_programs(machine, tuple(paths), quantities)
     if native and count < NATIVE_FROM_WITH_LEGS and rest_numbers(machine, quantities):
         machine_cut = _cut(machine, tuple(paths))
         native = machine_cut is not None and not machine_cut.legs
@@ -130,7 +130,7 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
         return partial(_fill_of_cables, machine, tuple(quantities))
     plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
-    if plain or not over_scalars(machine, tuple(paths), quantities):
+    if plain or not have_programs(machine, tuple(paths), quantities):
         return solved
     closed = closes_inside(machine)
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
@@ -324,7 +324,7 @@ _cut = lru_cache(PROGRAMS_KEPT)(cut_machine)
 _reducible = lru_cache(PROGRAMS_KEPT)(reducible)
 
 
-def over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
+def have_programs(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
     """Whether programs can compute all that these quantities need, wherever parameters at these leaf paths are."""
     wanted, needed = [QUANTITIES[name] for name in quantities], rest_numbers(machine, quantities)
     if any(quantity.cut or quantity.cables for quantity in wanted):

@@ -23,7 +23,7 @@ from kinetostat.engine.form import (
     step_of,
 )
 from kinetostat.engine.kernel import closes_inside
-from kinetostat.engine.loaded import over_scalars
+from kinetostat.engine.loaded import have_programs
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.frozen import dataclass
@@ -144,7 +144,9 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     acting = any(value or path in paths for path, value in known.items() if LOADS.intersection(path.split(".")))
     rests = acting and cut_machine(machine, paths) is not None
     needing = [
-        name for name in wanted if not (over_scalars(machine, paths, [name]) and (rests or not QUANTITIES[name].loaded))
+        name
+        for name in wanted
+        if not (have_programs(machine, paths, [name]) and (rests or not QUANTITIES[name].loaded))
     ]
     if needing:
         raise InputError(

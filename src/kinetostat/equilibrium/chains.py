@@ -1,4 +1,4 @@
-"""Legs as rows of screw motions with springs and masses, of which `mechanism` is made, and the units of their numbers.
+"""Legs as rows of screw motions with springs and masses, and the units of their numbers; `mechanism` is made of them.
 
 Nothing is solved here. Units, axes and origin are those of `mechanism`.
 

@@ -211,7 +211,7 @@ class Tangent:
         return definite(elimination(rows), rows)
 
     def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
-        """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""
+        """Return each actuator with its load after the step (N or N·m), positive where it pulls the actuator open."""
         mechanism, carrier, terms = self.mechanism, self.carrier, self.place.terms
         force = mechanism.force[0]
         loads = loads_of_rods(self.rods, self.place.pulls, self.twist, force)

@@ -83,7 +83,7 @@ def _finite(matrix: Matrix) -> Array:
 
 
 def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array, Array]]:
-    """The matrix as a sum of dyads of its eigenscrews: for each, twice line . moment, its line and its moment.
+    """Return the eigenscrews of a matrix, the sum of their dyads: twice line . moment, the line and the moment.
 
     They are computed in a unit of length in which both diagonal blocks have the same trace. A line that is only
     round-off is set to zero.

@@ -288,7 +288,7 @@ def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
 
 
 def refuse_tensions(machine: Machine) -> None:
-    """Refuse a machine whose tensions are to be chosen: its actuators are commanded by forces, not by coordinates.
+    """Refuse a machine whose file asks for chosen tensions: forces command its actuators, not coordinates.
 
     Raises:
         InputError: it is such a machine.

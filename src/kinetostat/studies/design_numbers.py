@@ -30,7 +30,7 @@ from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_qu
 from kinetostat.tolerances import EQUAL_DESIGNS
 
 PERCENTILE = 95.0
-"""Percent of the poses that are at least as good as the value shown."""
+"""Share of the poses, in percent, that are at least as good as the value that is shown."""
 BUILT_ERROR = "built_error"
 """A number beside the quantities: the error that 95 % of the machines within the tolerances of a file do not exceed."""
 DISPLACEMENT = "displacement"

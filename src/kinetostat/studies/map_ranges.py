@@ -16,7 +16,7 @@ from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.spec.ranges import parse_range
 
 MOST_RANGES = 2
-"""Number of ranges at most: the axes of a map."""
+"""Greatest number of ranges, because a map has two axes."""
 PROBE_STEPS = 48
 """Number of poses to each side that are tried along a coordinate."""
 LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}

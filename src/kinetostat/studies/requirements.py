@@ -135,7 +135,7 @@ def motor_requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
 
 
 def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
-    """Judge whether a motor does a motion: the greatest share of its limits that is used is at most 1."""
+    """Judge whether a motor can do a motion: it uses at most its limits, a share of 1."""
     known = motors.read_catalogue()
     if requirement.catalogue:
         motions.check_lines("catalogue", requirement.catalogue)

@@ -142,14 +142,16 @@ class LoadedState(Immutable):
             known, statics = springs(free.configuration), clean_statics(free.statics)
         blocks = free_stiffnesses(self.tangent, self.compliance, self.machine.family.components) or {}
         weakest = {name: softest(block, name, known, statics) for name, block in blocks.items()}
-        return {name: _whole_shares(direction) for name, direction in weakest.items() if direction is not None}
+        return {
+            name: _with_shares_of_springs(direction) for name, direction in weakest.items() if direction is not None
+        }
 
     def __repr__(self) -> str:
         return f"<{self.machine.name!r} under load: {self.rest.word}>"
 
 
-def _whole_shares(direction: Softest) -> Softest:
-    """The direction with shares that add up to 1: those of springs alone, without what tension and weight do."""
+def _with_shares_of_springs(direction: Softest) -> Softest:
+    """Return the direction with the shares of springs alone, scaled to add up to 1; tension and weight are left out."""
     whole = sum(share for _, share in direction.shares) or 1.0
     shares, kinds = (tuple((n, share / whole) for n, share in row) for row in (direction.shares, direction.kinds))
     return replace(direction, shares=shares, kinds=kinds)
@@ -224,7 +226,7 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
 
 
 def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> LoadedState:
-    """The answer for a machine that comes to rest, stable or not."""
+    """Return the answer for a machine that comes to rest, whether its rest is stable or not."""
     machine, response = state.machine, state.free
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)

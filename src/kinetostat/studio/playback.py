@@ -29,6 +29,56 @@ Poses: TypeAlias = dict[str, Array]
 """Values of each field along a path, SI."""
 
 
+class Player:
+    """A slider, and a button that lets it run to its end and stops it; each is built where the page is being built."""
+
+    def __init__(self, period: float, is_busy: Callable[[], bool]) -> None:
+        """Prepare it.
+
+        Args:
+            period: from one step to the next, s.
+            is_busy: whether the last step is still being drawn; the next one then waits.
+        """
+        self._period, self._is_busy = period, is_busy
+        self._timer: ui.timer | None = None
+
+    def build_slider(self, last: int, on_change: Callable[[], None]) -> ui.slider:
+        """Build the slider, whose steps are 0 to `last`."""
+        self.last = last
+        self.place = ui.slider(min=0, max=last, value=0, on_change=on_change).props("dense")
+        return self.place
+
+    def build_button(self, meaning: str, mark: str) -> ui.button:
+        """Build the button."""
+        self.button = icon_button("play_arrow", meaning, self._toggle, mark)
+        return self.button
+
+    def pause(self) -> None:
+        """Stop the slider where it is."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
+        self.button.props("icon=play_arrow")
+
+    def _toggle(self) -> None:
+        if self._timer is not None:
+            self.pause()
+            return
+        if self.place.value >= self.last:
+            self.place.set_value(0)
+        with self.button:  # a timer lives while something is played: an idle page asks for nothing
+            self._timer = ui.timer(self._period, self._step)
+        self.button.props("icon=pause")
+
+    def _step(self) -> None:
+        if self._is_busy():
+            return
+        if self.place.value >= self.last:
+            self.pause()
+        else:
+            self.place.set_value(int(self.place.value) + 1)
+
+
 class Playback:
     """A button beside the views of the picture, and what it opens: a path, a slider along it, play and pause."""
 
@@ -40,23 +90,22 @@ class Playback:
             on_change: called after every change of the machine.
             is_busy: whether the last pose is still being drawn; the next one then waits.
         """
-        self._session, self._on_change, self._is_busy = session, on_change, is_busy
+        self._session, self._on_change, self._player = session, on_change, Player(PERIOD, is_busy)
         self._path: Poses = {}
         self._kept: list[dict[str, float]] = []
         with icon_button("route", "Follow a path of poses", lambda: self.menu.open(), "path"):
             self.menu = ui.menu().props("no-parent-event persistent").classes("playback")
         with self.menu:
             self.about = ui.label(EMPTY).classes("note").mark("path-about")
-            self.place = ui.slider(min=0, max=1, value=0, on_change=self._go).props("dense").mark("path-place")
+            self.place = self._player.build_slider(1, self._go).mark("path-place")
             with ui.row().classes("panel-tools"):
-                self.play = icon_button("play_arrow", "Play or pause", self._toggle, "path-play")
+                self.play = self._player.build_button("Play or pause", "path-play")
                 icon_button("add_location_alt", "Keep this pose", self._keep, "path-keep")
                 self.upload = upload_field(self._open, refuse, "path-upload", ".csv")
                 icon_button("folder_open", "Open a CSV file of poses", self._pick, "path-open")
                 icon_button("delete_outline", "Forget the path", self.clear, "path-clear")
                 ui.space()
                 icon_button("close", "Close", self.menu.close, "path-close")
-        self._timer: ui.timer | None = None
         self._show()
 
     @property
@@ -96,40 +145,13 @@ class Playback:
         self._show()
 
     def _show(self) -> None:
-        self._pause()
-        self.place.props(f"max={max(self.count - 1, 1)}").set_value(0)
+        self._player.pause()
+        self._player.last = max(self.count - 1, 1)
+        self.place.props(f"max={self._player.last}").set_value(0)
         self.place.set_enabled(self.count > 1)
         self.play.set_enabled(self.count > 1)
         kept = f"{len(self._kept)} kept pose{'s' if len(self._kept) > 1 else ''}. " if self._kept else ""
         self.about.set_text(f"{kept}A path of {self.count} poses." if self.count > 1 else kept + EMPTY)
-
-    def _toggle(self) -> None:
-        if self._timer is None:
-            self._play()
-        else:
-            self._pause()
-
-    def _play(self) -> None:
-        """Start a timer, which lives while the path is played: an idle page asks for nothing."""
-        if self.place.value >= self.count - 1:
-            self.place.set_value(0)
-        with self.menu:
-            self._timer = ui.timer(PERIOD, self._step)
-        self.play.props("icon=pause")
-
-    def _pause(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer = None
-        self.play.props("icon=play_arrow")
-
-    def _step(self) -> None:
-        if self._is_busy():
-            return
-        if self.place.value >= self.count - 1:
-            self._pause()
-        else:
-            self.place.set_value(int(self.place.value) + 1)
 
     def _go(self) -> None:
         """Move the machine to the pose under the slider."""
@@ -139,7 +161,7 @@ class Playback:
         try:
             self._session.move({path: float(column[at]) for path, column in self._path.items()})
         except InputError as error:
-            self._pause()
+            self._player.pause()
             refuse(str(error))
         else:
             self._on_change()

@@ -62,7 +62,7 @@ def is_mathematics(text: str) -> bool:
 
 
 def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
-    """Return the width of the widest of some labels beside an axis, inches."""
+    """Return the width of the widest label, inches; the labels stand beside an axis."""
     font = FontProperties(family=[*families()], size=size)
     widths = (text_to_path.get_text_width_height_descent(drawable(label), font, False)[0] for label in labels)
     return float(max(widths, default=0.0)) / POINTS_PER_INCH

@@ -17,6 +17,7 @@ from kinetostat.studio.answers import MotionRequest, Report, drives_along, finit
 from kinetostat.studio.elements import CurveView, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
+from kinetostat.studio.playback import Player
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import paragraph
 from kinetostat.views.drives import DRIVES
@@ -45,7 +46,7 @@ class DrivesPanel(Panel):
         self._asked: Machine | None = None
         self._text = ""
         self._waits = False  # for the picture of the last frame
-        self._timer: ui.timer | None = None
+        self._player = Player(PERIOD, lambda: self._waits)
         self._lane = Lane(drives_along, self._deliver)
         with ui.row().classes("panel-tools"):
             self.upload = upload_field(self._open, refuse, "drives-upload", ".csv")
@@ -54,8 +55,8 @@ class DrivesPanel(Panel):
         self.about = ui.html(paragraph(NO_MOTION), sanitize=False).mark("drives-about")
         with ui.element("div").classes("vibration") as self.content:
             with ui.row().classes("panel-tools"):
-                self.play = icon_button("play_arrow", "Play or pause the motion", self._toggle, "drives-play")
-                self.place = ui.slider(min=0, max=FRAMES, value=0, on_change=self._go).props("dense")
+                self.play = self._player.build_button("Play or pause the motion", "drives-play")
+                self.place = self._player.build_slider(FRAMES, self._go)
                 self.place.props('aria-label="time"').classes("grow").mark("drives-place")
                 self.time = ui.label("").classes("note").mark("drives-time")
             self.curves = (
@@ -73,17 +74,17 @@ class DrivesPanel(Panel):
             self._ask()
 
     def leave(self) -> None:
-        self._pause()
+        self._player.pause()
 
     def close(self) -> None:
-        self._pause()
+        self._player.pause()
         self._lane.close()
 
     def _ask(self) -> None:
         """Compute what the motion asks of the machine as it is now."""
         if self._session is None:
             return
-        self._pause()
+        self._player.pause()
         self._asked = self._session.machine
         self._lane.ask(MotionRequest(self._session.machine, self._text))
 
@@ -123,11 +124,11 @@ class DrivesPanel(Panel):
         label, unit, lines = curves_of(answer, str(self.kind.value), times)
         shown = [{"name": name, "values": finite(row)} for name, row in lines]
         labels = {"x": "time (s)", "y": label}
-        more = {"signed": True, "here": self._moment, "across": "s", "unit": unit}
+        more = {"signed": True, "here": self._time_shown, "across": "s", "unit": unit}
         self.curves.run_method("show", {"x": finite(times), "lines": shown, "label": labels, **more})
 
     @property
-    def _moment(self) -> float:
+    def _time_shown(self) -> float:
         """The time under the slider, s."""
         if self._answer is None:
             return 0.0
@@ -138,42 +139,18 @@ class DrivesPanel(Panel):
         """Move the machine to where it is at the time under the slider."""
         if self._answer is None or self._session is None or self._asked is None:
             return
-        motion, moment = self._answer.motion, self._moment
+        motion, moment = self._answer.motion, self._time_shown
         self.time.set_text(f"{moment:.3f} s")
         self.curves.run_method("mark", moment)
         pose = {POSE + name: float(np.interp(moment, motion.times, row)) for name, row in motion.path.pose.items()}
         try:
             self._session.move(pose)
         except InputError as error:
-            self._pause()
+            self._player.pause()
             refuse(str(error))
         else:
             self._waits = True
             self.changed()
-
-    def _toggle(self) -> None:
-        if self._timer is not None:
-            self._pause()
-            return
-        if self.place.value >= FRAMES:
-            self.place.set_value(0)
-        with self.content:  # a timer lives while the motion is played: an idle page asks for nothing
-            self._timer = ui.timer(PERIOD, self._step)
-        self.play.props("icon=pause")
-
-    def _pause(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer = None
-        self.play.props("icon=play_arrow")
-
-    def _step(self) -> None:
-        if self._waits:
-            return
-        if self.place.value >= FRAMES:
-            self._pause()
-        else:
-            self.place.set_value(int(self.place.value) + 1)
 
 
 def _apart_from_pose(machine: Machine) -> tuple[object, ...]:
