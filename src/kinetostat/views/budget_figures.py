@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +10,12 @@ from kinetostat.studies.budget.budget import Budget
 from kinetostat.studies.budget.data import budget_dataset
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.budget import ranked_by
-from kinetostat.views.figures import COLOURS, STYLE, contour_maps, curves, fix_layout, note_setting, set_title
+from kinetostat.views.figures import (
+    COLOURS,
+    contour_maps,
+    curves,
+    new_figure,
+)
 from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 
@@ -61,19 +65,15 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
         "largest single tolerances": {budget.parts[i].words: rows[:, i].tolist() for i in order},
     }
     heights = [len(bars) + 0.6 for bars in panels.values()]
-    with mpl.rc_context(STYLE):
-        beside = max(LEAST_LABEL_WIDTH, width_of(label for bars in panels.values() for label in bars))
-        figure = Figure(figsize=(beside + 2.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
+    beside = max(LEAST_LABEL_WIDTH, width_of(label for bars in panels.values() for label in bars))
+    many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
+    with new_figure((beside + 2.4, 1.4 + 0.24 * sum(heights)), title.format(budget.machine.name), many) as figure:
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
         for panel, (name, bars) in zip(axes, panels.items(), strict=True):
             _bars(panel, name, bars, names)
         axes[-1].set_xlabel("share of the variance (%)")
         if len(names) > 1:
             axes[-1].legend(loc="lower right")
-        set_title(figure, title.format(budget.machine.name))
-        many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
-        note_setting(figure, many)
-        fix_layout(figure)
     return figure
 
 

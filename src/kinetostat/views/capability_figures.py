@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from functools import partial
 from itertools import combinations
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from kinetostat.studies.capability import Capability, CapabilitySet
 from kinetostat.studies.setting import setting_of
 from kinetostat.tolerances import DEPENDENT
 from kinetostat.views.capability import TITLES
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 BEYOND = 3.0
@@ -67,20 +66,17 @@ def capability_figure(
     """
     rows = _sets_with_planes(answer, sets)
     columns = max(len(planes) for _, planes in rows)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(0.5 + 2.3 * columns, 0.9 + 2.25 * len(rows)), layout="constrained")
+    with new_figure(
+        (0.5 + 2.3 * columns, 0.9 + 2.25 * len(rows)),
+        title.format(answer.machine.name),
+        setting_of(answer.machine),
+        "dashed: what the drives allow in every direction of space; forces and moments beside the loads that count",
+    ) as figure:
         panels = figure.subplots(len(rows), columns, squeeze=False)
         for place, (row, (part, planes)) in enumerate(zip(panels, rows, strict=True)):
             for panel in row[len(planes) :]:
                 panel.set_visible(False)
             _draw_row(answer, part, row, planes, COLOURS[place])
-        set_title(figure, title.format(answer.machine.name))
-        note_setting(
-            figure,
-            setting_of(answer.machine),
-            "dashed: what the drives allow in every direction of space; forces and moments beside the loads that count",
-        )
-        fix_layout(figure)
     return figure
 
 

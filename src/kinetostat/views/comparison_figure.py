@@ -4,7 +4,6 @@ import math
 import string
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from kinetostat.display import Display
 from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.setting import frame_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 WIDE = 30.0
@@ -37,10 +36,10 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
     panels = [panel for panel in _panels(comparison) if panel[1]]
     lines = [panels[i : i + PANELS_IN_A_ROW] for i in range(0, len(panels), PANELS_IN_A_ROW)]
     sizes = [[0.9 + 0.55 * len(bars) for _, bars in line] for line in lines]
-    with mpl.rc_context(STYLE):
-        width = max(sum(line) + 0.6 * len(line) + 0.6 for line in sizes)
-        height = 2.3 * len(lines) + 0.6 + 0.17 * len(comparison.designs)
-        figure = Figure(figsize=(width, height), layout="constrained")
+    width = max(sum(line) + 0.6 * len(line) + 0.6 for line in sizes)
+    height = 2.3 * len(lines) + 0.6 + 0.17 * len(comparison.designs)
+    over = f"mean (bars) and worst (dots) {comparison.where}" if comparison.where else "at the pose of each design"
+    with new_figure((width, height), title.format(over)) as figure:
         rows = figure.add_gridspec(len(lines), 1)
         for row, (line, widths) in enumerate(zip(lines, sizes, strict=True)):
             cells = rows[row].subgridspec(1, len(line), width_ratios=widths)
@@ -56,9 +55,6 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
         frames = dict.fromkeys(frame_of(design.machine) for design in comparison.designs)
         legend = f"in {' or '.join(frames)}"
         figure.legend(handles=handles, loc="outside lower left", title=legend, title_fontsize=6.5, alignment="left")
-        over = f"mean (bars) and worst (dots) {comparison.where}" if comparison.where else "at the pose of each design"
-        set_title(figure, title.format(over))
-        fix_layout(figure)
     return figure
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,7 +20,7 @@ from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, new_figure, note_setting
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
@@ -158,8 +157,7 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
             rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
             rows.append((curves.force * force.factor, force.label("force" if length == "m" else "torque"), chosen))
     rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.6, 0.9 + 1.7 * len(rows)), layout="constrained")
+    with new_figure((6.6, 0.9 + 1.7 * len(rows)), title.format(answer.machine.name)) as figure:
         panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
         for panel, (values, label, chosen) in zip(panels, rows, strict=True):
             _lines_over_time(panel, answer, values, chosen)
@@ -168,9 +166,7 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
         if len(answer.drives) <= MOST_LEGEND:
             handles, names = panels[-1].get_legend_handles_labels()
             figure.legend(handles, names, loc="outside right upper", frameon=False, fontsize="small")
-        set_title(figure, title.format(answer.machine.name))
         _note(figure, answer)
-        fix_layout(figure)
     return figure
 
 
@@ -194,8 +190,7 @@ def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors mu
     curves, display = _curves(answer), answer.machine.display
     kinds = [(True, PER_MINUTE, "speed (1/min)", "torque"), (False, 1.0, "speed (m/s)", "force")]
     shown = [kind for kind in kinds if any(drive.rotary is kind[0] for drive in answer.drives)]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.6, 0.9 + 3.4 * len(shown)), layout="constrained")
+    with new_figure((6.6, 0.9 + 3.4 * len(shown)), title.format(answer.machine.name)) as figure:
         for panel, (rotary, factor, label, what) in zip(
             figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True
         ):
@@ -224,9 +219,7 @@ def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors mu
                 loc="upper left",
                 bbox_to_anchor=(1.0, 1.0),
             )
-        set_title(figure, title.format(answer.machine.name))
         _note(figure, answer)
-        fix_layout(figure)
     return figure
 
 
@@ -236,8 +229,7 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
     name = "" if answer.worst is None else answer.worst[1]
     k = next(i for i, drive in enumerate(answer.drives) if drive.name == name)
     scale = display.scale(answer.drives[k].unit)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.6, 3.2), layout="constrained")
+    with new_figure((6.6, 3.2), title.format(answer.machine.name, name)) as figure:
         panel = figure.add_subplot()
         times = answer.motion.times
         for i, part in enumerate(PARTS):
@@ -247,9 +239,7 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
         panel.set_xlabel("time (s)")
         panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
         panel.legend(frameon=False, fontsize="small", ncols=3)
-        set_title(figure, title.format(answer.machine.name, name))
         _note(figure, answer)
-        fix_layout(figure)
     return figure
 
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,7 +19,7 @@ from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.figures import COLOURS, look_of, new_figure
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.options import LAW_TOLERANCE
 from kinetostat.views.question import (
@@ -214,8 +213,7 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
     panels = [panel for panel in panels if any(np.isfinite(values).any() for _, _, values in panel[2])]
     rows = -(-len(panels) // 2)
     heights = display.scale("rad")
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 0.7 + 2.0 * rows), layout="constrained")
+    with new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), setting_of(answer.machine)) as figure:
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
         for panel, (what, unit, curves) in zip(axes, panels, strict=False):
             small = what.startswith(("displacement", "rotation", "error", "correction"))
@@ -232,9 +230,6 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
         for panel in list(figure.axes)[max(0, len(panels) - 2) : len(panels)]:
             panel.set_xlabel(heights.label("elevation"))
             panel.tick_params(labelbottom=True)
-        set_title(figure, title.format(answer.machine.name))
-        note_setting(figure, setting_of(answer.machine))
-        fix_layout(figure)
     return figure
 
 

@@ -2,7 +2,8 @@
 
 import io
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -72,6 +73,25 @@ Tell: TypeAlias = Callable[[int, int, str], None]
 """Called with how many figures are done, how many there are, and which one comes next."""
 
 
+@contextmanager
+def new_figure(size: tuple[float, float], title: str | None = None, *notes: str) -> Iterator[Figure]:
+    """Give an empty figure to fill, in the style of all figures; at the end write title and notes, and fix the layout.
+
+    Args:
+        size: width and height, inches.
+        title: over the figure; without one (None), the panels take its room.
+        notes: small lines below the figure; see `note_setting`.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        yield figure
+        if title is not None:
+            set_title(figure, title)
+        if notes:
+            note_setting(figure, *notes)
+        fix_layout(figure)
+
+
 def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
     """One panel per quantity over the two dimensions of the dataset, contours labelled with their values.
 
@@ -83,8 +103,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     across, up = dataset["status"].dims
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.75 * columns + 0.3, 2.45 * rows + 0.4), layout="constrained")
+    with new_figure((2.75 * columns + 0.3, 2.45 * rows + 0.4), title, *setting_lines(dataset)) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         x, x_label = axis_values(dataset, str(across))
         y, y_label = axis_values(dataset, str(up))
@@ -97,9 +116,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
             set_axis_scales(panel, dataset, str(across), str(up))
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
-        set_title(figure, title)
-        note_setting(figure, *setting_lines(dataset))
-        fix_layout(figure)
+    with mpl.rc_context(STYLE):
         for contours in lines:
             _write_levels(contours)
     return figure
@@ -115,14 +132,10 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
     """
     (across,) = dataset["status"].dims
     units = list(dict.fromkeys(dataset[name].attrs["units"] for name in names))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(3.4 * len(units) + 0.2, 3.0), layout="constrained")
+    with new_figure((3.4 * len(units) + 0.2, 3.0), title, *setting_lines(dataset)) as figure:
         for panel, unit in zip(figure.subplots(1, len(units), squeeze=False).flat, units, strict=True):
             shown = [name for name in names if dataset[name].attrs["units"] == unit]
             _curve_panel(panel, dataset, str(across), shown)
-        set_title(figure, title)
-        note_setting(figure, *setting_lines(dataset))
-        fix_layout(figure)
     return figure
 
 

@@ -6,7 +6,6 @@ Nothing is computed here.
 from collections.abc import Callable
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -22,17 +21,14 @@ from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import (
-    STYLE,
     axis_values,
     contour_maps,
     curves,
     fill_regions,
-    fix_layout,
     look_of,
-    note_setting,
+    new_figure,
     region_colours,
     set_axis_scales,
-    set_title,
     setting_lines,
 )
 from kinetostat.views.grid import frequent_sets, quantities_of
@@ -81,8 +77,7 @@ def carrying_map(carrying: Carrying, title: str) -> Figure:
     across, up = (str(dim) for dim in dataset["status"].dims)
     named = [f"{name}: {100.0 * n / dataset['status'].size:.0f} %" for name, n in frequent_sets(carrying)]
     colours = region_colours(max(len(named), 1))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(4.6, 4.4 + ROW * len(named)), layout="constrained")
+    with new_figure((4.6, 4.4 + ROW * len(named)), title) as figure:
         panel = figure.subplots()
         (x, x_label), (y, y_label) = axis_values(dataset, across), axis_values(dataset, up)
         codes = dataset["carrying"].transpose(up, across).values
@@ -95,8 +90,6 @@ def carrying_map(carrying: Carrying, title: str) -> Figure:
         patches += [Patch(color="#eeeeee", label="no result")] if (codes < 0).any() else []
         about = "\n".join(line for line in setting_lines(dataset) if line)
         figure.legend(handles=patches, loc="outside lower center", ncols=1, title=about, title_fontsize=6.5)
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
@@ -122,9 +115,10 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
     groups = {unit: [n for n in names if QUANTITIES[n].unit == unit] for unit in (QUANTITIES[n].unit for n in names)}
     fields = [pair for pair in zip(answers.poses.fields, answers.poses.values, strict=True) if np.ptp(pair[1]) > 0.0]
     kinds = list(dict.fromkeys(field.quantity.kind for field, _ in fields))
-    with mpl.rc_context(STYLE):
-        rows = len(groups) + len(kinds)
-        figure = Figure(figsize=(6.6, 0.7 + 1.9 * len(groups) + 1.25 * len(kinds)), layout="constrained")
+    rows = len(groups) + len(kinds)
+    with new_figure(
+        (6.6, 0.7 + 1.9 * len(groups) + 1.25 * len(kinds)), title.format(answers.machine.name), *_notes(answers)
+    ) as figure:
         ratios = [1.9] * len(groups) + [1.25] * len(kinds)
         panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios).flat)
         for panel, (unit, members) in zip(panels, groups.items(), strict=False):
@@ -137,9 +131,6 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
             scale = answers.machine.display.scale(shown[0][0].unit)
             _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
         panels[-1].set_xlabel("pose")
-        set_title(figure, title.format(answers.machine.name))
-        note_setting(figure, *_notes(answers))
-        fix_layout(figure)
     return figure
 
 

@@ -8,7 +8,6 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
@@ -23,7 +22,7 @@ from kinetostat.studies.guideline_sentences import limit_of
 from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title, slim_bar
+from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
@@ -66,17 +65,13 @@ def coloured_table(
     """
     shown = list(rows)[:MOST_LINES]
     cells = np.array([[np.nan if p is None else p for p in rows[path]] for path in shown], dtype=float)
-    with mpl.rc_context(STYLE):
-        beside = max(NAMES, width_of(shown))
-        figure = Figure(figsize=(beside + 0.5 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), layout="constrained")
+    beside = max(NAMES, width_of(shown))
+    with new_figure((beside + 0.5 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), titles[0], titles[1]) as figure:
         panel = figure.subplots()
         room = int(LETTERS * BAR_SHARE * figure.get_figheight())
         _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))
         panel.set_yticks(range(len(shown)), shown)
         panel.set_xticks(range(len(heads)), heads)
-        set_title(figure, titles[0])
-        note_setting(figure, titles[1])
-        fix_layout(figure)
     return figure
 
 
@@ -153,8 +148,12 @@ def rigid_figure(
     """Draw the stiffness of each direction against that of each element, with dots where it becomes rigid."""
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.9 * columns + 0.9, 2.5 * rows + 0.7), layout="constrained")
+    with new_figure(
+        (2.9 * columns + 0.9, 2.5 * rows + 0.7),
+        title.format(guidelines.machine.name),
+        setting_of(guidelines.machine),
+        guidelines.loads_left_out,
+    ) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, (element, limits) in zip(panels, shown, strict=False):
             _curves(panel, guidelines, element, limits)
@@ -164,9 +163,6 @@ def rigid_figure(
         lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
-        set_title(figure, title.format(guidelines.machine.name))
-        note_setting(figure, setting_of(guidelines.machine), guidelines.loads_left_out)
-        fix_layout(figure)
     return figure
 
 

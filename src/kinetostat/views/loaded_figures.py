@@ -17,7 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, new_figure, set_title
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.question import Drawing
@@ -49,9 +49,13 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Fi
         ([i for i, name in enumerate(state.components) if not name.startswith("r")], "displacement", "m"),
     ]
     turning = {spring.name: spring.turning for spring in state.springs}
-    with mpl.rc_context(STYLE):
-        kinds = [(unit, turns) for unit, turns in (("N", False), ("N·m", True)) if turns in turning.values()]
-        figure = Figure(figsize=(6.6, 0.7 + 1.8 * (2 + len(kinds))), layout="constrained")
+    kinds = [(unit, turns) for unit, turns in (("N", False), ("N·m", True)) if turns in turning.values()]
+    with new_figure(
+        (6.6, 0.7 + 1.8 * (2 + len(kinds))),
+        title.format(machine.name),
+        setting_of(machine, []),
+        "thin lines: to first order" if state.linear else "",
+    ) as figure:
         panels = list(figure.subplots(2 + len(kinds), 1, sharex=True, squeeze=False).flat)
         for panel, (rows, what, unit) in zip(panels, groups, strict=False):
             scale = display.fitting(unit, curve.displacement[:, rows].flat)
@@ -65,9 +69,6 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Fi
             largest = sorted(loads, key=lambda name: -abs(loads[name]).max())[:MOST_SPRINGS]
             _curves(panel, share, {name: loads[name] for name in loads if name in largest}, scale.label("load"))
         panels[-1].set_xlabel("share of the loads (%)")
-        set_title(figure, title.format(machine.name))
-        note_setting(figure, setting_of(machine, []), "thin lines: to first order" if state.linear else "")
-        fix_layout(figure)
     return figure
 
 
@@ -144,9 +145,8 @@ def bars_figure(state: LoadedState) -> Figure:
         (unit, turns) for unit, turns in (("N", False), ("N·m", True)) if any(s.turning is turns for _, s in shown)
     ]
     groups = [[(name, spring) for name, spring in shown if spring.turning is turns] for _, turns in kinds]
-    with mpl.rc_context(STYLE):
-        beside = max(NAMES, width_of(name for name, _ in shown))
-        figure = Figure(figsize=(beside + 4.6, 0.6 * len(groups) + BAR * len(shown)), layout="constrained")
+    beside = max(NAMES, width_of(name for name, _ in shown))
+    with new_figure((beside + 4.6, 0.6 * len(groups) + BAR * len(shown))) as figure:
         heights = [len(group) + 1 for group in groups]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
         for panel, (unit, _), group in zip(panels, kinds, groups, strict=True):
@@ -165,7 +165,6 @@ def bars_figure(state: LoadedState) -> Figure:
             panel.margins(x=0.15)
             panel.set_axisbelow(True)
             panel.invert_yaxis()
-        fix_layout(figure)
     return figure
 
 

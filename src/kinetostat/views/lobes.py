@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -12,7 +11,7 @@ from kinetostat.display import number
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
 from kinetostat.studies.setting import pose_of, setting_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
@@ -85,8 +84,8 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
     scale = answer.machine.display.scale("m")
     top = HEADROOM * answer.least * scale.factor
     widths = np.minimum(np.where(np.isfinite(answer.widths), answer.widths, np.inf) * scale.factor, 2.0 * top)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+    poses = f"least of {answer.poses} poses" if answer.poses > 1 else f"chatter at {answer.frequency:.4g} Hz"
+    with new_figure((5.6, 3.6), title.format(answer.machine.name), setting_of(answer.machine), poses) as figure:
         panel = figure.add_subplot()
         speeds = 60.0 * answer.speeds
         panel.fill_between(speeds, widths, 2.0 * top, color=COLOURS[1], alpha=0.18, linewidth=0.0)
@@ -99,10 +98,6 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
         panel.set_ylim(0.0, top)
         panel.set_xlabel("speed of the spindle (1/min)")
         panel.set_ylabel(scale.label("width of cut"))
-        set_title(figure, title.format(answer.machine.name))
-        poses = f"least of {answer.poses} poses" if answer.poses > 1 else f"chatter at {answer.frequency:.4g} Hz"
-        note_setting(figure, setting_of(answer.machine), poses)
-        fix_layout(figure)
     return figure
 
 

@@ -5,7 +5,6 @@ Nothing is computed here.
 
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,7 +12,7 @@ from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title, slim_bar
+from kinetostat.views.figures import COLOURS, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.measured import SOURCE_WORDS
 from kinetostat.views.question import Drawing
@@ -49,8 +48,10 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
     turns = np.isin(names, (*ROTATION, *EULER))
     parts = [(rows, unit) for rows, unit in ((~turns, "m"), (turns, "rad")) if rows.any()]
     lines = np.array(seen.data.lines)[seen.pose]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 2.3 * len(parts) + 0.7), layout="constrained")
+    beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
+    with new_figure(
+        (6.4, 2.3 * len(parts) + 0.7), title.format(answer.machine.name), "measured less computed", beyond
+    ) as figure:
         panels = figure.subplots(len(parts), 2, squeeze=False, sharex=True)
         for row, (rows, unit) in zip(panels, parts, strict=True):
             scale = answer.machine.display.deflection(unit)
@@ -69,10 +70,6 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.2)
         for panel in panels[-1]:
             panel.set_xlabel("line of the file")
-        set_title(figure, title.format(answer.machine.name))
-        beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
-        note_setting(figure, "measured less computed", beyond)
-        fix_layout(figure)
     return figure
 
 
@@ -85,8 +82,7 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     few = answer.unknowns if len(matrix) <= FEW_NAMES else ()
     names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in few]
     beside = max(LEAST_PATH_WIDTH, width_of(names, NAME_SIZE))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(size + beside + 0.8, size + beside + 0.2), layout="constrained")
+    with new_figure((size + beside + 0.8, size + beside + 0.2), title.format(answer.machine.name)) as figure:
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)
@@ -94,8 +90,6 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
             panel.set_yticks(range(len(names)), names, fontsize=NAME_SIZE)
             panel.set_xticks(range(len(names)), names, fontsize=NAME_SIZE, rotation=90)
         slim_bar(figure.colorbar(image, ax=panel, shrink=0.5, pad=0.02, label="correlation"))
-        set_title(figure, title.format(answer.machine.name))
-        fix_layout(figure)
     return figure
 
 
@@ -103,8 +97,7 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
     """The commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
     tool = answer.observed.model.drawn.tool * scale.factor
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    with new_figure((6.4, 3.6), title.format(answer.machine.name)) as figure:
         for panel, (view, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):
             panel.plot(tool[:, across], tool[:, up], ".", color=COLOURS[0], label="measured")
             if answer.next is not None and {"pose.x", "pose.y", "pose.z"} <= answer.next.poses.keys():
@@ -113,8 +106,6 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
             panel.set(title=view, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-        set_title(figure, title.format(answer.machine.name))
-        fix_layout(figure)
     return figure
 
 
@@ -128,8 +119,12 @@ def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and c
     order = np.sort(np.argsort(-np.abs(size), kind="stable")[:MOST_BARS_OF_ENTRIES])
     rows = [answer.rows[n] for n in order]
     places = np.arange(len(rows))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 1.9 + 0.2 * len(rows)), layout="constrained")
+    with new_figure(
+        (6.4, 1.9 + 0.2 * len(rows)),
+        title.format(answer.machine.name),
+        setting_of(answer.machine),
+        "grey: explained by uncertainties",
+    ) as figure:
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
         left.axvspan(-COVERAGE_FACTOR, COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
         left.axvline(0.0, color="black", linewidth=0.6)
@@ -152,9 +147,6 @@ def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and c
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
         right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
-        set_title(figure, title.format(answer.machine.name))
-        note_setting(figure, setting_of(answer.machine), "grey: explained by uncertainties")
-        fix_layout(figure)
     return figure
 
 

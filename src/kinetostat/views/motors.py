@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,7 +16,7 @@ from kinetostat.studies.drives import root_mean_square
 from kinetostat.studies.motors import MotorChoice, MotorFit, motors
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
@@ -66,17 +65,15 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
     shown = answer.fits[:MOST_DRAWN]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(0.4 + 3.3 * columns, 0.9 + 2.7 * rows), layout="constrained")
+    note = "dark: for ever; light: for a short while; lines: the drives; circles: RMS"
+    with new_figure(
+        (0.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name), setting_of(answer.machine), note
+    ) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, fit in zip(panels, shown, strict=False):
             _diagram(panel, answer, fit)
         for panel in figure.axes[len(shown) :]:
             panel.set_visible(False)
-        set_title(figure, title.format(answer.machine.name))
-        note = "dark: for ever; light: for a short while; lines: the drives; circles: RMS"
-        note_setting(figure, setting_of(answer.machine), note)
-        fix_layout(figure)
     return figure
 
 

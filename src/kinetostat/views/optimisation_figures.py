@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,7 +13,7 @@ from kinetostat.studies.optimisation.assessment import Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 BINS = 40
@@ -49,8 +48,7 @@ def convergence(log: Log, title: str) -> Figure:
     across = "descent" if log.problem.method == "gradient" else "generation"
     steps = np.arange(1, len(log.steps) + 1)
     best, mean = (np.array([step.get(key, np.nan) for step in log.steps], dtype=float) for key in ("best", "mean"))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.8, 3.0), layout="constrained")
+    with new_figure((6.8, 3.0), title) as figure:
         left, right = figure.subplots(1, 2)
         scale = log.problem.machine.display.scale(objective.term.unit)
         left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the population", linestyle="--")
@@ -64,20 +62,15 @@ def convergence(log: Log, title: str) -> Figure:
         right.set(xlabel=across, ylabel="relative distance to the last best", yscale="log")
         for panel in (left, right):
             panel.margins(x=0.02)
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
 def comparison(result: Result, title: str) -> Figure:
     """Draw how many times stiffer each direction is, and each variable between its bounds before and after."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), layout="constrained")
+    with new_figure((7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), title) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _gains(left, result)
         _places(right, result)
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
@@ -139,8 +132,7 @@ def front(result: Result, title: str) -> Figure:
     pairs = [(i, j) for i in range(best.shape[1]) for j in range(i + 1, best.shape[1])]
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(4.2 * columns if columns == 1 else 3.1 * columns, 3.2 * rows), layout="constrained")
+    with new_figure((4.2 * columns if columns == 1 else 3.1 * columns, 3.2 * rows), title) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, (i, j) in zip(panels, pairs, strict=False):
             x, y = (problem.machine.display.scale(problem.objectives[k].term.unit) for k in (i, j))
@@ -158,20 +150,15 @@ def front(result: Result, title: str) -> Figure:
             panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
             panel.set_ylim(*_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
         figure.axes[0].legend(loc="best")
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
 def tolerances(result: Result, title: str) -> Figure:
     """Draw how each objective scatters over random machines within the tolerances of the best design."""
     scatters = result.robustness.scatters if result.robustness else ()
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
+    with new_figure((3.6 * len(scatters) + 0.6, 2.9), title) as figure:
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
             _histogram(panel, scatter, result.problem.machine.display)
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -15,7 +14,7 @@ from kinetostat.display import number
 from kinetostat.studies.servo import Servo, servo
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.vibration.receptance import along, receptance
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
@@ -101,8 +100,9 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
     closed = answer.receptance(given.tolist())
     still = receptance(answer.loops.modes, answer.loops.damping, given)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 3.8), layout="constrained")
+    with new_figure(
+        (5.6, 3.8), title.format(answer.machine.name), setting_of(answer.machine), "thin: motors that stand still"
+    ) as figure:
         panel = figure.add_subplot()
         for place, (name, way) in enumerate(ways.items()):
             colour = COLOURS[place]
@@ -113,9 +113,6 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
         panel.set_xlabel("frequency (Hz)")
         panel.set_ylabel(scale.label("dynamic stiffness"))
         panel.legend(loc="best")
-        set_title(figure, title.format(answer.machine.name))
-        note_setting(figure, setting_of(answer.machine), "thin: motors that stand still")
-        fix_layout(figure)
     return figure
 
 

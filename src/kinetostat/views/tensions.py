@@ -4,13 +4,12 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from kinetostat.display import number
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.tensions import Tensions, tensions
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import numeric_table
@@ -60,8 +59,9 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figu
     scale = answer.machine.display.scale("N")
     sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
     least, most = (bound * scale.factor for bound in answer.bounds)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 1.3 + BAR_HEIGHT * len(sizes)), layout="constrained")
+    with new_figure(
+        (6.0, 1.3 + BAR_HEIGHT * len(sizes)), title.format(answer.machine.name), setting_of(answer.machine)
+    ) as figure:
         panel = figure.add_subplot()
         names = [cable.name for cable in answer.cables]
         bars = panel.barh(names, sizes, height=0.7, color=COLOURS[0])
@@ -76,9 +76,6 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figu
             panel.axvline(bound, color=COLOURS[1], linewidth=1.2, label="bound" if bound == near[0] else None)
         if near:
             panel.legend(loc="upper right", frameon=False, fontsize="small", bbox_to_anchor=(1.0, 1.12))
-        set_title(figure, title.format(answer.machine.name))
-        note_setting(figure, setting_of(answer.machine))
-        fix_layout(figure)
     return figure
 
 

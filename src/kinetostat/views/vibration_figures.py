@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +10,7 @@ from matplotlib.ticker import LogLocator
 from kinetostat.arrays import Array
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.loaded_figures import moved_figure
 from kinetostat.views.question import Drawing
 from kinetostat.views.vibration import axis_of
@@ -52,8 +51,8 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
     scale = machine.display.scale("m/N")
     ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
     ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 5.6), layout="constrained")
+    about = "grey lines: natural frequencies, numbered from the lowest; circles: least real part, which limits a cut"
+    with new_figure((7.6, 5.6), title.format(machine.name), setting_of(machine, []), about) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0), height_ratios=(1.25, 1.0, 1.0))
         size = figure.add_subplot(grid[0, 0])
         phase, real = (figure.add_subplot(grid[row, 0], sharex=size) for row in (1, 2))
@@ -88,12 +87,6 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
         nyquist.set_aspect("equal", adjustable="datalim")
         _number_modes(size, answer, given)
         size.legend(loc="best")
-        set_title(figure, title.format(machine.name))
-        about = (
-            "grey lines: natural frequencies, numbered from the lowest; circles: least real part, which limits a cut"
-        )
-        note_setting(figure, setting_of(machine, []), about)
-        fix_layout(figure)
     return figure
 
 

@@ -34,13 +34,11 @@ from kinetostat.studies.workspace_verdicts import (
 )
 from kinetostat.views.figures import (
     COLOURS,
-    STYLE,
     Drawings,
     axis_values,
     fill_regions,
-    fix_layout,
+    new_figure,
     set_axis_scales,
-    set_title,
     slim_bar,
 )
 from kinetostat.views.grid import display_of
@@ -119,8 +117,7 @@ def _sections(
     columns = min(3, len(cuts))
     rows = -(-len(cuts) // columns)
     wide = 4.6 if len(cuts) == 1 else 2.6
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(wide * columns + 0.3, 0.9 * wide * rows + 0.9), layout="constrained")
+    with new_figure((wide * columns + 0.3, 0.9 * wide * rows + 0.9), title) as figure:
         panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
         edges: set[PoseCondition] = set()
         for panel, cut in zip(panels, cuts, strict=False):
@@ -135,8 +132,6 @@ def _sections(
             handles=[*_patches(cuts, labels), *_lines(conditions, edges)],
             loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=6.5,
         )  # fmt: skip
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
@@ -219,8 +214,7 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) 
     triangles = surface(depth(inside, shares or _halves(inside)), [values for values, _ in axes])
     scale = display_of(dataset).scale(dataset[quantity].attrs["units"])
     values = scale.factor * _on(triangles, thin[quantity].transpose(*dims).values, inside, [v for v, _ in axes])
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 4.8), layout="constrained")
+    with new_figure((5.2, 4.8), title) as figure:
         panel = figure.add_subplot(projection="3d")
         norm = _norm_of(values)
         low, high = norm.vmin or 0.0, norm.vmax or 1.0
@@ -237,8 +231,6 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) 
             extend=("neither", "min", "max", "both")[extremes],
         )  # fmt: skip
         slim_bar(bar)
-        set_title(figure, title)
-        fix_layout(figure)
     return figure
 
 
