@@ -8,7 +8,7 @@ import errno
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from kinetostat.commands.asking import add_other_questions, add_question
@@ -41,6 +41,17 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 LOOKING = "computing; if the pose is out of reach, the nearest one is looked for"
 """Words beside the progress bar of a long analysis."""
 
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "machine files": ("list", "new", "schema", "check"),
+    "at a pose": ("analyze", "forward", "sensitivity", "guidelines", "tensions", "capability"),
+    "at many poses": ("path", "sweep", "map", "workspace"),
+    "under load and in motion": ("command", "elevation", "modes", "servo", "lobes", "drives", "motors"),
+    "as built": ("budget", "identify", "validate"),
+    "design": ("compare", "optimize", "pareto"),
+    "documents and other programs": ("report", "export", "studio", "reproduce", "doctor"),
+}
+"""Commands by what they are asked about, in the order in which the help lists them; others come last."""
+
 EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
@@ -58,6 +69,18 @@ EXAMPLES = """examples:
 
 exit codes: 0 done, 1 the question has no answer or a requirement is not met, 2 bad input, 130 stopped by Ctrl-C
 """
+
+
+class Overview(Help):
+    """Help that lists the commands in groups."""
+
+    def _format_action(self, action: argparse.Action) -> str:
+        if not isinstance(action, argparse._SubParsersAction):
+            return super()._format_action(action)
+        lines = {each.dest: self._format_action(each) for each in action._get_subactions()}
+        groups = {name: [lines.pop(word) for word in words] for name, words in GROUPS.items()}
+        groups["other"] = [*lines.values()]
+        return "".join(f"\n {name}:\n{''.join(group)}" for name, group in groups.items() if group)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -125,7 +148,7 @@ def _parser() -> Parser:
         prog="kinetostat",
         description="Compute how stiff a parallel kinematic machine is, where it is weak, and why.",
         epilog=EXAMPLES,
-        formatter_class=Help,
+        formatter_class=Overview,
     )
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.set_defaults(run=_version_or_help, parser=parser)

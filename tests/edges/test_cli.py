@@ -19,6 +19,7 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.views import analysis
+from kinetostat.views.questions import QUESTIONS
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -131,6 +132,21 @@ def test_ctrl_c_is_an_exit_code_of_its_own(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     assert f"{STOPPED} stopped by Ctrl-C" in " ".join(capsys.readouterr().out.split())
+
+
+def test_help_lists_every_command_once_below_a_heading(capsys):
+    main([])
+    head, *groups = re.split(r"^ (\S.*):$", capsys.readouterr().out.partition("\ncommands:")[2], flags=re.MULTILINE)
+    listed = [
+        word
+        for group in groups[1::2]
+        for word in re.findall(r"^  (\w+)", group.partition("examples:")[0], re.MULTILINE)
+    ]
+    assert not head.strip()
+    assert "other" not in groups
+    assert len(listed) == len(set(listed))
+    assert {"list", "doctor", "compare", *QUESTIONS} <= set(listed)
+    assert "drives" in groups[groups.index("under load and in motion") + 1]
 
 
 @pytest.mark.parametrize("command", ["sweep", "map", "sensitivity"])

@@ -37,7 +37,7 @@ def add_optimize_commands(commands: "Commands") -> None:
         "kinetostat pareto zhang-gosselin-front -o front",
     )  # fmt: skip
     for command in (optimize, pareto):
-        command.add_argument("study", metavar="STUDY_HELP", help=STUDY_HELP)
+        command.add_argument("study", metavar="STUDY", help=STUDY_HELP)
         takes_settings(
             command,
             'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
