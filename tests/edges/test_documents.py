@@ -14,7 +14,7 @@ from report_pages import small_pictures
 
 from cad import starts
 from kinetostat.cli import main
-from kinetostat.machine.loading import build, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studio import serving
 from kinetostat.validation.comparison import validate
@@ -233,6 +233,12 @@ def test_what_is_left_out_is_marked(shown, marked):
 def test_a_number_that_is_cut_off_is_found_out():
     assert missing("ry 1.40\n...", "ry 1.404595\n0 of 3\n") is not None
     assert missing("...\ny 1.404595", "ry 1.404595\n") is not None
+
+
+def test_the_overview_lists_all_bundled_machines():
+    rows = [line for line in (ROOT / "docs/overview.md").read_text().splitlines() if line.startswith("| `")]
+    names = re.findall(r"`(?:\.\.\.-)?([\w-]+)`", " ".join(row.split("|")[1] for row in rows))
+    assert [name for name in bundled() if not name.endswith(tuple(names))] == []
 
 
 def test_equations_are_numbered_in_order_and_those_that_are_named_exist():
