@@ -15,8 +15,7 @@ from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.paper.reproduction import Reproduction, reproduce
 from kinetostat.tolerances import AGREED
-from kinetostat.validation.answer import block_differences
-from kinetostat.validation.comparison import KNOWN, frequency_difference, frequency_pairs, validate
+from kinetostat.validation.comparison import KNOWN, block_differences, frequency_difference, frequency_pairs, validate
 from site_build.markdown import difference, table
 from site_build.second_route import compliance
 

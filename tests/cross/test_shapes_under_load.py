@@ -13,8 +13,8 @@ from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.kinetostatics.deflected import deflected_links
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
-from kinetostat.views.scene.analysis_overlays import loaded_overlays
-from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.anatomy import proportions_of
+from kinetostat.views.scene.overlays import loaded_overlays
 from refusals import refused
 
 DOWN = "[load]\nforce = [0, -500, 0]\n"

@@ -16,8 +16,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.validation import comparison
-from kinetostat.validation.answer import block_differences
-from kinetostat.validation.comparison import KNOWN, engines, validate
+from kinetostat.validation.comparison import KNOWN, block_differences, engines, validate
 from kinetostat.validation.pieces import StrutPiece, end_compliance, pieces
 from kinetostat.validation.pynite_machine import extrapolate
 from machines import CASES, is_regular, load_without_limits

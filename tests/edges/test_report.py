@@ -19,7 +19,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import extra_command
 from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.map_ranges import usual_ranges
+from kinetostat.studies.grid import usual_ranges
 from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page

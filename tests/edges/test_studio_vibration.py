@@ -9,7 +9,7 @@ from kinetostat.machine.loading import load
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import modes
 from kinetostat.studio.answers import SwingRequest, ringing, swing
-from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.vibration import percent
 
 MASSES = ("tool.mass=12", "tool.inertia=[0.3, 0.3, 0.5, 0, 0, 0]", "linear_density.legs=4")

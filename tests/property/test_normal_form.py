@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elastic import compliance_at
-from kinetostat.kinetostatics.centres import centre_of_compliance
-from kinetostat.kinetostatics.eigenscrews import compliance_eigenscrews
+from kinetostat.kinetostatics.eigenscrews import centre_of_compliance, compliance_eigenscrews
 from kinetostat.kinetostatics.indices import (
     free_stiffness_along,
     free_stiffnesses,

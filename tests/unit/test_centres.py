@@ -20,7 +20,7 @@ from elastic import (
 )
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinetostatics.centres import (
+from kinetostat.kinetostatics.eigenscrews import (
     centre_of_compliance,
     centre_of_elasticity,
     centre_of_stiffness,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elastic import LENGTH, PLANE, spring_matrix, stiffnesses, turns, wrench_moved
-from kinetostat.kinetostatics.conditioning import stiffness_condition, twist_condition
+from kinetostat.kinetostatics.indices import stiffness_condition, twist_condition
 
 lengths = st.floats(0.05, 5.0)
 

@@ -9,9 +9,9 @@ import pytest
 import trimesh
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
+from kinetostat.exchange.solids import glb
 from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import LOOKS, Scene, Solid

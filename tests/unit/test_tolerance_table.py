@@ -9,8 +9,15 @@ from kinetostat import InputError, build, load
 from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
-from kinetostat.spec.tolerance_classes import GRADES, SIZES, within_class, within_grade
-from kinetostat.spec.tolerance_table import SIGMAS, joined_tolerances, read_tolerances
+from kinetostat.spec.tolerance_table import (
+    GRADES,
+    SIGMAS,
+    SIZES,
+    joined_tolerances,
+    read_tolerances,
+    within_class,
+    within_grade,
+)
 
 
 def read(value):

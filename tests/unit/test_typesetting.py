@@ -3,7 +3,7 @@
 import pytest
 from rich.text import Text
 
-from kinetostat.views.report.typesetting import as_table, typeset
+from kinetostat.views.report.content import as_table, typeset
 from kinetostat.views.tables import numeric_table, text_table
 
 

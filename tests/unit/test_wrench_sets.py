@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from kinetostat.numerics.wrench_sets import capacity, faces, wrench_closure
+from kinetostat.numerics.polytopes import capacity, faces, wrench_closure
 
 LEAST, MOST = 0.1, 2.0
 SHAPES = [(3, 4), (3, 6), (6, 7), (6, 8), (6, 9)]

@@ -27,7 +27,7 @@ from kinetostat.machine.machine import Chains, Machine, Step
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
-from kinetostat.numerics.wrench_sets import capacity, wrench_closure
+from kinetostat.numerics.polytopes import capacity, wrench_closure
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import SAME_DIRECTION
 

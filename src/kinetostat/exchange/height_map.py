@@ -20,7 +20,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.map_ranges import usual_ranges
+from kinetostat.studies.grid import usual_ranges
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.storage import write_text
 

@@ -1,13 +1,15 @@
-"""Indices: stiffness by direction at one pose, read off K or C; rotation and translation are never mixed.
+"""Indices of K, C or a Jacobian at one pose: stiffness by direction, and how unevenly the directions are treated.
 
-No machine, no legs and no characteristic length here (see `conditioning`). Of K and C either may be missing or not
-finite, as where a spring is rigid or free: all is then taken from the other by Schur complement. A planar machine has
-the `components` rz x y and matrices 3 x 3.
+Stiffness by direction never mixes rotation and translation and needs no characteristic length. Of K and C either may be
+missing or not finite, as where a spring is rigid or free: all is then taken from the other by Schur complement. A
+planar machine has the `components` rz x y and matrices 3 x 3. Conditioning makes rotations comparable by a length, the
+choice of the caller, which goes with every number printed.
 
 "Free": the other block carries no load and follows (a machine alone, loaded at its tool). "Guided": the other block is
 held, as by a second guide. Free is never stiffer than guided.
 
-Source: theory section 10.
+Source: theory section 10; for conditioning J. Salisbury and J. Craig, "Articulated hands", Int. J. Robotics Research
+1(1), 1982.
 """
 
 import math
@@ -228,3 +230,74 @@ def _shares(
         raise ValueError(f"direction {list(direction)} is zero or has no {block} component in this machine's space")
     cosines = np.array(blocks[block].directions) @ (vector / size) if blocks else np.zeros(0)
     return [float(c) ** 2 if abs(c) > AT_RIGHT_ANGLES else 0.0 for c in cosines]
+
+
+def stiffness_condition(
+    stiffness: Matrix | None, compliance: Matrix | None, length: float, components: Sequence[int] = SPATIAL
+) -> float:
+    """Condition number of K made homogeneous: cond(D K D) with D = diag(1/L for rotations, 1 for translations).
+
+    All entries of D K D are in N/m: moments are forces at an arm L, rotations displacements at an arm L. It is also
+    cond(D^-1 C D^-1). The length is the characteristic length of Angeles, Fundamentals of Robotic Mechanical Systems.
+
+    Args:
+        stiffness, compliance: K and C at P, base axes [n x n]; K is used where it is finite, else C.
+        length: L > 0, m.
+        components: rows of the matrices, increasing, of rx ry rz x y z = 0 ... 5.
+
+    Returns:
+        1 (isotropic) to infinity (something is rigid or free while other parts deflect, or neither matrix is finite).
+
+    Raises:
+        ValueError: if the length is not positive, or a matrix has another shape.
+    """
+    stiff, soft = finite(stiffness, components), finite(compliance, components)
+    scale = _scale(components, 1.0 / _positive(length) if stiff is not None else length)
+    matrix = soft if stiff is None else stiff
+    if matrix is None:
+        return np.inf
+    values = np.linalg.eigvalsh(matrix * np.outer(scale, scale))
+    return _ratio(values[-1], values[0])
+
+
+def twist_condition(twists: npt.ArrayLike, length: float, components: Sequence[int] = SPATIAL) -> float:
+    """Condition number of a Jacobian whose columns are twists, angles multiplied by `length`: sigma_max / sigma_min.
+
+    Introduced for Jacobians by Salisbury and Craig, "Articulated hands", Int. J. Robotics Research 1(1), 1982.
+
+    Args:
+        twists: unit twists of the actuators at P, base axes [n x m], rotations (rad) above translations (m); of
+            actuators of one kind, or each divided by what makes its rates comparable.
+        length: L > 0, m.
+        components: the n rows, increasing, of rx ry rz x y z = 0 ... 5.
+
+    Returns:
+        1 to infinity (dependent columns; with m > n, dependent rows).
+
+    Raises:
+        ValueError: if the length is not positive, or the array is not [n x m] and finite.
+    """
+    return _condition(twists, _scale(components, _positive(length)))
+
+
+def _positive(length: float) -> float:
+    if not 0.0 < length < np.inf:
+        raise ValueError(f"a characteristic length is positive, not {length}")
+    return length
+
+
+def _scale(components: Sequence[int], rotational: float) -> Array:
+    return np.array([rotational if c < 3 else 1.0 for c in components])
+
+
+def _condition(screws: npt.ArrayLike, scale: Array) -> float:
+    matrix = np.asarray(screws, dtype=float)
+    if matrix.ndim != 2 or len(matrix) != len(scale) or not matrix.size or not np.isfinite(matrix).all():
+        raise ValueError(f"screws are {len(scale)} rows of finite numbers, one column each, not {matrix.shape}")
+    values = np.linalg.svd(matrix * scale[:, None], compute_uv=False)
+    return _ratio(values[0], values[-1])
+
+
+def _ratio(largest: float, smallest: float) -> float:
+    """The quotient; infinity where the smallest is only round-off."""
+    return float(largest / smallest) if smallest > ROUND_OFF_OF_EIGENVALUE * largest else np.inf

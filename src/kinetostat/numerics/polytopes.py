@@ -1,18 +1,28 @@
-"""Convex polytopes from their half-spaces A x <= b with b > 0: vertices, and outlines of cuts through the origin.
+"""Convex polytopes: vertices and cuts of those given by half-spaces, and faces of sums of segments.
 
-Half-spaces and vertices are dual: each vertex belongs to a facet of the convex hull of the points a / b. No machine is
-known here.
+A polytope A x <= b with b > 0 is dual to its vertices: each belongs to a facet of the convex hull of the points a / b.
 
-Source: G. M. Ziegler, Lectures on Polytopes (1995), section 2.3.
+The wrenches that forces within bounds can hold are a sum of segments (a zonotope), or of rays if forces have no upper
+bound. In d dimensions each of its faces contains d - 1 of the wrenches of unit forces, so that its normal is
+perpendicular to these, and the faces are found without computing a vertex. Which forces act, and along which lines, is
+not known here.
+
+Source: G. M. Ziegler, Lectures on Polytopes (1995), section 2.3; theory (78); S. Bouchard, C. Gosselin and B. Moore,
+"On the ability of a cable-driven robot to generate a prescribed set of wrenches", J. Mechanisms and Robotics 2 (2010);
+capacity: F. Guay, P. Cardou, A. Cruz-Ruiz and S. Caro, "Measuring how well a structure supports varying external
+wrenches", New Advances in Mechanisms, Transmissions and Applications (2014).
 """
 
 import math
+from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
-from kinetostat.tolerances import SAME_VERTEX
+from kinetostat.tolerances import DEGENERATE_FACE, SAME_VERTEX, UNRESISTED
 
 spatial = LateModule("scipy.spatial")
 
@@ -73,3 +83,126 @@ def reach_along(normals: Array, bounds: Array, direction: Array) -> float:
     rates = normals @ direction
     ahead = rates > SAME_VERTEX * np.abs(rates).max(initial=0.0)
     return float(np.min(bounds[ahead] / rates[ahead], initial=math.inf))
+
+
+UNBOUNDED_FORCE = 1e300
+"""Number that stands for a force without a bound: a face that such a force moves is beyond every wrench."""
+FARTHEST_FACE = 1e200
+"""Distance beyond which a face exists only because of `UNBOUNDED_FORCE`."""
+MOST_NUMBERS = 120_000
+"""Greatest number of entries of an array in a slab, so that it stays in the second level of the cache."""
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Normals of the faces of n sets of wrenches.
+
+    Attributes:
+        normals: unit normals; NaN where the forces of a face are dependent [d x faces x n].
+        pulls: components of the wrenches of unit forces along the normals, exactly 0 for those in the face
+            [faces x m x n].
+    """
+
+    normals: Array
+    pulls: Array
+
+    def ends(self, least: Array, most: Array) -> tuple[Array, Array]:
+        """The extent of the sets along the normals, and against them [faces x n].
+
+        Args:
+            least, most: bounds of every force [m x n]; `most` may be infinite.
+        """
+        forth, back = np.maximum(self.pulls, 0.0), np.maximum(-self.pulls, 0.0)
+        high = np.where(np.isinf(most), UNBOUNDED_FORCE, most)  # 0 times infinity would be NaN
+        above = (forth * high).sum(axis=1) - (back * least).sum(axis=1)
+        below = (back * high).sum(axis=1) - (forth * least).sum(axis=1)
+        return above, below
+
+
+def faces(wrenches: Array) -> Faces:
+    """Find the normals of all faces of the sets of wrenches.
+
+    The normal is the cross product of the d - 1 wrenches in the face, whose components are their minors. Minors of the
+    first wrenches belong to many faces and are computed once.
+
+    Args:
+        wrenches: wrenches of unit forces, as columns [d x m x n].
+    """
+    size, count = wrenches.shape[:2]
+    unit = wrenches / np.maximum(np.sqrt((wrenches * wrenches).sum(axis=0)), UNRESISTED)
+    minors = unit
+    for order in range(2, size):
+        minors = _next_minors(minors, unit, order)
+    normals = minors[::-1] * ((-1.0) ** np.arange(size))[:, None, None]
+    lengths = np.sqrt(sum(row * row for row in normals))
+    normals /= np.where(lengths > DEGENERATE_FACE, lengths, np.nan)
+    pulls = np.zeros((normals.shape[1], *wrenches.shape[1:]))
+    for row, part in zip(normals, wrenches, strict=True):
+        pulls += row[:, None] * part
+    for face, members in enumerate(combinations(range(count), size - 1)):
+        pulls[face, members, :] = 0.0
+    sizes = np.sqrt((wrenches * wrenches).sum(axis=0))
+    pulls[np.abs(pulls) <= UNRESISTED * sizes] = 0.0
+    return Faces(normals, pulls)
+
+
+def _next_minors(minors: Array, unit: Array, order: int) -> Array:
+    """Minors of `order` columns from those of one less [row sets x column sets x n], in lexical order."""
+    size, count = unit.shape[:2]
+    sets, rows = list(combinations(range(count), order)), list(combinations(range(size), order))
+    before = {columns: place for place, columns in enumerate(combinations(range(count), order - 1))}
+    rows_before = {chosen: place for place, chosen in enumerate(combinations(range(size), order - 1))}
+    kept = minors[:, [before[columns[:-1]] for columns in sets]]
+    last = unit[:, [columns[-1] for columns in sets]]
+    result = np.zeros((len(rows), len(sets), unit.shape[2]))
+    for place, chosen in enumerate(rows):
+        for position, row in enumerate(chosen):
+            sign = 1.0 if (order - 1 - position) % 2 == 0 else -1.0
+            result[place] += sign * kept[rows_before[chosen[:position] + chosen[position + 1 :]]] * last[row]
+    return result
+
+
+def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: Array | None = None) -> Array:
+    """The distance of required wrenches from the faces of the set that forces within bounds can hold [n].
+
+    It is the distance of the outermost required wrench from the nearest face, negative if that wrench is outside. It is
+    infinite if the set has no face, and NaN if the wrenches of all forces span two dimensions less than their space.
+
+    Args:
+        wrenches: wrenches of unit forces, as columns [n x d x m].
+        least, most: bounds of every force [n x m]; `most` may be infinite.
+        required: wrenches that must all be held [n x k x d]; mixtures of them are then held as well.
+        box: half the sizes of a box of wrenches about each of them [n x d]; no box if it is None.
+    """
+    count, size, forces = wrenches.shape
+    result = np.empty(count)
+    half = np.zeros((count, size)) if box is None else box
+    for part in _slabs(count, size, forces):
+        across = faces(wrenches[part].transpose(1, 2, 0))
+        above, below = across.ends(least[part].T, most[part].T)
+        along = np.stack(
+            [sum(a * b for a, b in zip(across.normals, w.T, strict=True)) for w in required[part].transpose(1, 0, 2)]
+        )
+        of_box = sum(a * b for a, b in zip(np.abs(across.normals), half[part].T, strict=True))
+        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - of_box
+        known = ~np.isnan(across.normals[0])
+        distance = np.where(known, inside, np.inf).min(axis=0)
+        result[part] = np.where(known.any(axis=0), np.where(distance > FARTHEST_FACE, np.inf, distance), np.nan)
+    return result
+
+
+def wrench_closure(wrenches: Array) -> Array:
+    """The wrench that forces from 0 to 1 can hold in every direction [n]; if it is positive, forces hold any wrench.
+
+    Args:
+        wrenches: wrenches of unit forces, as columns [n x d x m].
+    """
+    count, size, forces = wrenches.shape
+    unit = np.ones((count, forces))
+    return capacity(wrenches, 0.0 * unit, unit, np.zeros((count, 1, size)))
+
+
+def _slabs(count: int, size: int, forces: int) -> Iterator[slice]:
+    widest = max(math.comb(forces, order) * math.comb(size, order) for order in range(1, size))
+    step = max(1, MOST_NUMBERS // max(widest, math.comb(forces, size - 1) * forces))
+    return (slice(start, start + step) for start in range(0, count, step))

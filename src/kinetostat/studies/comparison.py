@@ -23,8 +23,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import Immutable
-from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.design_numbers import DesignRow, rows_at_poses, rows_over
 from kinetostat.studies.requirements import Verdict, requirements

@@ -34,9 +34,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import Quantity
+from kinetostat.spec.fields import Quantity, parse_range
 from kinetostat.spec.immutable import Immutable
-from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.budget.budget import Budget, budget
 from kinetostat.studies.budget.tolerances import toleranced_parts
 from kinetostat.studies.corrections import GRAVITY_ANGLE, CorrectionTable, correction_table

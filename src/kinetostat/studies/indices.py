@@ -9,14 +9,15 @@ from numbers import Real
 from typing import Any
 
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.centres import (
+from kinetostat.kinetostatics.eigenscrews import (
+    Eigenscrew,
     Point,
     centre_of_compliance,
     centre_of_elasticity,
     centre_of_stiffness,
+    compliance_eigenscrews,
+    eigenscrews,
 )
-from kinetostat.kinetostatics.conditioning import stiffness_condition
-from kinetostat.kinetostatics.eigenscrews import Eigenscrew, compliance_eigenscrews, eigenscrews
 from kinetostat.kinetostatics.indices import (
     SPATIAL,
     Block,
@@ -27,6 +28,7 @@ from kinetostat.kinetostatics.indices import (
     guided_stiffness_along,
     guided_stiffnesses,
     principal_compliances,
+    stiffness_condition,
 )
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable

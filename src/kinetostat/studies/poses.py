@@ -21,8 +21,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLE, ANGLES, COMPONENT, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters
 from kinetostat.spec.errors import InputError, several, shorten
-from kinetostat.spec.fields import Quantity, quantities
-from kinetostat.spec.ranges import Range, parse_range
+from kinetostat.spec.fields import Quantity, Range, parse_range, quantities
 from kinetostat.units import UnitError, parse
 
 MOST_GIVEN_POSES = 5_000_000

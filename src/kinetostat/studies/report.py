@@ -21,7 +21,7 @@ from kinetostat.machine.parameters import find
 from kinetostat.machine.saving import as_file
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.ranges import parse_range
+from kinetostat.spec.fields import parse_range
 from kinetostat.spec.study import study_toml
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.budget.budget import budget
@@ -29,11 +29,10 @@ from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.drives import drives
 from kinetostat.studies.elevation import elevation
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.grid import MOST_RANGES, coarser_ranges, evaluate_grid, usual_ranges
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.lobes import lobes
-from kinetostat.studies.map_ranges import MOST_RANGES, coarser_ranges, usual_ranges
 from kinetostat.studies.motions import motions_required
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result

@@ -24,8 +24,8 @@ from kinetostat.machine.parameters import POSE, Parameter, find, parameters, sho
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import Immutable
-from kinetostat.spec.ranges import parse_range
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent

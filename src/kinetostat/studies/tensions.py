@@ -16,7 +16,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
-from kinetostat.numerics.wrench_sets import wrench_closure
+from kinetostat.numerics.polytopes import wrench_closure
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable

@@ -37,9 +37,8 @@ from kinetostat.studio.pulling import handles
 from kinetostat.tolerances import SINGULAR
 from kinetostat.units import KINDS
 from kinetostat.views.scene import machine_scene as scenes
-from kinetostat.views.scene.analysis_overlays import loaded_overlays, overlays_of, swing_data
-from kinetostat.views.scene.overlays import twist_solids
-from kinetostat.views.scene.proportions import Proportions
+from kinetostat.views.scene.anatomy import Proportions
+from kinetostat.views.scene.overlays import loaded_overlays, overlays_of, swing_data, twist_solids
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
 
 MAP_POINTS = 41

@@ -22,7 +22,7 @@ from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session, read_typed
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
-from kinetostat.views.usual_values import usual_range
+from kinetostat.views.levels import usual_range
 
 LENGTHS = ("m", "mm")
 """Units of axes that have one scale if both have the same."""

@@ -32,7 +32,7 @@ from kinetostat.studio.question_tab import AskTab
 from kinetostat.studio.scene_panel import Handles, ScenePanel
 from kinetostat.studio.session import Memory, Session, address_of
 from kinetostat.studio.text_pane import TextPane
-from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.anatomy import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
     ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel, VibrationPanel,

@@ -24,7 +24,7 @@ from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
 from kinetostat.views.question import Description, Drawing, Option, Question, late
 from kinetostat.views.questions import QUESTIONS
-from kinetostat.views.report.typesetting import as_table
+from kinetostat.views.report.content import as_table
 
 ASKING_PROGRAM = "kinetostat.studio.question_process"
 SECONDS_TO_ANSWER = 3600

@@ -19,8 +19,8 @@ from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Machine, Plane
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, NO_MOMENTUM, UNBALANCED_LOAD, UNMOVED
-from kinetostat.validation.answer import Answer, Trial
 from kinetostat.validation.as_written import DrawnMachine, drawing
+from kinetostat.validation.comparison import Answer, Trial
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
 from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
 from kinetostat.validation.pieces import (

@@ -18,7 +18,7 @@ from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import BLOCK_BEING_EXTRAPOLATED, SAME_NODE
-from kinetostat.validation.answer import Answer, Trial, difference
+from kinetostat.validation.comparison import Answer, Trial, difference
 from kinetostat.validation.pieces import Piece, StrutPiece, array, columns, joint_of, pieces, section_axes
 
 TRIALS = 10

@@ -13,8 +13,7 @@ from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
 """SI units of the blocks of K and C: rotation, coupling, translation."""

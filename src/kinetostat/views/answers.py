@@ -63,7 +63,7 @@ KINDS = (Kind("machine.machine.Machine"), *(Kind(name, place) for name, place in
 FILES_OF_A_MACHINE = {
     ".toml": "machine.saving.as_file",
     ".png": "views.picture.machine_picture",
-    ".glb": "views.scene.glb.machine_glb",
+    ".glb": "exchange.solids.machine_glb",
 }
 """Functions that make each file of a machine, a text or bytes."""
 

@@ -27,9 +27,8 @@ from kinetostat.studies.budget.budget import (
 from kinetostat.studies.budget.data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.studies.budget.tolerances import is_about
 from kinetostat.units import KINDS
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table, text_table
+from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
 MOST_LISTED_PARTS = 12
 """Single tolerances that are listed; all of them with --full, and in JSON."""

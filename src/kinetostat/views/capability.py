@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from kinetostat.studies.capability import Capability, capability
 from kinetostat.studies.setting import pose_of
 from kinetostat.views.analysis_tables import direction_words
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 TITLES = {
     "force": "force at no moment",

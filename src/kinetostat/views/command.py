@@ -17,11 +17,9 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
 from kinetostat.studies.plain_data import columns_csv
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.forward import coordinate_text
-from kinetostat.views.options import LAW_TOLERANCE
-from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.question import LAW_TOLERANCE, MESSAGE, NAME, Description, Field, Lines, Option, Question
+from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_LISTED_TERMS = 40
 """Terms of a law that are printed; a longer one is in JSON."""

@@ -10,9 +10,8 @@ from kinetostat.display import Display
 from kinetostat.studies.comparison import Comparison, SoftDirection
 from kinetostat.studies.design_numbers import Better, DesignRow
 from kinetostat.studies.requirements import Verdict
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Description, Field, Lines
-from kinetostat.views.tables import numeric_table, readable, text_table
+from kinetostat.views.tables import FittedTable, numeric_table, readable, text_table
 
 MOST_SHARES = 3
 NO_FIELD = "–"

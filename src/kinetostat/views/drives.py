@@ -21,9 +21,8 @@ from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, new_figure, note_setting
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 PER_MINUTE = 30.0 / np.pi
 """Turns per minute of 1 rad/s."""

@@ -20,10 +20,9 @@ from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.figures import COLOURS, look_of, new_figure
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import LAW_TOLERANCE
 from kinetostat.views.question import (
     FIRST_FIELDS,
+    LAW_TOLERANCE,
     Axis,
     Description,
     Drawing,
@@ -33,7 +32,7 @@ from kinetostat.views.question import (
     Question,
     Records,
 )
-from kinetostat.views.tables import numeric_table, text_table
+from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
 
 def _lines(answer: Elevation) -> Lines:

@@ -8,9 +8,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.assembly import Forward, ForwardPose, forward
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 COORDINATE_DIGITS = 7
 """Significant digits of a coordinate: enough for a micrometre of a metre, as controllers take them."""

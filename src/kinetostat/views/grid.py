@@ -21,10 +21,18 @@ from kinetostat.studies.grid import GridQuestion, answer, failures, field_of, gr
 from kinetostat.studies.quantities import usual_quantities
 from kinetostat.studies.stored_grid import Extremes, StoredGrid
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import DISPLACED, VARIED, quantities_option, ranges_option
-from kinetostat.views.question import Description, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.question import (
+    DISPLACED,
+    VARIED,
+    Description,
+    Field,
+    Lines,
+    Option,
+    Question,
+    quantities_option,
+    ranges_option,
+)
+from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_ROWS_OF_A_SWEEP = 60
 """Rows of a sweep that are printed one by one; of longer ones and of maps, the extremes."""

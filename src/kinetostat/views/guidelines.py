@@ -13,10 +13,17 @@ from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import LEAST_EFFECT, MATTERS, limit_of, statements
 from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guidelines
 from kinetostat.studies.plain_data import stiffness_of_spring
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import ranges_option
-from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
-from kinetostat.views.tables import numeric_table, text_table, words_on_omitted
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    LOADS_LEFT_OUT,
+    Description,
+    Field,
+    Lines,
+    Question,
+    Records,
+    ranges_option,
+)
+from kinetostat.views.tables import FittedTable, numeric_table, text_table, words_on_omitted
 
 TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "design": "Design"}
 """Words before the sentences of a topic."""

@@ -31,9 +31,8 @@ from kinetostat.studies.identification.next_poses import NextPoses, as_csv, unit
 from kinetostat.studies.identification.record import FitRecord, record_of
 from kinetostat.units import KINDS
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Description, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table, text_table
+from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
 RATIO, SHARE = Scale(1e6, "ppm"), Scale(1e2, "%")
 MOST_LISTED_OUTLIERS = 40

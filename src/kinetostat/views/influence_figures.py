@@ -24,9 +24,9 @@ from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
+from kinetostat.views.levels import usual_range
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
-from kinetostat.views.usual_values import usual_range
 
 MOST_LINES = 30
 """Parameters that are shown."""

@@ -44,10 +44,9 @@ from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import CLOSED
 from kinetostat.units import KINDS
 from kinetostat.views.page import whole_page
-from kinetostat.views.scene.anatomy import anatomy
+from kinetostat.views.scene.anatomy import anatomy, proportions_of
 from kinetostat.views.scene.leg_solids import rail_ends
 from kinetostat.views.scene.machine_scene import has_open_frame, plates
-from kinetostat.views.scene.proportions import proportions_of
 
 TEMPLATES = Path(__file__).with_name("live")
 SPAN, TURN, SHARE = 0.4, math.radians(30.0), 0.5

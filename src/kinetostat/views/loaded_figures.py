@@ -21,8 +21,8 @@ from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, new_fi
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.question import Drawing
-from kinetostat.views.scene.analysis_overlays import exaggerated_displacement, exaggeration_of, motions_of
-from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.anatomy import proportions_of
+from kinetostat.views.scene.overlays import exaggerated_displacement, exaggeration_of, motions_of
 
 UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
 BAR = 0.24

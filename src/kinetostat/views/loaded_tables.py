@@ -10,9 +10,8 @@ from kinetostat.studies.under_load import LoadedState, SpringState
 from kinetostat.tolerances import NO_REACTION
 from kinetostat.views.analysis_tables import entry_unit
 from kinetostat.views.first_lines import softest_sentence, stiffness_sentence
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Lines
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_LISTED_SPRINGS = 12
 """Springs that have a row each."""

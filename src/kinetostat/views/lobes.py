@@ -12,9 +12,8 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.figures import COLOURS, new_figure
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import tool_of
 
 SHOWN = 12

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from kinetostat.display import Display, Scale, number, number_and_uncertainty
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import Description, Field, Lines, Records
-from kinetostat.views.tables import text_table
+from kinetostat.views.tables import FittedTable, text_table
 
 SOURCE_WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
 EXACT_SHARE = 1e-9

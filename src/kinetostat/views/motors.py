@@ -17,9 +17,8 @@ from kinetostat.studies.motors import MotorChoice, MotorFit, motors
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, new_figure
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 PER_MINUTE = 60.0 / (2.0 * math.pi)
 MOST_DRAWN = 4

@@ -14,10 +14,18 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.evaluation import PoseAnswers, answers_at
 from kinetostat.studies.poses import read_poses
 from kinetostat.studies.quantities import usual_quantities
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import DISPLACED, quantities_option
-from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.question import (
+    DISPLACED,
+    LOADS_LEFT_OUT,
+    NAME,
+    Description,
+    Field,
+    Lines,
+    Option,
+    Question,
+    quantities_option,
+)
+from kinetostat.views.tables import FittedTable, numeric_table
 
 USUAL_QUANTITY = "free_stiffness"
 

@@ -19,10 +19,16 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, several, shorten
-from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, camera_on
-from kinetostat.views.rendering.ground import LARGEST_GROUND_MAP, Ground, veil_over
-from kinetostat.views.rendering.light import Light, light_on, shaded_colors, srgb_of
-from kinetostat.views.rendering.visibility import Hits, Triangles, hits_of
+from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, Hits, Triangles, camera_on, hits_of
+from kinetostat.views.rendering.light import (
+    LARGEST_GROUND_MAP,
+    Ground,
+    Light,
+    light_on,
+    shaded_colors,
+    srgb_of,
+    veil_over,
+)
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
 

@@ -8,10 +8,17 @@ from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes, sensitivity
 from kinetostat.units import KINDS, RIGID
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import quantities_option
-from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Question, Records
-from kinetostat.views.tables import numeric_table, words_on_omitted
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    LOADS_LEFT_OUT,
+    Description,
+    Field,
+    Lines,
+    Question,
+    Records,
+    quantities_option,
+)
+from kinetostat.views.tables import FittedTable, numeric_table, words_on_omitted
 
 MOST_INFLUENCES = 40
 """Parameters that have a line unless all are wanted."""

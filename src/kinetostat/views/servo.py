@@ -15,9 +15,8 @@ from kinetostat.studies.servo import Servo, servo
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.vibration.receptance import along, receptance
 from kinetostat.views.figures import COLOURS, DASHES, new_figure
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import RESPONSE, axis_of
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

@@ -10,9 +10,8 @@ from kinetostat.display import number
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.tensions import Tensions, tensions
 from kinetostat.views.figures import COLOURS, new_figure
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 BAR_HEIGHT = 0.28
 """Height of the figure for each cable, inches."""

@@ -11,9 +11,8 @@ from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.vibration.coupling import FreeTool
-from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.tables import FittedTable, numeric_table
 
 LEAST_SHARE = 0.005
 """Share of the energy of every mode below which a part has no line of its own."""

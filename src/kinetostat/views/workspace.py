@@ -10,10 +10,8 @@ from kinetostat.machine.parameters import dimension, shown
 from kinetostat.studies.grid import field_of
 from kinetostat.studies.workspace import FEWEST_CELLS, METHOD, Workspace, workspace
 from kinetostat.studies.workspace_verdicts import INSIDE, phrase
-from kinetostat.views.fitted_table import FittedTable
-from kinetostat.views.options import ranges_option
-from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question, ranges_option
+from kinetostat.views.tables import FittedTable, numeric_table
 
 SHOWN_ERRORS = 2
 """Standard errors that are printed: the truth lies within them 95 times of 100."""

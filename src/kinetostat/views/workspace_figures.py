@@ -42,8 +42,8 @@ from kinetostat.views.figures import (
     slim_bar,
 )
 from kinetostat.views.grid import display_of
+from kinetostat.views.levels import WIDE, usual_range
 from kinetostat.views.question import Drawing
-from kinetostat.views.usual_values import WIDE, usual_range
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
 KNOWN = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))

@@ -23,8 +23,8 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
 from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
-from kinetostat.views.report.typesetting import as_table
-from kinetostat.views.requirement_lines import headline, requirement_lines
+from kinetostat.views.report.content import as_table
+from kinetostat.views.terminal import headline, requirement_lines
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}

@@ -45,9 +45,8 @@ from kinetostat.views.optimisation import (
 )
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.question import Description
-from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section
+from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, as_table, typeset
 from kinetostat.views.report.pictures import figure_of
-from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 

@@ -22,9 +22,9 @@ from kinetostat.views.figures import as_svg
 from kinetostat.views.picture import picture
 from kinetostat.views.report.content import Figure
 from kinetostat.views.scene import browser
-from kinetostat.views.scene.analysis_overlays import overlays_of, swing_data
+from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.scene.machine_scene import machine_scene
-from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.overlays import overlays_of, swing_data
 from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, solid_data
 
 PICTURE_SIZE = (1000, 700)

@@ -24,10 +24,9 @@ from kinetostat.views.analysis_tables import (
 )
 from kinetostat.views.figures import axis_values, contour_maps, curves
 from kinetostat.views.grid import display_of
-from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
+from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table, as_table, typeset
 from kinetostat.views.report.pictures import PICTURE_WIDTH, MachinePictures, figure_of
 from kinetostat.views.report.provenance import MOTION
-from kinetostat.views.report.typesetting import as_table, typeset
 
 BLOCK_UNITS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (

@@ -33,14 +33,13 @@ from kinetostat.views.report.answers import (
     study_section,
     validation_section,
 )
-from kinetostat.views.report.content import InnerPage, Paragraph, Report, Section
+from kinetostat.views.report.content import InnerPage, Paragraph, Report, Section, typeset
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
 from kinetostat.views.report.provenance import Origin, method_section, record_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
-from kinetostat.views.report.typesetting import typeset
 
 SUFFIXES = (".html", ".pdf")
 

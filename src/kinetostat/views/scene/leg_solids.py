@@ -8,9 +8,17 @@ from dataclasses import replace
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.anatomy import Anatomy, JointPart, LinkPart, RailPart, SpringPart, together
+from kinetostat.views.scene.anatomy import (
+    Anatomy,
+    JointPart,
+    LinkPart,
+    Profile,
+    Proportions,
+    RailPart,
+    SpringPart,
+    together,
+)
 from kinetostat.views.scene.plates import Plate
-from kinetostat.views.scene.proportions import Profile, Proportions
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit, upright
 
 RAIL_LENGTH = 0.55

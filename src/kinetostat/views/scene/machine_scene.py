@@ -9,11 +9,10 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.refusal import why_not
 from kinetostat.machine.machine import BASE_FRAME, Configuration, Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.views.scene import overlays, shapes
-from kinetostat.views.scene.anatomy import Anatomy, anatomy, together
+from kinetostat.views.scene import shapes
+from kinetostat.views.scene.anatomy import Anatomy, Proportions, anatomy, bounds, proportions_of, together
 from kinetostat.views.scene.leg_solids import joint_radius, leg_solids, rail_ends
 from kinetostat.views.scene.plates import Plate, plate_behind
-from kinetostat.views.scene.proportions import Proportions, bounds, proportions_of
 from kinetostat.views.scene.solids import Label, Scene, Solid, unit, upright
 
 BED_DEPTH = 4.5
@@ -62,8 +61,8 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     length = FRAME_LENGTH * sizes.diagonal
     labels = [Label(leg.label, _label_point(leg, sizes)) for leg in legs if leg.actuated]
     for name, place in frames:
-        solids += overlays.frame_solids(name, place, length)
-        labels += overlays.frame_labels(name, place, length)
+        solids += frame_solids(name, place, length)
+        labels += frame_labels(name, place, length)
     rails = [end for leg in legs for rail in leg.rails for end in rail_ends(rail, sizes)]
     points = [*(p for leg in configuration.legs for p in leg.path), configuration.platform.translation, tool, *rails]
     low, high = bounds(points)
@@ -71,6 +70,26 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     beds = BED_DEPTH * max(joint_radius(leg, sizes) for leg in legs) if rails else 0.0
     floor = min(low.z - beds, *(_lowest(plate) for plate in (base, platform) if plate)) - 0.6 * sizes.leg
     return Scene(tuple(solids), tuple(labels), (low + high) * 0.5, math.hypot(*span.components()), floor)
+
+
+def frame_solids(name: str, place: Displacement, length: float) -> list[Solid]:
+    """Draw the axes of a frame as arrows (m)."""
+    axes = place.rotation
+    return [
+        Solid(
+            f"frame {name}/{axis}", shapes.arrow(length, 0.028 * length), f"{axis} axis",
+            upright(place.translation, direction), layer="frames",
+        )
+        for axis, direction in zip("xyz", (axes.x, axes.y, axes.z), strict=True)
+    ]  # fmt: skip
+
+
+def frame_labels(name: str, place: Displacement, length: float) -> list[Label]:
+    """Write the name of a frame at its origin and the letters of its axes."""
+    axes = place.rotation
+    tips = zip("xyz", (axes.x, axes.y, axes.z), strict=True)
+    letters = [Label(letter, place.translation + axis * (1.12 * length), "frames") for letter, axis in tips]
+    return [Label(name, place.translation, "frames"), *letters]
 
 
 def has_open_frame(configuration: Configuration) -> bool:

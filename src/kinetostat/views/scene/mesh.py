@@ -14,7 +14,6 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.tolerances import NO_CIRCLE
-from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, inset_outline
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
 
 REVOLVED_SIDES = 40
@@ -27,6 +26,9 @@ SMOOTH_EDGE = 0.8
 """Cosine between the normals of neighbouring faces above which the edge between them is shaded round."""
 MESHES_KEPT = 1024
 """Number of meshes that are kept: a machine has about a hundred, few of which change while it moves."""
+
+LEAST_BISECTOR_SHARE = 0.1
+"""Least component of a corner's bisector along an edge's normal: a sharp tip would otherwise move far back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +163,58 @@ def _extruded_mesh(shape: Extruded) -> Mesh:
     rings = np.stack([_level(inset_outline(outline, inset) if inset else outline, height) for inset, height, _ in rows])
     tilts = np.array([tilt for *_, tilt in rows])
     caps = [_cap(rings[-1], 1.0), _cap(rings[0], -1.0)]
-    return _joined_meshes([_wall(rings, tilts, edge_normals(outline)), *caps])
+    return _joined_meshes([_wall(rings, tilts, _edge_normals(outline)), *caps])
+
+
+def _edge_normals(outline: Array) -> Array:
+    """Return the unit normals [n x 2], outwards, of the edges from each corner of a counter-clockwise outline on."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def inset_outline(outline: Array, margin: float) -> Array:
+    """Move all edges of an outline inwards by `margin` (the outline's unit), and return the corners [n x 2]."""
+    normals = _edge_normals(outline)
+    bisectors = normals + np.roll(normals, 1, axis=0)
+    shares = np.einsum("ij,ij->i", bisectors, normals)
+    return outline - margin * bisectors / np.maximum(shares, LEAST_BISECTOR_SHARE)[:, None]
+
+
+def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
+    """Cut a simple counter-clockwise outline into n - 2 triangles of its corners' numbers, by clipping ears.
+
+    Source: G. H. Meisters, Polygons have ears, American Mathematical Monthly 82 (1975).
+    """
+    points = [(float(x), float(y)) for x, y in outline]
+    left = list(range(len(points)))
+    triangles = []
+    while len(left) > 3:
+        tip = next((i for i in range(len(left)) if _is_ear(points, left, i)), _most_turning(points, left))
+        triangles.append((left[tip - 1], left[tip], left[(tip + 1) % len(left)]))
+        del left[tip]
+    return [*triangles, (left[0], left[1], left[2])]
+
+
+def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], tip: int) -> bool:
+    """Whether the triangle at a corner lies inside and holds no other corner."""
+    corners = left[tip - 1], left[tip], left[(tip + 1) % len(left)]
+    a, b, c = (points[i] for i in corners)
+    if turn_of(a, b, c) <= 0.0:
+        return False
+    others = (points[i] for i in left if i not in corners)
+    return not any(min(turn_of(a, b, p), turn_of(b, c, p), turn_of(c, a, p)) >= 0.0 for p in others)
+
+
+def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
+    """The corner that turns most to the left: the best choice where round-off has hidden every ear."""
+    turns = [turn_of(points[left[i - 1]], points[left[i]], points[left[(i + 1) % len(left)]]) for i in range(len(left))]
+    return max(range(len(left)), key=turns.__getitem__)
+
+
+def turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Twice the area of a triangle, positive if it is counter-clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _level(flat: Array, height: float) -> Array:

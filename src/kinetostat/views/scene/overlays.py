@@ -1,43 +1,35 @@
-"""Symbols over a machine: load, compliance ellipsoids, soft and free directions, and frames.
+"""Overlays of an analysis over its machine: compliance ellipsoids, soft and free directions, load, deflected shape.
 
-Sizes of the machine decide how large they are; their directions and values come from `analysis_overlays`.
+The symbols come first, whose sizes the machine decides; after them the machine's answer is turned into them.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
-from kinetostat.algebra.screw import Wrench
-from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
+from kinetostat.algebra.scalar import cos, sin
+from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
+from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Rotation, Vector, rotation_along
+from kinetostat.frozen import dataclass
+from kinetostat.kinetostatics.deflected import Deflection, deflected_links
 from kinetostat.kinetostatics.indices import Principal
+from kinetostat.kinetostatics.loading import deflection
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.under_load import LoadedState
+from kinetostat.tolerances import NO_TURN
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.proportions import Proportions
-from kinetostat.views.scene.solids import Label, Solid, Swept, Turned, unit, upright
+from kinetostat.views.scene.anatomy import Proportions, anatomy
+from kinetostat.views.scene.leg_solids import joint_radius
+from kinetostat.views.scene.machine_scene import plates, tool_solids
+from kinetostat.views.scene.solids import Solid, Swept, Turned, solid_data, unit, upright
 
 LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
 """Longest semi-axis of an ellipsoid as a share of the machine's diagonal."""
 THINNEST = 0.012
 """Least semi-axis in units of the longest: an ellipsoid that is flat or thin can still be seen."""
-
-
-def frame_solids(name: str, place: Displacement, length: float) -> list[Solid]:
-    """Draw the axes of a frame as arrows (m)."""
-    axes = place.rotation
-    return [
-        Solid(
-            f"frame {name}/{axis}", shapes.arrow(length, 0.028 * length), f"{axis} axis",
-            upright(place.translation, direction), layer="frames",
-        )
-        for axis, direction in zip("xyz", (axes.x, axes.y, axes.z), strict=True)
-    ]  # fmt: skip
-
-
-def frame_labels(name: str, place: Displacement, length: float) -> list[Label]:
-    """Write the name of a frame at its origin and the letters of its axes."""
-    axes = place.rotation
-    tips = zip("xyz", (axes.x, axes.y, axes.z), strict=True)
-    letters = [Label(letter, place.translation + axis * (1.12 * length), "frames") for letter, axis in tips]
-    return [Label(name, place.translation, "frames"), *letters]
 
 
 def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Proportions) -> list[Solid]:
@@ -143,3 +135,214 @@ def _bent_arrow(
         Solid(names[0], shapes.arc(radius, turn, wire), material, place),
         Solid(names[1], head, material, upright(tip, heading)),
     ]
+
+
+SHOWN_DEFLECTION = 0.09
+"""Greatest displacement of an exaggerated shape as a share of the machine's diagonal."""
+GHOST_WIDTH = 0.7
+"""Radius of a deflected link, in radii of its leg."""
+GHOST_POINTS = 12
+"""Points along a deflected link."""
+
+
+def overlays_of(
+    analysis: Analysis, sizes: Proportions, factor: float | None = None
+) -> tuple[list[Solid], float | None]:
+    """Draw the results of an analysis, and return the factor by which the deflected shape is exaggerated.
+
+    Args:
+        analysis: in base axes; for a pose without an answer nothing is drawn.
+        sizes: of the machine.
+        factor: of exaggeration; None to choose a round one.
+
+    Returns:
+        The solids, and the factor; None without a load.
+    """
+    if analysis.indices is None:
+        return [], None
+    machine, response = analysis.machine, analysis.state.free
+    configuration = response.configuration
+    solids = compliance_overlays(machine, configuration, sizes, analysis.indices.principal_compliances)
+    if analysis.load is None:
+        return solids, None
+    load = Wrench(Vector(*analysis.load.wrench[:3]), Vector(*analysis.load.wrench[3:]))
+    moved = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
+    ghost, chosen = deflection_overlays(machine, configuration, sizes, moved, factor)
+    return solids + ghost, chosen
+
+
+def loaded_overlays(
+    state: LoadedState, sizes: Proportions, factor: float | None = None
+) -> tuple[list[Solid], float | None]:
+    """Draw a machine at rest under its loads over the unloaded one; the factor as `overlays_of`, never below 1.
+
+    Args:
+        state: of the machine; where it comes to no rest nothing is drawn.
+        sizes: of the machine.
+        factor: of exaggeration; None to choose a round one.
+    """
+    if not state.displacement:
+        return [], None
+    response = state.state.free
+    moved = motions_of(state, response)
+    chosen = factor or exaggeration_of(response, moved, sizes.diagonal)
+    return deflection_overlays(state.machine, response.configuration, sizes, moved, chosen)
+
+
+def motions_of(state: LoadedState, response: Response) -> Deflection:
+    """The motions of a machine from its unloaded pose, of which the response is, to its rest."""
+    by_name = dict(zip(state.components, state.displacement, strict=True))
+    turned, moved = ([by_name.get(name, 0.0) for name in COMPONENTS[part]] for part in (slice(3), slice(3, 6)))
+    return Deflection(response.load, Twist(Vector(*turned), Vector(*moved)), state.links)
+
+
+def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> float:
+    """A round factor, at least 1, that makes the motions of a loaded machine visible.
+
+    Args:
+        response: of the machine at its unloaded pose.
+        moved: from there.
+        diagonal: of the machine, m.
+    """
+    legs, point = response.configuration.legs, response.reference
+    reach = max(((leg.path[-1] - point).norm() for leg in legs if leg.path), default=0.0)
+    return max(1.0, _exaggeration(moved, float(reach), diagonal))
+
+
+def compliance_overlays(
+    machine: Machine, configuration: Configuration, sizes: Proportions, principal: Mapping[str, Principal] | None
+) -> list[Solid]:
+    """Draw ellipsoids and softest directions at the tool point; nothing where a direction is free.
+
+    Args:
+        machine, configuration, sizes: as for `machine_scene`.
+        principal: principal compliances of the blocks "translation" and "rotation", base axes.
+    """
+    if not principal:
+        return []
+    point, blocks = machine.tool_point(configuration.platform), principal.items()
+    ellipsoids = [s for name, block in blocks for s in ellipsoid_solids(name, block, point, sizes)]
+    return [*ellipsoids, *softest_solids(principal, point, sizes)]
+
+
+def deflection_overlays(
+    machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection, factor: float | None = None
+) -> tuple[list[Solid], float]:
+    """Draw the load and the deflected shape, and return the factor by which it is exaggerated.
+
+    Of a machine with infinite deflections only the load is drawn.
+
+    Args:
+        machine, configuration, sizes: as for `machine_scene`.
+        moved: its small motions.
+        factor: of exaggeration; None to choose a round one.
+    """
+    loads = load_solids(moved.load, machine.tool_point(configuration.platform), sizes)
+    if not _finite(moved):
+        return loads, 1.0
+    moving = _moving(machine, configuration, sizes)
+    chosen = factor or _exaggeration(moved, moving.reach, sizes.diagonal)
+    return [*loads, *_ghost(moved, moving, chosen)], chosen
+
+
+def swing_data(
+    machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection
+) -> list[dict[str, Any]]:
+    """Both ends of a swing as plain data, so that a browser needs nothing else to move the machine between them.
+
+    Each solid is in the middle of its swing, as `solid_data` has it, with `ends`: how far every point of its path
+    moves to one end, or its two extreme places. It swings as far as a deflected shape is drawn. Nothing is drawn of
+    motions that are infinite or zero.
+
+    Args:
+        machine, configuration, sizes: as for `machine_scene`.
+        moved: small motions, of any size.
+    """
+    moving = _moving(machine, configuration, sizes)
+    largest = _largest(moved, moving.reach)
+    if not 0.0 < largest < math.inf:
+        return []
+    factor = SHOWN_DEFLECTION * sizes.diagonal / largest
+    solids = []
+    for there, middle, back in zip(*(_ghost(moved, moving, end) for end in (factor, 0.0, -factor)), strict=True):
+        drawn, first, last = (solid_data(solid) for solid in (middle, there, back))
+        ends = [first["place"], last["place"]]
+        if isinstance(there.shape, Swept) and isinstance(middle.shape, Swept):
+            pairs = zip(there.shape.path, middle.shape.path, strict=True)
+            ends = [[a - b for a, b in zip(*pair, strict=True)] for pair in pairs]
+        solids.append({**drawn, "ends": ends})
+    return solids
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """Solids and sizes of the parts that a machine moves when it deflects.
+
+    Attributes:
+        body: platform and tool.
+        point: the tool point.
+        reach: of the platform from there, m.
+        radii: of the links by leg, m.
+    """
+
+    body: Sequence[Solid]
+    point: Vector
+    reach: float
+    radii: Mapping[str, float]
+
+
+def _moving(machine: Machine, configuration: Configuration, sizes: Proportions) -> _Moving:
+    point, legs = machine.tool_point(configuration.platform), [anatomy(leg) for leg in configuration.legs]
+    _, platform = plates(configuration, legs, sizes.leg)
+    body = [*platform.solids(), *tool_solids(machine, configuration, platform, sizes.leg)]
+    reach = max((joint - point).norm() for joint in platform.joints)
+    return _Moving(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
+
+
+def _finite(moved: Deflection) -> bool:
+    numbers = [*moved.motion.components(), *(c for link in moved.links for c in link.end_motion.components())]
+    return all(math.isfinite(c) for c in numbers)
+
+
+def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
+    """A round factor (1, 2 or 5 times a power of ten) that makes a deflected shape visible.
+
+    Args:
+        moved: the small motions.
+        reach: of the platform from the tool point, m.
+        diagonal: of the machine, m.
+    """
+    largest = _largest(moved, reach)
+    if not 0.0 < largest < math.inf:
+        return 1.0
+    wanted = SHOWN_DEFLECTION * diagonal / largest
+    power = 10.0 ** math.floor(math.log10(wanted))
+    # A little more than wanted is allowed, so that a factor that is round already does not fall to the next one.
+    return max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted * 1.0001), default=power)
+
+
+def _largest(moved: Deflection, reach: float) -> float:
+    """The greatest displacement of all ends of links and of the platform, m."""
+    links = [motion.translational.norm() for link in moved.links for motion in (link.start_motion, link.end_motion)]
+    return max([*links, moved.motion.translational.norm() + moved.motion.rotational.norm() * reach])
+
+
+def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
+    """The deflected machine: its links as bent wires, and its platform at its displaced place."""
+    wires = []
+    for n, link in enumerate(moved.links):
+        points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
+        path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * moving.radii[link.leg]
+        if len(set(path)) == len(path):  # a link without a length is no wire
+            wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
+    motion = exaggerated_displacement(moved.motion, moving.point, factor)
+    body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
+    return [*wires, *body]
+
+
+def exaggerated_displacement(motion: Twist, point: Vector, factor: float) -> Displacement:
+    """A small motion of a body at a point, times a factor, as a rigid displacement of the body."""
+    angle = motion.rotational.norm() * factor
+    axis = unit(motion.rotational)
+    turn = rotation_along(axis, cos(angle), sin(angle)) if abs(angle) > NO_TURN else IDENTITY
+    return Displacement(turn, point + motion.translational * factor - turn.apply(point))

@@ -1,5 +1,9 @@
-"""Base and platform as plates behind the joints of the legs, joined to them by pedestals. No leg is drawn here."""
+"""Base and platform as plates behind the joints of the legs, joined to them by pedestals; the outlines of the plates.
 
+No leg is drawn here.
+"""
+
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,8 +11,9 @@ import numpy as np
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.polygon import rounded_hull
-from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
+from kinetostat.views.scene.mesh import turn_of
+from kinetostat.views.scene.shapes import CORNER_POINTS, HALF_CIRCLE_POINTS
+from kinetostat.views.scene.solids import Extruded, Point2, Solid, unit, upright
 
 PLATE_CLEARANCE = 2.3
 """Distance of a plate from the joint centres, in radii of a leg: enough room for the fork of a joint."""
@@ -122,3 +127,37 @@ def plate_behind(
         place = Displacement(frame.rotation, frame.rotation.apply(Vector(*(0.5 * (low + high)).tolist())))
         block = Vector(*(high - low + BLOCK_SIZE * radius).tolist())
     return Plate(name, place, tuple(joints), radius, block)
+
+
+def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
+    """Return the convex hull of points, widened by `margin` with round corners, counter-clockwise."""
+    hull = convex_hull(points)
+    if len(hull) == 1:
+        angles = [math.tau * i / (4 * HALF_CIRCLE_POINTS) for i in range(4 * HALF_CIRCLE_POINTS)]
+        return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
+    corners: list[Point2] = []
+    for i, (x, y) in enumerate(hull):
+        (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
+        first = math.atan2(y - py, x - px) - 0.5 * math.pi
+        turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
+        count = max(2, math.ceil(2 * CORNER_POINTS * turn / math.pi))
+        angles = [first + turn * k / count for k in range(count + 1)]
+        corners += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]
+    return tuple(corners)
+
+
+def convex_hull(points: Sequence[Point2]) -> list[Point2]:
+    """Return the corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+
+    def half(along: Sequence[Point2]) -> list[Point2]:
+        kept: list[Point2] = []
+        for x, y in along:
+            while len(kept) > 1 and turn_of(kept[-2], kept[-1], (x, y)) <= 0.0:
+                kept.pop()
+            kept.append((x, y))
+        return kept[:-1]
+
+    return half(ordered) + half(ordered[::-1])
