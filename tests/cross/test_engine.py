@@ -12,24 +12,28 @@ from kinetostat.algebra.scalar import cos, reciprocal, smaller, sqrt, where
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import by_free_springs, evaluate
+from kinetostat.engine.form import plan_for
 from kinetostat.engine.kernel import program_of, slab_fill
 from kinetostat.engine.machine_code import Program, machine_code_of
 from kinetostat.engine.native import Body, host_lanes
 from kinetostat.engine.points import Axis, Grid, PointTable
 from kinetostat.engine.trace import Graph, Traced, needed_nodes
 from kinetostat.engine.trigonometry import cos_and_sin
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
+from kinetostat.motion.response import response_in_motion
+from kinetostat.motion.rigid import MotionPlan
 from machines import CASES, Case, every_machine, one_of_each, stiffness_paths
 from numeric import lost
 
 Columns = dict[str, Array]
 
-UNLOADED = [q for q in QUANTITIES.values() if not (q.loaded or q.modal or q.driven == "acceleration")]
+UNLOADED = [q for q in QUANTITIES.values() if not (q.loaded or q.modal)]
 NAMES = tuple(quantity.name for quantity in UNLOADED)
 DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
 AGREEMENT = 5e-12
@@ -64,9 +68,16 @@ def native(machine: Machine, columns: Columns, names: tuple[str, ...] = NAMES) -
     return found
 
 
+def whole(machine: Machine, plan: MotionPlan | None) -> Response:
+    """The response with what quantities need of rigid parts in motion, as programs have it."""
+    state = MachineState(machine)
+    return response_in_motion(machine, state.free, state.joints, plan, NAMES)
+
+
 def by_floats(machine: Machine, columns: Columns) -> Found:
     poses = zip(*(column.tolist() for column in columns.values()), strict=True)
-    responses = [respond(with_values(machine, dict(zip(columns, pose, strict=True)))) for pose in poses]
+    plan = plan_for(machine, NAMES)
+    responses = [whole(with_values(machine, dict(zip(columns, pose, strict=True))), plan) for pose in poses]
     status = np.array([r.status for r in responses], dtype=np.int8)
     return Found(np.array([read(r) for r in responses]).T, status, np.array([lost(r) for r in responses]))
 
@@ -74,7 +85,7 @@ def by_floats(machine: Machine, columns: Columns) -> Found:
 def by_arrays(machine: Machine, columns: Columns) -> Found:
     count = len(next(iter(columns.values())))
     with np.errstate(all="ignore"):
-        response = respond(with_values(machine, columns))
+        response = whole(with_values(machine, columns), plan_for(machine, NAMES))
         status = np.broadcast_to(response.status, count).astype(np.int8)
         found = [np.broadcast_to(q.value(response), count) for q in UNLOADED]
     return Found(np.where(status == Status.OK, found, np.nan), status, lost(respond(machine)))

@@ -1,13 +1,16 @@
 """Servo loops: receptance and poles against the transfer function of platform and drives, written out here."""
 
+import copy
 import json
 
 import numpy as np
 import pytest
 
 import kinetostat
-from kinetostat import InputError, load, save, servo
+from kinetostat import InputError, drives, evaluate, load, save, servo
 from kinetostat.equilibrium.state import state_of
+from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.machine.loading import build
 from kinetostat.vibration.servo import ServoLoop
 from kinetostat.views.servo import SERVO, servo_figures
 
@@ -15,11 +18,24 @@ MASS, INERTIA, ROTOR, LEAD = 12.0, (0.3, 0.4, 0.5), 2e-5, 0.01
 PLATFORM = ["tool.mass=12 kg", "tool.inertia=[0.3, 0.4, 0.5, 0, 0, 0]", "damping.per_mass=1e-12", "roll=0.1", "x=0.01"]
 DRIVE = ["drives.rotor_inertia=2e-5", "drives.lead=0.01", "drives.rotor_damping=0.001"]
 GAINS = ["servo.position_gain=50", "servo.velocity_gain=0.05"]
+OWN_NUMBERS = {
+    2: {"position_gain": 80.0, "velocity_gain": 0.08, "integral_time": 0.0},
+    3: {"lead": 0.005, "rotor_inertia": 4e-5, "position_at_load": 1.0},
+    6: {"rotor_damping": 0.004, "position_gain": 30.0},
+}
+"""What drives of some legs have in the place of the numbers of all."""
+OF_ROTOR = ("lead", "rotor_inertia", "rotor_damping")
+OWN = [
+    f"{'drives' if field in OF_ROTOR else 'servo'}.leg {leg}.{field}={value}"
+    for leg, numbers in OWN_NUMBERS.items()
+    for field, value in numbers.items()
+]
 LOOPS = {
     "proportional, at the motor": [],
     "integral, at the motor": ["servo.integral_time=0.02"],
     "integral, at the load": ["servo.integral_time=0.02", "servo.position_at_load=1"],
     "integral, between": ["servo.integral_time=0.02", "servo.position_at_load=0.4"],
+    "each its own": ["servo.integral_time=0.02", *OWN],
 }
 
 
@@ -27,17 +43,19 @@ def hexapod(*more):
     return load("hexapod", [*PLATFORM, *DRIVE, *GAINS, *more])
 
 
-def drive_stiffness(machine, s):
+def drive_stiffness(machine, leg, s):
     """Force of a drive on its joint per motion of the joint, by its two equations: motor and transmission."""
-    table, square = machine.tables["servo"], (2.0 * np.pi / LEAD) ** 2
-    k = machine.tables["stiffness"].actuator[0]
-    gain = table.velocity_gain * square
-    gain = gain * (1.0 + 1.0 / (s * table.integral_time)) if table.integral_time else gain
-    share = table.position_at_load
+    shared = vars(machine.tables["servo"]) | {"rotor_inertia": ROTOR, "rotor_damping": 0.001, "lead": LEAD}
+    given = shared | OWN_NUMBERS.get(leg, {}) if machine.family.own_drives else shared
+    square, share = (2.0 * np.pi / given["lead"]) ** 2, given["position_at_load"]
+    k = 2e7
+    gain = given["velocity_gain"] * square
+    gain = gain * (1.0 + 1.0 / (s * given["integral_time"])) if given["integral_time"] else gain
     # Unknown are the motor's place and the force, for a joint that moves by one.
-    motor = s * s * ROTOR * square + s * 0.001 * square + gain * (table.position_gain * (1.0 - share) + s)
+    rotor = (s * s * given["rotor_inertia"] + s * given["rotor_damping"]) * square
+    motor = rotor + gain * (given["position_gain"] * (1.0 - share) + s)
     matrix = np.array([[motor, -1.0], [k, 1.0]])
-    return np.linalg.solve(matrix, [-gain * table.position_gain * share, k])[1]
+    return np.linalg.solve(matrix, [-gain * given["position_gain"] * share, k])[1]
 
 
 def platform_stiffness(answer, s):
@@ -48,7 +66,8 @@ def platform_stiffness(answer, s):
     axes = np.array([axis.components() for axis in (turn.x, turn.y, turn.z)], dtype=float).T
     mass = np.zeros((6, 6))
     mass[:3, :3], mass[3:, 3:] = axes @ np.diag(INERTIA) @ axes.T, MASS * np.eye(3)
-    return s * s * mass + drive_stiffness(answer.machine, s) * lines.T @ lines
+    loops = np.array([drive_stiffness(answer.machine, leg, s) for leg in range(1, 7)])
+    return s * s * mass + (lines.T * loops) @ lines
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -136,3 +155,92 @@ def test_reversal_adds_play_and_friction_of_all_drives():
     assert kinetostat.compile(measured, ["x"], "reversal_error_x")(0.01) == 0.0
     with pytest.raises(InputError, match="no lost motion"):
         kinetostat.compile(load("hexapod"), ["x"], "reversal_error_x")
+
+
+def test_a_machine_leg_by_leg_has_the_same_loops_of_its_own():
+    """The same hexapod as a file leg by leg, whose legs have the names of the family's."""
+    machine = hexapod("servo.integral_time=0.02", *OWN)
+    written = servo(build(document_of(machine)))
+    np.testing.assert_allclose(written.poles, servo(machine).poles, rtol=1e-6, atol=1e-6)
+    assert len({loop.position_gain for loop in written.loops.loops}) == 3
+
+
+def test_own_numbers_follow_a_machine_into_its_file_and_along_a_motion(tmp_path):
+    machine = hexapod("servo.integral_time=0.02", *OWN)
+    save(machine, tmp_path / "own.toml")
+    again = load(tmp_path / "own.toml")
+    assert again.tables == machine.tables
+    changed = machine.with_values({"servo.leg 2.position_gain": 60.0, "drives.lead": 0.02})
+    assert [loop.position_gain for loop in servo(changed).loops.loops] == [50.0, 60.0, 50.0, 50.0, 50.0, 30.0]
+    speeds = [drive.motor_speed / drive.speed for drive in drives(machine, speed=0.1, acceleration=1.0).drives]
+    assert speeds == pytest.approx([2.0 * np.pi / (0.005 if leg == 3 else LEAD) for leg in range(1, 7)])
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("servo.leg 9.position_gain=3", r'the leg or drive of \[servo\."leg 9"\] is "leg 9"'),
+        ("servo.leg 2.gain=3", 'the field of servo."leg 2" is "gain"'),
+        ("drives.leg 2.lead=5 kg", "drives.leg 2.lead is"),
+    ],
+)
+def test_a_mistake_in_the_table_of_a_drive_is_named(setting, message):
+    with pytest.raises(InputError, match=message):
+        hexapod(setting)
+
+
+def lost_by_joints(machine, moment):
+    """Motion of the tool, by component, that reversing moments in all passive joints make in its state of rest.
+
+    The machine as its file leg by leg, in which one passive joint after the other is a flexure hinge that is next to
+    free and carries the moment (or force) where it is.
+    """
+    document, names = document_of(machine), machine.family.component_names
+    joints = [
+        (leg["name"], joint["name"])
+        for leg in document["legs"]
+        for joint in leg["joints"]
+        if joint["type"] in ("revolute", "prismatic") and not joint.get("actuated")
+    ]
+    lost = dict.fromkeys(names, 0.0)
+    for leg, name in joints:
+        prepared = copy.deepcopy(document) | {"load": {"state": "loaded"}}
+        joint = next(j for row in prepared["legs"] if row["name"] == leg for j in row["joints"] if j["name"] == name)
+        joint |= {"stiffness": 1e-9, "preload": LITTLE}
+        at_rest = build(prepared)
+        moved = evaluate(at_rest, {"x": [at_rest.tables["pose"].x]}, [f"displacement_{name}" for name in names])
+        for name in names:
+            lost[name] += 2.0 * moment / LITTLE * abs(float(moved[f"displacement_{name}"][0]))
+    return lost
+
+
+LITTLE = 1e-3
+"""Moment or force that bends the machine so little that its geometry stays."""
+
+
+def reversal_errors(machine):
+    names = machine.family.component_names
+    answer = evaluate(machine, {"x": [machine.tables["pose"].x]}, [f"reversal_error_{name}" for name in names])
+    return {name: float(answer[f"reversal_error_{name}"][0]) for name in names}
+
+
+@pytest.mark.parametrize("name", ["planar-3rrr", "tripteron"])
+def test_friction_of_joints_holds_back_what_its_moments_deflect(name):
+    """The Tripteron's links bend, and its legs hold each other: all of that counts."""
+    frictions = ["damping.hinge_friction=0.3", "damping.slide_friction=0.3"]
+    expected, lost = lost_by_joints(load(name), 0.3), reversal_errors(load(name, frictions))
+    assert lost == pytest.approx(expected, rel=1e-6)
+    assert min(lost.values()) > 1e-9
+
+
+def test_friction_of_guides_and_joints_meets_the_stiffness_of_closed_loops():
+    """A machine whose actuators are as stiff as their loops at rest misses as much, without loops."""
+    rubs = ["drives.guide_friction=30 N", "damping.hinge_friction=0.2"]
+    closed = hexapod("servo.leg 4.integral_time=0.02", *rubs)
+    at_rest = [loop.static_stiffness for loop in servo(closed).loops.loops]
+    alone = load("hexapod", [*PLATFORM, *rubs, f"stiffness.actuator={at_rest}"])
+    assert reversal_errors(closed) == pytest.approx(reversal_errors(alone), rel=1e-9)
+    only_guides = load("hexapod", [*PLATFORM, rubs[0], f"stiffness.actuator={at_rest}"])
+    flexibility = state_of(only_guides).free.statics.flexibility
+    moved = sum(60.0 / k * abs(twist.translational.x) for k, twist in zip(at_rest, flexibility, strict=True))
+    assert reversal_errors(only_guides)["x"] == pytest.approx(moved, rel=1e-9)

@@ -65,6 +65,29 @@ def test_a_motor_feels_its_drive_through_the_screw(tmp_path):
     assert plain.drives[0].inertia_ratio is None
 
 
+def test_friction_of_a_guide_loads_the_screw_and_bends_what_holds_the_tool(tmp_path):
+    """That of the rotor does neither: it acts before the screw, and behind the spring of the drive."""
+    quiet, plain, rubbing = (
+        answer_of(tmp_path, MOVES, *MASS, *more)
+        for more in ((), MOTORS, (*MOTORS, "drives.guide_friction=30 N", "drives.leg 2.guide_friction=0 N"))
+    )
+    rubs = np.array([30.0, 0.0, 30.0, 30.0, 30.0, 30.0])[:, None] * np.sign(plain.curves.speed)
+    assert rubbing.curves.force == pytest.approx(plain.curves.force + rubs, abs=1e-9)
+    passed = (quiet.curves.force + rubs) * 0.01 / (2.0 * np.pi)
+    rotor = plain.curves.motor_torque - (load_ := quiet.curves.force * 0.01 / (2.0 * np.pi)) * loss(load_, plain)
+    assert rubbing.curves.motor_torque == pytest.approx(rotor + passed * loss(passed, plain), abs=1e-9)
+    assert plain.deflection == pytest.approx(quiet.deflection, abs=1e-15)
+    flexibility = analyze(load("hexapod", [*MASS])).state.free.statics.flexibility
+    moved = np.array([twist.components() for twist in flexibility], dtype=float)
+    start = slice(1, 4)  # the pose has hardly changed yet, so that C is that of the file's pose
+    bent = rubs.T[start] / 2e7 @ moved
+    assert rubbing.deflection[start] - plain.deflection[start] == pytest.approx(-bent, rel=1e-2, abs=1e-8)
+
+
+def loss(passed, answer):
+    return np.where(passed * answer.curves.speed > 0.0, 1.0 / 0.8, 0.8)
+
+
 def test_parts_add_up_and_say_what_is_greatest(tmp_path):
     answer = answer_of(tmp_path, MOVES, *MASS, *MOTORS, "load.force=[5, 0, -20]")
     assert answer.curves.parts.sum(axis=1) == pytest.approx(answer.curves.force)

@@ -23,14 +23,14 @@ from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, rest_numbers
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_motion, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.motion.operators import at_pose, loads_by_acceleration
+from kinetostat.motion.response import response_in_motion
 from kinetostat.motion.rigid import MotionPlan, mechanism_over_scalars, plan_of
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
@@ -192,7 +192,7 @@ def objectives_of(
             status are further columns, unless the family places the joints itself. If quantities are about the machine
             under load, coordinates of its state follow, see `step_of`.
         limited: whether the limits of a machine meant under its loads judge its points at rest.
-        plan: which motions there are, where quantities are about accelerations, see `plan_for`.
+        plan: which motions there are, where quantities need them, see `plan_for`.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
         stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
             of its size, so that the program can be repeated until this is small.
@@ -218,9 +218,8 @@ def objectives_of(
         response = replace(response, frequencies=lowest_frequencies(vibration.squares(known)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
-    if plan is not None:
-        here = at_pose(given.machine, response.configuration, joints, plan)
-        response = replace(response, acceleration_loads=loads_by_acceleration(here))
+    names = [name for weights in objectives for name, _ in weights]
+    response = response_in_motion(given.machine, response, joints, plan, names)
     accepted = response.status < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
     if stepping and response.loaded is not None:
@@ -229,21 +228,21 @@ def objectives_of(
 
 
 def plan_for(machine: Machine, names: Iterable[str]) -> MotionPlan | None:
-    """Decide at the pose of a machine which motions its programs count with; None for quantities without masses.
+    """Decide at the pose of a machine which motions its programs count with; None where quantities need none.
 
     Args:
         machine: with numbers.
         names: of quantities.
 
     Raises:
-        InputError: quantities are about accelerations, and the machine has no place at its pose.
+        InputError: quantities need them, and the machine has no place at its pose.
     """
-    if not needs_masses(names):
+    if not needs_motion(names):
         return None
     state = MachineState(machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(
-            f"accelerations of {machine.name} are not known, because it has no place at the pose of its file: "
+            f"motions of {machine.name} are not known, because it has no place at the pose of its file: "
             f"{state.refusal} Change [pose]."
         )
     with np.errstate(all="ignore"):

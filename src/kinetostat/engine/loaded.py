@@ -36,7 +36,7 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
-from kinetostat.motion.operators import at_pose, loads_by_acceleration
+from kinetostat.motion.response import response_in_motion
 from kinetostat.vibration.modes import frequencies
 from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
@@ -195,9 +195,8 @@ def _response_with_states(
             (free == Status.OK) | (free == Status.SINGULAR) & (cable_status == Status.NO_REST), cable_status, free
         )
         response = replace(response, cables=numbers, status=status)
-    if plan := plan_for(machine, quantities):
-        here = at_pose(state.machine, state.configuration, state.joints, plan)
-        response = replace(response, acceleration_loads=loads_by_acceleration(here))
+    plan = plan_for(machine, quantities)
+    response = response_in_motion(state.machine, response, state.joints, plan, quantities)
     if at_rest := rest_numbers(machine, quantities):
         further = {"frequency": frequencies} if "frequency" in at_rest else None
         loaded, at_rest_status = loaded_numbers(state, further)

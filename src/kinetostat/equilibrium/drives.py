@@ -16,22 +16,31 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import ElasticLeg, Units
+from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.leg import Spring
+from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 
 
-def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> ElasticLeg:
+def with_drives(leg: ElasticLeg, units: Units, machine: Machine) -> ElasticLeg:
     """Add what rotors and friction do to the coordinates of a leg.
 
     Args:
         leg: the leg without drives.
         units: the units in which it is counted.
-        drives, damping: the tables of these names.
+        machine: with its tables [drives] and [damping].
 
     Raises:
         InputError: rotors have an inertia or friction, but nothing says how far they turn.
     """
-    given = [drives.rotor_inertia, drives.rotor_damping, damping.hinges, damping.slides]
+    damping = machine.tables["damping"]
+    drives = {
+        coordinate: numbers_of_drive(machine, "drives", spring)
+        for coordinate, spring in enumerate(leg.springs)
+        if spring is not None and spring.actuated
+    }
+    given = [number for drive in drives.values() for number in (drive.rotor_inertia, drive.rotor_damping)]
+    given += [damping.hinges, damping.slides]
     if all(is_zero(number) for number in given):
         return leg
     rotors, dampers = np.array(leg.rotors), np.array(leg.dampers)
@@ -41,9 +50,10 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
         if spring is None:
             dampers[:, coordinate] = _friction(leg, coordinate, units, damping)
         elif spring.actuated:
-            turns = rotor_turns(spring, drives)
+            drive = drives[coordinate]
+            turns = rotor_turns(spring, drive)
             square = turns * turns
-            for amounts, number in ((rotors, drives.rotor_inertia), (dampers, drives.rotor_damping)):
+            for amounts, number in ((rotors, drive.rotor_inertia), (dampers, drive.rotor_damping)):
                 if not is_zero(number):
                     amounts[:, coordinate] = units.inertia(square * number, spring.joint.point is not None)
     return replace(leg, rotors=rotors, dampers=dampers)
@@ -51,6 +61,10 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
 
 def rotor_turns(spring: Spring, drives: Any) -> Scalar:
     """Radians by which the rotor of an actuator turns per metre or radian of the actuator; 0.0 if nothing says it.
+
+    Args:
+        spring: of the actuator.
+        drives: the table [drives] as this drive has it, see `machine.drives`.
 
     Raises:
         InputError: rotors have an inertia or friction, but nothing says how far they turn.

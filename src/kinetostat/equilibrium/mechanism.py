@@ -168,7 +168,7 @@ def _elastic_legs(
     for leg in configuration.legs:
         its_members = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
         chain = elastic_leg(leg, units, amounts, its_members, travels.get(leg.name, ()))
-        legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
+        legs.append(with_drives(chain, units, machine))
     return tuple(legs)
 
 

@@ -112,6 +112,8 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     for name in ("drives", "servo", "damping", "cutting"):
         usual = vars(COMMON[name]())
         given = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
+        paths = [path for path, _ in machine.family.own_drives if path.startswith(f"{name}.")]
+        given |= {path.partition(".")[2]: dict(vars(machine.tables[path])) for path in paths}
         document |= {name: given} if given else {}
     document |= {"load": load_given} if load_given else {}
     upright = _numbers(turn.z) == [0.0, 0.0, 1.0]

@@ -158,7 +158,7 @@ def _rod(element: Element, start: Array, end: Array, radius: float, material: st
 
 def _joint_shape(element: Element, freedom: Freedom, body: Body, radius: float) -> None:
     """Draw a hinge as a pin and a slide as a longer one; springs are coloured."""
-    material = "actuator" if freedom.actuated else "spring" if freedom.stiffness > 0.0 else "joint"
+    material = "actuator" if freedom.drive else "spring" if freedom.stiffness > 0.0 else "joint"
     middle = np.zeros(3) if freedom.point is None else freedom.point - body.at
     half = freedom.axis * radius * (4.0 if freedom.point is None else 1.8)
     size = _n((1.4 if freedom.point is None else 1.2) * radius)

@@ -33,14 +33,14 @@ class Freedom:
         axis: unit vector.
         point: a point on the axis of a hinge, base frame, m; None for a slide.
         stiffness: N·m/rad or N/m; 0 where it moves freely.
-        actuated: whether the spring is that of an actuator.
+        drive: the spring of the actuator that it is; None of others.
     """
 
     name: str
     axis: Array
     point: Array | None
     stiffness: float = 0.0
-    actuated: bool = False
+    drive: Spring | None = None
 
 
 @dataclasses.dataclass
@@ -175,10 +175,10 @@ class _Chain:
         self._body = body
         return body
 
-    def _free(self, name: str, joint: Joint, stiffness: float = 0.0, actuated: bool = False) -> None:
+    def _free(self, name: str, joint: Joint, stiffness: float = 0.0, drive: Spring | None = None) -> None:
         """Give the last body a freedom; a screw is a hinge and a slide that a thread couples."""
         axis, point = array(joint.axis), None if joint.point is None else array(joint.point)
-        hinge = Freedom(self._model.unique(name), axis, point, stiffness, actuated)
+        hinge = Freedom(self._model.unique(name), axis, point, stiffness, drive)
         self._body.freedoms.append(hinge)
         if joint.pitch != 0.0:
             slide = Freedom(self._model.unique(f"{name} advance"), axis, None)
@@ -198,7 +198,7 @@ class _Chain:
         if not self._shares(joint, at):
             self._grow(name, at)
         if isinstance(piece, Spring):
-            self._free(name, joint, float(piece.stiffness), piece.actuated)
+            self._free(name, joint, float(piece.stiffness), piece if piece.actuated else None)
         else:
             self._free(name, joint)
 
@@ -230,8 +230,8 @@ class _Chain:
             self._free(f"{strut.name} swing", Joint(Vector(*axis), strut.start))
         if np.isfinite(strut.stiffness):
             self._grow(f"{strut.name} rod", (start + end) * 0.5)
-            driven = any(spring.actuated and spring.joint.point is None for spring in self._leg.springs)
-            self._free(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, driven)
+            driven = (spring for spring in self._leg.springs if spring.actuated and spring.joint.point is None)
+            self._free(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, next(driven, None))
         self._body.reach.append(end)
         self._model.bars[len(self._model.chains), len(self._bodies) - 1] = [(near, self._body)]
         self._ball = True

@@ -186,8 +186,8 @@ def _rotors(machine: Machine, model: Model) -> dict[str, float]:
     """Inertia that rotors add to the joints of their actuators, by the names of these."""
     if not has_rotors(machine):
         return {}
-    driven = [freedom for body in _moving(model) for freedom in body.freedoms if freedom.actuated]
-    return {freedom.name: rotor_inertia(machine, slides=freedom.point is None) for freedom in driven}
+    freedoms = [freedom for body in _moving(model) for freedom in body.freedoms]
+    return {freedom.name: rotor_inertia(machine, freedom.drive) for freedom in freedoms if freedom.drive}
 
 
 def _on_bodies(

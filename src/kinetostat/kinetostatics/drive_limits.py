@@ -4,9 +4,11 @@ What drives can do within them is in `feasible`. Over scalars.
 """
 
 import math
+from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller
 from kinetostat.frozen import dataclass
+from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
@@ -22,6 +24,7 @@ class DriveLimits:
             open; infinite if not limited.
         speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
         lost_motion: what its joint misses between both senses of motion, m or rad, theory (105).
+        softness: compliance of its joint at rest, with its servo loop if it has one, m/N or rad/(N·m).
     """
 
     spring: Spring
@@ -29,6 +32,7 @@ class DriveLimits:
     upper: Scalar
     speed: Scalar
     lost_motion: Scalar = 0.0
+    softness: Scalar = 0.0
 
 
 def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveLimits, ...]:
@@ -49,29 +53,66 @@ def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveL
                 greatest = smaller(most, load.max_tension)
             lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
         speed = limits.actuator_speed if slides else limits.actuator_turning_speed
-        result.append(DriveLimits(spring, lower, upper, speed, lost_motion(machine, slides)))
+        lost, soft = lost_motion(machine, spring), softness(machine, spring)
+        result.append(DriveLimits(spring, lower, upper, speed, lost, soft))
     return tuple(result)
 
 
-def lost_motion(machine: Machine, slides: bool) -> Scalar:
-    """Lost motion of the joint of a drive between both senses: its play, and friction that no integral part removes.
+def lost_motion(machine: Machine, spring: Spring) -> Scalar:
+    """Lost motion of the joint of a drive between both senses: play, friction of its rotor, and of its guide.
+
+    No integral part of its loop must remove the friction of the rotor. That of guide or bearing is a load on the joint.
 
     Args:
         machine: with its tables [drives] and [servo].
-        slides: whether the drive is linear.
+        spring: of the actuator.
 
     Returns:
         m, or rad of a rotary drive.
 
     Source: theory (105).
     """
-    drives, servo = machine.tables["drives"], machine.tables["servo"]
-    play = (1.0 - servo.position_at_load) * (drives.backlash if slides else drives.angular_backlash)
-    absent = is_zero(drives.rotor_friction) or not is_zero(servo.integral_time)
-    if absent or is_zero(servo.velocity_gain) or is_zero(servo.position_gain):
-        return play
-    turns = drives.lead * (0.5 / math.pi) if slides else reciprocal(drives.ratio)
-    return play + 2.0 * drives.rotor_friction * turns * reciprocal(servo.velocity_gain * servo.position_gain)
+    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
+    slides, lost = spring.joint.point is None, play(machine, spring)
+    rubs = drive.guide_friction if slides else drive.bearing_friction
+    if not is_zero(rubs):
+        lost = lost + softness(machine, spring) * (2.0 * rubs)
+    if is_zero(drive.rotor_friction) or not (_is_closed(servo) and is_zero(servo.integral_time)):
+        return lost
+    turns = drive.lead * (0.5 / math.pi) if slides else reciprocal(drive.ratio)
+    return lost + 2.0 * drive.rotor_friction * turns * reciprocal(servo.velocity_gain * servo.position_gain)
+
+
+def play(machine: Machine, spring: Spring) -> Scalar:
+    """The play of a drive as far as its encoder does not see it, m or rad."""
+    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
+    given = drive.backlash if spring.joint.point is None else drive.angular_backlash
+    return (1.0 - servo.position_at_load) * given
+
+
+def softness(machine: Machine, spring: Spring) -> Scalar:
+    """Compliance of the joint of a drive at rest, m/N or rad/(N·m): with its servo loop if it has one.
+
+    Args:
+        machine: with its tables [drives] and [servo].
+        spring: of the actuator; its stiffness is that of the transmission if there is a loop.
+
+    Source: theory (102).
+    """
+    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
+    transmission = reciprocal(spring.stiffness)
+    if not _is_closed(servo):
+        return transmission
+    soft = transmission * (1.0 - servo.position_at_load)
+    per_turn = drive.lead * (0.5 / math.pi) if spring.joint.point is None else reciprocal(drive.ratio)
+    if not is_zero(servo.integral_time) or is_zero(per_turn):
+        return soft
+    return soft + per_turn * per_turn * reciprocal(servo.velocity_gain * servo.position_gain)
+
+
+def _is_closed(servo: Any) -> bool:
+    """Whether a drive has a servo loop, by the form of its table [servo]."""
+    return not (is_zero(servo.velocity_gain) or is_zero(servo.position_gain))
 
 
 def driven_springs(configuration: Configuration) -> list[Spring]:

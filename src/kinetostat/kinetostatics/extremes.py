@@ -125,12 +125,18 @@ def reversal_error(response: Response, row: int) -> Scalar:
         response: of a pose; at T, base axes.
         row: of rx ry rz x y z = 0 ... 5.
 
+    Returns:
+        NaN where it has not been computed what friction of passive joints holds back (`motion.response`).
+
     Source: theory (105).
     """
+    if response.held_by_joints is None:
+        return math.nan
     pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
     twists = [twist for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
     moved = zip(twists, response.drives, strict=True)
-    return total([abs(twist.components()[row]) * drive.lost_motion for twist, drive in moved])
+    lost = [abs(twist.components()[row]) * drive.lost_motion for twist, drive in moved]
+    return total([*lost, response.held_by_joints[row]])
 
 
 def _least(values: Sequence[Scalar]) -> Scalar:

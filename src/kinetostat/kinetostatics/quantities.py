@@ -314,21 +314,13 @@ def _of_loaded_state() -> list[MapQuantity]:
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
         moved = partial(_displacement, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
-        stiff = _stiffness_unit(i, i)
+        stiff, soft = _stiffness_unit(i, i), rf"$1/C_{{t,{shown}}}$"
         entries += [
             MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", moved, (name,), loaded="displacement"),
             MapQuantity(
                 f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded="stiffness"
             ),
-            MapQuantity(
-                f"tangent_free_stiffness_{name}",
-                stiff,
-                rf"$1/C_{{t,{shown}}}$",
-                free,
-                (name,),
-                "more",
-                loaded="compliance",
-            ),
+            MapQuantity(f"tangent_free_stiffness_{name}", stiff, soft, free, (name,), "more", loaded="compliance"),
         ]
     entries += _frequencies("loaded_frequency", "frequency")
     factor, slack = partial(_under_load, what="factor"), partial(_under_load, what="slack")
@@ -407,6 +399,11 @@ def needs_masses(names: Iterable[str]) -> bool:
     return any(QUANTITIES[name].driven == "acceleration" for name in names)
 
 
+def needs_motion(names: Iterable[str]) -> bool:
+    """Whether quantities need the rigid parts of a machine in motion (`motion.response`)."""
+    return any(QUANTITIES[name].driven in ("acceleration", "reversal") for name in names)
+
+
 def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) -> bool:
     """Whether quantities need more of a pose than its linear response: a state of rest, masses, or tensions.
 
@@ -415,7 +412,7 @@ def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) ->
     """
     names = list(names)
     wanted = [QUANTITIES[name] for name in names]
-    beyond = any(quantity.modal or quantity.cables for quantity in wanted) or needs_masses(names)
+    beyond = any(quantity.modal or quantity.cables for quantity in wanted) or needs_motion(names)
     return beyond or bool(rest_numbers(machine, [quantity.name for quantity in wanted], limited))
 
 

@@ -66,6 +66,8 @@ class Response:
         drives: what each drive may do, in the order of the actuators that hold something.
         acceleration_loads: load of each drive per unit of acceleration at the tool point (`motion.operators`), where it
             has been computed.
+        held_by_joints: motion of the tool that friction of passive joints holds back, by component, m or rad
+            (`motion.response`), where it has been computed.
     """
 
     configuration: Configuration
@@ -90,6 +92,7 @@ class Response:
     cables: Mapping[str, Any] | None = None
     drives: tuple[DriveLimits, ...] = ()
     acceleration_loads: Sequence[Twist] | None = None
+    held_by_joints: Sequence[Scalar] | None = None
     regularity = renamed_property("singularity_margin")
 
     @cached_property

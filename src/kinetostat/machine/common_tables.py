@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from kinetostat.machine.limits import Limits
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import LEAST_OF_KIND, Quantity, table
+from kinetostat.spec.fields import LEAST_OF_KIND, Field, Quantity, made_table, quantities, table
 
 
 @table
@@ -49,7 +49,7 @@ class Tool:
 
 @table
 class Drives:
-    """Table [drives], in any machine file: rotors and gears of actuators, behind the springs of their stiffness."""
+    """Table [drives], in any machine file: rotors, gears and friction of all actuators; [drives.NAME] is for one."""
 
     rotor_inertia: Annotated[
         float, Quantity("moment of inertia", "of the rotor of each actuator with all that turns with it")
@@ -61,6 +61,12 @@ class Drives:
     rotor_damping: Annotated[float, Quantity("torsional damping", "viscous friction that each rotor meets")] = 0.0
     rotor_friction: Annotated[
         float, Quantity("torsional friction", "Coulomb friction that each rotor meets: the same at every speed")
+    ] = 0.0
+    guide_friction: Annotated[
+        float, Quantity("linear friction", "Coulomb friction of a linear actuator in its guide, behind its screw")
+    ] = 0.0
+    bearing_friction: Annotated[
+        float, Quantity("torsional friction", "Coulomb friction of a rotary actuator in its bearing, behind its gear")
     ] = 0.0
     efficiency: Annotated[
         float,
@@ -76,10 +82,11 @@ class Drives:
 
 @table
 class ServoGains:
-    """Table [servo], in any machine file: the loops of all drives, whose transmissions have the actuators' stiffness.
+    """Table [servo], in any machine file: the servo loops of all drives, and in [servo.NAME] that of one.
 
-    The position loop asks for a speed in proportion to the position error, and the velocity loop for a torque in
-    proportion to the speed error and to its integral.
+    The transmission between motor and joint has the stiffness of the actuator. The position loop asks
+    for a speed in proportion to the position error, and the velocity loop for a torque in proportion to the speed error
+    and to its integral.
     """
 
     position_gain: Annotated[float, Quantity("rate", "speed that the position loop asks for, per position error")] = 0.0
@@ -212,6 +219,19 @@ COMMON = {
     "cables": CableTable,
     "limits": Limits,
 }
+
+
+def table_of_one_drive(path: str, fields: Sequence[str]) -> type:
+    """Make the class of the table of a single drive from the fields that are written in it.
+
+    Args:
+        path: such as "servo.leg 1".
+        fields: of the table of all drives, "servo" here.
+    """
+    known = quantities(COMMON[path.partition(".")[0]])
+    return made_table("OwnNumbers", {field: Field(known[field]) for field in fields})
+
+
 VIBRATION_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
 """Beginnings of the paths of fields on which only vibrations depend."""
 ROUND_OFF_OF_TENSOR = 1e-4

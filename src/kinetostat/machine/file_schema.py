@@ -12,7 +12,7 @@ from typing import Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 from kinetostat.machine.catalogue import families
-from kinetostat.machine.common_tables import STATES, NamedLoad
+from kinetostat.machine.common_tables import STATES, Drives, NamedLoad, ServoGains
 from kinetostat.machine.orientation import ANGLES, orientation_schema
 from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec.errors import PRINTABLE
@@ -38,6 +38,9 @@ def machine_schema() -> dict[str, Any]:
     for table in schema["$defs"].values():
         if {*ANGLES} <= table.get("properties", {}).keys():
             table["properties"] |= orientation_schema()
+        for drives in (Drives, ServoGains):
+            if table.get("title") == drives.__name__:
+                table["additionalProperties"] = TypeAdapter(drives).json_schema()
         if "gravity" in table.get("properties", {}):
             table["additionalProperties"] = TypeAdapter(NamedLoad).json_schema()
             table["properties"]["state"] = {"enum": [*STATES], "default": "free", "description": STATE}

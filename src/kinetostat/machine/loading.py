@@ -17,6 +17,7 @@ from kinetostat.late import LateModule
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.cross_section import resolve
+from kinetostat.machine.drives import check_own_drives, family_with_own_drives
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
@@ -25,7 +26,7 @@ from kinetostat.machine.orientation import form_of, remove_replaced_form, with_a
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, numbered_entry, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
-from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
+from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY, Plan
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import Document
@@ -151,10 +152,12 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     resolved = resolve(changed, family, origin)
     whole = family_with_loads(family_with_parts(family, changed), changed, origin)
+    whole = family_with_own_drives(whole, changed, origin)
     machine = _validated_machine(whole, resolved, origin, display)
     placed = machine.configure()
     parts = unloaded_parts(placed.legs, placed.platform.rotation.z, family.planar)
     check_limits(machine.tables["limits"], parts, origin)
+    check_own_drives(whole, placed.legs, origin)
     return replace(machine, loaded=loaded)
 
 
@@ -166,16 +169,23 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     changed = legs_of_file.with_parts(_with_overrides(named, settings, {}, coordinates, origin), origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     plan, numbers = legs_of_file.separate(changed, origin)
-    machine = _validated_machine(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin, display)
+    family = _written_family(plan, numbers, origin)
+    machine = _validated_machine(family, numbers, origin, display)
     checking.check_numbers(plan, machine.tables, origin)
-    family = family_with_loads(written.family_of(checking.complete_plan(plan, machine.family_tables)), numbers, origin)
+    family = _written_family(checking.complete_plan(plan, machine.family_tables), numbers, origin)
     whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
     slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
     parts = unloaded_parts(legs, chains.home.rotation.z, plan.planar, slides)
     check_limits(machine.tables["limits"], parts, origin)
+    check_own_drives(family, legs, origin)
     return replace(whole, loaded=loaded)
+
+
+def _written_family(plan: Plan, numbers: Document, origin: str) -> Family:
+    """The family of a plan, with the tables of named loads and of single drives that a file has."""
+    return family_with_own_drives(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin)
 
 
 def _with_overrides(

@@ -15,7 +15,7 @@ from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.frozen import dataclass
-from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
+from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia, table_of_one_drive
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
@@ -183,6 +183,8 @@ class Family:
         links: those with a mass, of a family in closed form.
         members: gives all links that can move of a machine written leg by leg, from its tables.
         loads: names of the loads at other points of the platform that its files have, see `named_loads`.
+        own_drives: paths of the tables that single drives have of their own ("servo.leg 1"), each with the fields that
+            are written there, see `machine.drives`.
         recipe: the recipe of a family that is made while the program runs, a function and its arguments that make it
             again elsewhere; other families are pickled by name.
     """
@@ -197,6 +199,7 @@ class Family:
     links: tuple[LinkKind, ...] = ()
     members: Callable[..., list[Member]] | None = None
     loads: tuple[str, ...] = ()
+    own_drives: tuple[tuple[str, tuple[str, ...]], ...] = ()
     recipe: tuple[Callable[..., "Family"], tuple[Any, ...]] | None = None
 
     def __post_init__(self) -> None:
@@ -217,7 +220,8 @@ class Family:
     def every_table(self) -> dict[str, type]:
         """Its own tables and the common ones."""
         named = {f"load.{name}": NamedLoad for name in self.loads}
-        return FixedDict({**self.tables, **link_tables(self.links), **COMMON, **named})
+        single = {path: table_of_one_drive(path, fields) for path, fields in self.own_drives}
+        return FixedDict({**self.tables, **link_tables(self.links), **COMMON, **single, **named})
 
 
 @dataclass(frozen=True)

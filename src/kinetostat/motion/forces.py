@@ -175,7 +175,7 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
             row[place] = row[place] + coulomb * (axis.dot(turning) * share)
     for place, number in enumerate(leg.drives, leg.passive):
         drive, rate = machine.drives[number], motion.rates[place]
-        row.append(drive.viscous * rate + drive.coulomb * sign(rate))
+        row.append(drive.viscous * rate + (drive.coulomb + drive.guide) * sign(rate))
     return row
 
 

@@ -22,6 +22,7 @@ from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
+from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine
@@ -61,6 +62,7 @@ class RigidDrive:
         spring: of its actuator.
         turns: radians of the rotor per unit of its coordinate, rad per rad or per unit of length; 0 if nobody says it.
         inertia, viscous, coulomb: of its rotor as its coordinate feels them.
+        guide: Coulomb friction of the joint itself, behind screw or gear.
     """
 
     spring: Spring
@@ -68,6 +70,7 @@ class RigidDrive:
     inertia: Scalar
     viscous: Scalar
     coulomb: Scalar
+    guide: Scalar = 0.0
 
     @property
     def slides(self) -> bool:
@@ -244,17 +247,18 @@ def _vectors(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
 
 
 def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
-    tables, slides = machine.tables["drives"], spring.joint.point is None
-    turns = rotor_turns(spring, tables)
+    numbers, slides = numbers_of_drive(machine, "drives", spring), spring.joint.point is None
+    turns = rotor_turns(spring, numbers)
     here = turns * length if slides else turns  # per unit of the coordinate
     shrink = 1.0 / length
     square = here * here * shrink
     return RigidDrive(
         spring,
         here,
-        square * tables.rotor_inertia,
-        square * tables.rotor_damping,
-        here * tables.rotor_friction * shrink,
+        square * numbers.rotor_inertia,
+        square * numbers.rotor_damping,
+        here * numbers.rotor_friction * shrink,
+        numbers.guide_friction if slides else numbers.bearing_friction * shrink,
     )
 
 

@@ -24,6 +24,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
+from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
@@ -291,7 +292,7 @@ def _weighs(state: MachineState, form: RigidForm) -> bool:
     rigid = form.at(state).rigid
     loads = any(abs(float(part)) > 0.0 for part in rigid.process.components())
     heavy = bool(rigid.platform) or any(leg.masses for leg in rigid.legs)
-    friction = any(drive.inertia or drive.viscous or drive.coulomb for drive in rigid.drives)
+    friction = any(drive.inertia or drive.viscous or drive.coulomb or drive.guide for drive in rigid.drives)
     return (
         loads or heavy or friction or any(part.coulomb or part.viscous for leg in rigid.legs for part in leg.friction)
     )
@@ -320,12 +321,15 @@ def _curves(state: MachineState, motion: Motion, forces: PathForces) -> DriveCur
     speed, acceleration = forces.drives[:, 0] * senses, forces.drives[:, 1] * senses
     parts = forces.drives[:, 2:] * senses[:, :, None]
     force = parts.sum(axis=1)
-    turns, table = _turns(state)[:, None], state.machine.tables["drives"]
-    rotary = _rotary(state)[:, None]
-    rotor = np.where(rotary, table.rotor_inertia, 0.0) * acceleration * turns
-    rotor = rotor + np.where(rotary, table.rotor_damping * speed * turns + table.rotor_friction * np.sign(speed), 0.0)
+    turns, rotary = _turns(state)[:, None], _rotary(state)[:, None]
+    inertia, damping, friction, efficiency = (
+        np.array([getattr(numbers, name) for numbers in _numbers(state)])[:, None]
+        for name in ("rotor_inertia", "rotor_damping", "rotor_friction", "efficiency")
+    )
+    rotor = inertia * acceleration * turns + damping * speed * turns + friction * np.sign(speed)
+    rotor = np.where(rotary, rotor, 0.0)
     passed = force / turns - rotor  # through gear or screw, to the machine
-    loss = np.where(passed * speed > 0.0, 1.0 / table.efficiency, table.efficiency)
+    loss = np.where(passed * speed > 0.0, 1.0 / efficiency, efficiency)
     torque = rotor + passed * loss
     power = torque * speed * turns
     steps = 0.5 * (power[:, 1:] + power[:, :-1]) * np.diff(motion.times)
@@ -336,16 +340,19 @@ def _curves(state: MachineState, motion: Motion, forces: PathForces) -> DriveCur
 
 def _rotary(state: MachineState) -> Array:
     """Whether the motor of each drive turns: that of a linear drive does where the file gives its lead."""
-    springs = driven_springs(state.configuration)
-    return np.array(
-        [s.joint.point is not None or rotor_turns(s, state.machine.tables["drives"]) > 0.0 for s in springs]
-    )
+    pairs = zip(driven_springs(state.configuration), _numbers(state), strict=True)
+    return np.array([s.joint.point is not None or rotor_turns(s, numbers) > 0.0 for s, numbers in pairs])
+
+
+def _numbers(state: MachineState) -> list[Any]:
+    """The table [drives] as each drive has it."""
+    return [numbers_of_drive(state.machine, "drives", spring) for spring in driven_springs(state.configuration)]
 
 
 def _turns(state: MachineState) -> Array:
     """Turns of the rotor per unit of each drive's coordinate, rad; 1 where the motor is the drive itself."""
-    springs = driven_springs(state.configuration)
-    given = np.array([float(rotor_turns(spring, state.machine.tables["drives"])) for spring in springs])
+    pairs = zip(driven_springs(state.configuration), _numbers(state), strict=True)
+    given = np.array([float(rotor_turns(spring, numbers)) for spring, numbers in pairs])
     return np.where(given > 0.0, given, 1.0)
 
 
@@ -357,11 +364,11 @@ def root_mean_square(times: Array, rows: Array) -> Array:
 
 
 def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: DriveCurves) -> list[DriveLoad]:
-    turns, rotary, table = _turns(state), _rotary(state), state.machine.tables["drives"]
+    turns, rotary, numbers = _turns(state), _rotary(state), _numbers(state)
     rms_force, rms_torque = (root_mean_square(motion.times, rows) for rows in (curves.force, curves.motor_torque))
     result = []
     for k, spring in enumerate(driven_springs(state.configuration)):
-        rotor = float(table.rotor_inertia) if rotary[k] else 0.0
+        rotor = float(numbers[k].rotor_inertia) if rotary[k] else 0.0
         reflected = float(forces.inertia[k].max() / turns[k] ** 2) - rotor if len(forces.inertia) else None
         braking = np.minimum(0.5 * (curves.power[k, 1:] + curves.power[k, :-1]), 0.0) * np.diff(motion.times)
         result.append(

@@ -28,7 +28,8 @@ from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import limit_use
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.drive_limits import lost_motion
+from kinetostat.kinetostatics.drive_limits import driven_springs, play
+from kinetostat.machine.actuators import name_of
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
@@ -289,11 +290,14 @@ def _free_motions(model: ErrorModel) -> dict[tuple[str, str], list[int]]:
 def _gaps(model: ErrorModel, machine: Machine) -> dict[tuple[str, str], float]:
     """From one end to the other of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
     gaps: dict[tuple[str, str], float] = {}
+    plays = {
+        name_of(spring): float(play(machine, spring)) for spring in driven_springs(state_of(machine).configuration)
+    }
     for error in model.errors:
         if error.group == "zeros":
-            lost = float(lost_motion(machine, slides=error.kind == "length"))
-            if lost:
-                gaps[error.leg, error.path.removeprefix(f"legs.{error.leg}.").removesuffix(ZERO)] = lost
+            joint = error.path.removeprefix(f"legs.{error.leg}.").removesuffix(ZERO)
+            if plays.get(f"{error.leg} {joint}"):
+                gaps[error.leg, joint] = plays[f"{error.leg} {joint}"]
     if machine.tolerances:
         for part in toleranced_parts(machine, model.errors, machine.tolerances):
             if part.free:

@@ -15,8 +15,9 @@ from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.equilibrium.state import MachineState, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.vibration import modes
@@ -81,7 +82,7 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
     Returns:
         None where no mode is known, or the motion takes no time.
     """
-    still = with_values(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
+    still = with_every_drive(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
     try:
         answer = modes(still)
     except InputError:  # nothing has a mass, or no spring deflects

@@ -18,8 +18,8 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -267,7 +267,7 @@ def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str)
             part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
             settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
             beside += part.inertia
-    return with_values(machine, settings), beside
+    return with_every_drive(machine, settings), beside
 
 
 def loads_with(machine: Machine, motor: MotorRating, beside: float, motion: Motion) -> DriveLoads:
@@ -282,7 +282,7 @@ def loads_with(machine: Machine, motor: MotorRating, beside: float, motion: Moti
     Raises:
         InputError: nothing says how far the motors turn.
     """
-    state = state_of(with_values(machine, {"drives.rotor_inertia": motor.inertia + beside}))
+    state = state_of(with_every_drive(machine, {"drives.rotor_inertia": motor.inertia + beside}))
     loads = drive_loads(state, rigid_form_of(state), motion)
     if any(not drive.rotary for drive in loads.drives):
         raise InputError(

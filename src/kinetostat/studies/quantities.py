@@ -17,6 +17,7 @@ from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinetostatics.drive_limits import drive_limits
 from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
+from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
@@ -194,18 +195,23 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
             )
 
 
-LOST_MOTION = ("drives.backlash", "drives.angular_backlash", "drives.rotor_friction")
+LOST_MOTION = ("backlash", "angular_backlash", "rotor_friction", "guide_friction", "bearing_friction")
+"""Fields of [drives] by which drives lose motion."""
+FRICTION_OF_JOINTS = ("damping.hinge_friction", "damping.slide_friction")
 
 
 def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence[Parameter]) -> None:
-    """Refuse a reversal error of a machine whose file gives its drives no lost motion."""
-    given = values(state.machine)
-    if any(parameter.path in LOST_MOTION for parameter in varied):
-        return
-    if not any(given[field] for field in LOST_MOTION):
+    """Refuse a reversal error of a machine whose file gives neither play of drives nor friction."""
+    known = [
+        (path, value)
+        for path, value in values(state.machine).items()
+        if path in FRICTION_OF_JOINTS or (path.startswith("drives.") and path.rpartition(".")[2] in LOST_MOTION)
+    ]
+    changed = {leaf for parameter in varied for leaf in parameter.leaves}
+    if not any(value or path in changed for path, value in known):
         raise InputError(
-            f'"{name}" is not known: the file of {state.machine.name} gives its drives no lost motion; write '
-            'backlash = "5 um" (angular_backlash of rotary drives), say, in the table [drives].'
+            f'"{name}" is not known: the file of {state.machine.name} gives no lost motion, neither play nor friction; '
+            'write backlash = "5 um" (angular_backlash of rotary drives), say, in the table [drives].'
         )
 
 
@@ -252,8 +258,8 @@ def refuse_unknown_mass(machine: Machine, what: str, configuration: Configuratio
         InputError: says what to give.
     """
     masses = moving_masses(machine, configuration)
-    tool, drives = machine.tables["tool"], machine.tables["drives"]
-    turning = [tool.payload, drives.rotor_inertia, *tool.inertia, *tool.payload_inertia]
+    tool = machine.tables["tool"]
+    turning = [tool.payload, *values_of_drives(machine, "drives.rotor_inertia"), *tool.inertia, *tool.payload_inertia]
     vibrates = what != "mass" and any(turning)
     if all(part.mass is None for part in masses) and not vibrates:
         raise InputError(

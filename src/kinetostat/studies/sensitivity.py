@@ -45,7 +45,9 @@ WITHOUT_INFLUENCE = (
 )  # fmt: skip
 """Beginnings of the fields on which no index depends: loads, limits, weights, buckling and growth."""
 NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
-"""Those on which nothing depends that has derivatives."""
+"""Those on which nothing else depends that has derivatives."""
+OF_LOST_MOTION = ("drives.", "servo.", "damping.")
+"""Those on which lost motion depends."""
 NOT_EVEN_LOADED = ("load.min_tension", "load.max_tension")
 """Those on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
 FAR_AWAY = (
@@ -248,6 +250,8 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
     loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
     accelerated = needs_masses(names)
+    if path.startswith(OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in wanted):
+        return here[path] != 0.0
     if path.startswith(NEVER) or (path.startswith(VIBRATION_FIELDS) and not (modal or accelerated)):
         return False
     modal = modal or accelerated

@@ -18,8 +18,9 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
+from kinetostat.machine.actuators import name_of
+from kinetostat.machine.drives import numbers_of_drive, with_every_drive
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
@@ -122,7 +123,7 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
     state = state_of(machine)
     direction = tuple(unit_direction(along, "along")) if along else ()
     loops = _loops(state)
-    still = with_values(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
+    still = with_every_drive(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
     vibration = modes(still)
     if vibration.solution is None or vibration.damping is None or not vibration.solution.ringing:
         return Servo(state, vibration.status, vibration.message)
@@ -131,36 +132,35 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
 
 def _loops(state: MachineState) -> dict[str, ServoLoop]:
     """The loop of each drive, by the name of its actuator."""
-    machine = state.machine
-    table, drives = machine.tables["servo"], machine.tables["drives"]
-    for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
-        if not getattr(table, name):
-            raise InputError(
-                f"servo.{name} of {machine.name} is 0, so that its motors are not held; write {name} = {example}, say, "
-                "in the table [servo]."
-            )
-    if not drives.rotor_inertia:
-        raise InputError(
-            f"drives.rotor_inertia of {machine.name} is 0, and a loop without inertia has no dynamics; write "
-            'rotor_inertia = "2e-5 kg*m**2", say, in the table [drives].'
-        )
-    loops = {}
+    machine, loops = state.machine, {}
     for spring in driven_springs(state.configuration):
+        gains, drive = (numbers_of_drive(machine, table, spring) for table in ("servo", "drives"))
+        for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
+            if not getattr(gains, name):
+                raise InputError(
+                    f"servo.{name} of {machine.name} is 0, so that the motor of {name_of(spring)} is not held; write "
+                    f"{name} = {example}, say, in the table [servo]."
+                )
+        if not drive.rotor_inertia:
+            raise InputError(
+                f"drives.rotor_inertia of {machine.name} is 0, and a loop without inertia has no dynamics; write "
+                'rotor_inertia = "2e-5 kg*m**2", say, in the table [drives].'
+            )
         stiffness = float(spring.stiffness)
         if math.isinf(stiffness):
             raise InputError(
                 f"{spring.name} of {machine.name} is rigid; its stiffness is that of the transmission between motor "
                 "and joint, which a servo loop needs: give it one."
             )
-        square = float(rotor_turns(spring, drives)) ** 2
+        square = float(rotor_turns(spring, drive)) ** 2
         loops[spring.of] = ServoLoop(
             transmission=stiffness,
-            inertia=square * drives.rotor_inertia,
-            friction=square * drives.rotor_damping,
-            velocity_gain=square * table.velocity_gain,
-            position_gain=table.position_gain,
-            integral_time=table.integral_time,
-            at_load=table.position_at_load,
+            inertia=square * drive.rotor_inertia,
+            friction=square * drive.rotor_damping,
+            velocity_gain=square * gains.velocity_gain,
+            position_gain=gains.position_gain,
+            integral_time=gains.integral_time,
+            at_load=gains.position_at_load,
         )
     return loops
 

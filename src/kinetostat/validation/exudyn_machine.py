@@ -339,7 +339,7 @@ def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration
             if isinstance(piece, Spring) and piece.actuated:
                 point, axis = piece.joint.point, array(piece.joint.axis)
                 line = None if point is None else array(point), axis
-                model.rotor((near, far), line, rotor_inertia(machine, slides=point is None))
+                model.rotor((near, far), line, rotor_inertia(machine, piece))
 
 
 def modal_frequencies(model: Multibody) -> Array:

@@ -12,6 +12,8 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.machine.drives import numbers_of_drive, values_of_drives
+from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.validation.pieces import array, bodies_before, columns
 
@@ -122,16 +124,16 @@ def one_body(parts: Sequence[Heavy]) -> Heavy:
 
 def has_rotors(machine: Machine) -> bool:
     """Whether rotors of actuators have an inertia."""
-    return bool(machine.tables["drives"].rotor_inertia)
+    return any(values_of_drives(machine, "drives.rotor_inertia"))
 
 
-def rotor_inertia(machine: Machine, slides: bool) -> float:
+def rotor_inertia(machine: Machine, spring: Spring) -> float:
     """Return the inertia of a rotor as its actuator feels it, kg where that slides and kg·m² where it turns.
 
     A screw turns the rotor once per lead, a gear as often as its ratio says.
     """
-    drives = machine.tables["drives"]
-    turns = 2.0 * math.pi / drives.lead if slides else drives.ratio
+    drives = numbers_of_drive(machine, "drives", spring)
+    turns = 2.0 * math.pi / drives.lead if spring.joint.point is None else drives.ratio
     return float(drives.rotor_inertia) * turns**2
 
 

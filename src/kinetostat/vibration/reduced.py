@@ -26,6 +26,7 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars
@@ -35,7 +36,7 @@ from kinetostat.vibration.modes import frequencies, hertz
 
 EQUAL_SQUARES = 1e-9
 """Relative difference of the squares of two frequencies up to which they count as equal."""
-PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.rotor_inertia|legs\..*\.mass|sections\..*\.density")
+PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.(.*\.)?rotor_inertia|legs\..*\.mass|sections\..*\.density")
 """Leaf paths of parameters that may give links or rotors a mass."""
 
 
@@ -65,7 +66,9 @@ def platform_alone(machine: Machine | MachineState, varying: Collection[str] = (
 def legs_without_mass(machine: Machine, configuration: Configuration) -> bool:
     """Whether no leg has a mass or a rotor with inertia, as the form of the file says it."""
     links = [part for part in moving_masses(machine, configuration) if part.name != PLATFORM]
-    return all(link.mass is None for link in links) and is_zero(machine.tables["drives"].rotor_inertia)
+    return all(link.mass is None for link in links) and all(
+        is_zero(inertia) for inertia in values_of_drives(machine, "drives.rotor_inertia")
+    )
 
 
 def free_frequencies(machine: Machine, response: Response, joints: Joints | None, sloped: bool = False) -> list[Scalar]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.studies.servo import Servo, servo
 from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.vibration.receptance import along, receptance
@@ -31,11 +31,12 @@ def _lines(answer: Servo) -> Lines:
     if answer.loops is None:
         return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
     lines = [("Pose", f"{pose_of(answer.machine)}."), ("Servo", answer.message)]
-    show, loop = answer.machine.display.show, answer.loops.loops[0]
-    unit = "N·m/rad" if answer.loops.modes.drives[0].turning else "N/m"
-    resists = "no limit" if math.isinf(loop.static_stiffness) else show(loop.static_stiffness, unit)
-    transmission = show(loop.transmission, unit)
-    lines.append(("Drive", f"The first drive holds {resists} at 0 Hz; its transmission has {transmission}."))
+    softest = min(_drives(answer), key=lambda drive: drive["static"] / drive["transmission"])
+    resists, transmission = (_stiffness(answer, softest[key], softest["unit"]) for key in ("static", "transmission"))
+    limit = "is rigid" if math.isinf(softest["static"]) else f"holds {resists}"
+    alike = len(set(answer.loops.loops)) == 1
+    which = "Each drive" if alike else f"{softest['name']} loses most by its loop: it"
+    lines.append(("Drive", f"{which} {limit} at 0 Hz; its transmission has {transmission}."))
     if answer.assumed:
         lines.append(("Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."))
     return lines
@@ -52,6 +53,44 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
         shown = [RIGID if math.isinf(value) else show(value, _unit(name)) for value in (standing, static, least)]
         table.add_row(name, *shown, number(frequency, digits=3))
     yield table
+    yield _table_of_drives(answer)
+
+
+def _stiffness(answer: Servo, value: float, unit: str) -> str:
+    return RIGID if math.isinf(value) else answer.machine.display.show(value, unit)
+
+
+def _table_of_drives(answer: Servo) -> FittedTable:
+    table = numeric_table("Drives", "", ["transmission", "Kv", "Tn", "at the load", "loop closed, 0 Hz"])
+    for drive in _drives(answer):
+        transmission, static = (_stiffness(answer, drive[key], drive["unit"]) for key in ("transmission", "static"))
+        integral = f"{number(1e3 * drive['integral_time'])} ms" if drive["integral_time"] else DASH
+        gain, share = f"{number(drive['position_gain'])} 1/s", f"{number(100.0 * drive['at_load'])} %"
+        table.add_row(drive["name"], transmission, gain, integral, share, static)
+    return table
+
+
+def _drives(answer: Servo) -> list[dict[str, Any]]:
+    """The loop of each drive, at its coordinate."""
+    if answer.loops is None:
+        return []
+    return [
+        {
+            "name": str(drive.name),
+            "unit": "N·m/rad" if drive.turning else "N/m",
+            **vars(loop),
+            "static": loop.static_stiffness,
+        }
+        for drive, loop in zip(answer.loops.modes.drives, answer.loops.loops, strict=True)
+    ]
+
+
+def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
+    """The same for files, which have no infinite numbers."""
+    return [
+        {key: None if isinstance(value, float) and math.isinf(value) else value for key, value in drive.items()}
+        for drive in _drives(answer)
+    ]
 
 
 def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
@@ -125,6 +164,21 @@ STIFFNESS = tuple(
         ("least_at", "frequency of the least, Hz"),
     )
 )
+DRIVE = tuple(
+    Field(key, long_name=meaning, column=f"drive_{key}")
+    for key, meaning in (
+        ("name", "of the drive"),
+        ("unit", "of its stiffnesses"),
+        ("transmission", "stiffness between motor and joint"),
+        ("static", "stiffness at 0 Hz with its loop closed; none where rigid"),
+        ("inertia", "of its rotor at the joint, kg or kg·m²"),
+        ("friction", "viscous friction of its rotor at the joint, N·s/m or N·m·s/rad"),
+        ("velocity_gain", "at the joint, N·s/m or N·m·s/rad"),
+        ("position_gain", "1/s"),
+        ("integral_time", "s; 0 without an integral part"),
+        ("at_load", "share of the position that is measured behind the transmission"),
+    )
+)
 SERVO = Description(
     title="Servo loops",
     fields=(
@@ -134,6 +188,7 @@ SERVO = Description(
         Field("slowest_ratio", lambda answer: answer.slowest and answer.slowest[1]),
         Field("damping_assumed", "assumed"),
         Records("stiffness", "row", STIFFNESS, _stiffnesses),
+        Records("drives", "drive", DRIVE, _records_of_drives, forms=("json", "nc")),
         Field("poles_real", lambda answer: [pole.real for pole in answer.poles], "rad/s", forms=("json",)),
         Field("poles_imaginary", lambda answer: [pole.imag for pole in answer.poles], "rad/s", forms=("json",)),
         Field("receptance_real", lambda answer: _response(answer).real, axes=RESPONSE, forms=("nc",)),

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from kinetostat.machine.common_tables import COMMON
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
 from kinetostat.machine.orientation import orientation_schema
 from kinetostat.machine.series import label
@@ -113,9 +114,7 @@ def written_schema(version: int) -> dict[str, Any]:
             "pose": {**_table({**dict.fromkeys(SPATIAL_POSE, QUANTITY), **orientation_schema()}), "minProperties": 1},
             "sections": {"type": "object", "additionalProperties": _cross_section()},
             "legs": {"type": "array", "minItems": 1, "items": _leg()},
-            "tool": {"type": "object"},
-            "load": {"type": "object"},
-            "limits": {"type": "object"},
+            **{name: {"type": "object"} for name in COMMON},
             "display": DISPLAY_SCHEMA,
         },
         ["name", "family", "platform", "pose", "legs"],

@@ -1,0 +1,135 @@
+"""The tables [drives] and [servo] as each drive has them: what all drives share, and what a drive has of its own.
+
+A file may have a table [drives.NAME] or [servo.NAME] for a leg or a drive, with the fields in which it differs. A
+machine with such tables gets a family of its own, whose files have them. Loads and motions of drives are not here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from kinetostat.machine.actuators import name_of
+from kinetostat.machine.common_tables import COMMON
+from kinetostat.machine.leg import Leg, PartName, Spring
+from kinetostat.machine.machine import Family, Machine
+from kinetostat.machine.parameters import KEPT_FAMILIES, AnyMachine, with_values
+from kinetostat.spec.document import Document, toml_key
+from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.fields import quantities
+
+TABLES_OF_DRIVES = ("drives", "servo")
+"""Tables of which a drive may have its own."""
+MOST_DRIVES = 64
+"""Drives with tables of their own: more is a mistake."""
+
+
+def family_with_own_drives(family: Family, document: Document, origin: str) -> Family:
+    """The family whose machine files have the tables of single drives that a document has; itself without any.
+
+    Args:
+        family: of the machine.
+        document: what its file says.
+        origin: names it in messages.
+
+    Raises:
+        InputError: a field that drives do not have, or too many tables.
+    """
+    tables = []
+    for table in TABLES_OF_DRIVES:
+        known, written = quantities(COMMON[table]), document.get(table)
+        entries = written.items() if isinstance(written, dict) else ()
+        for name, given in entries:
+            if name in known or not isinstance(given, dict):
+                continue  # a field of the table itself, known or not
+            where = f"{table}.{toml_key(name)}"
+            for field in given:
+                choice(field, known, f'"{origin}": the field of {where}')
+            tables.append((f"{table}.{name}", tuple(field for field in known if field in given)))
+    if len(tables) > len(TABLES_OF_DRIVES) * MOST_DRIVES:
+        raise InputError(
+            f'"{origin}" has {len(tables)} tables of single drives; at most {MOST_DRIVES} drives have any.'
+        )
+    return _with_own_drives(family, tuple(tables)) if tables else family
+
+
+@lru_cache(KEPT_FAMILIES)
+def _with_own_drives(family: Family, tables: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
+    return replace(family, own_drives=tables, recipe=(_with_own_drives, (family, tables)))
+
+
+def check_own_drives(family: Family, legs: Sequence[Leg], origin: str) -> None:
+    """Refuse tables of drives that a machine does not have.
+
+    Args:
+        family: whose files have these tables.
+        legs: of the machine.
+        origin: names it in messages.
+
+    Raises:
+        InputError: names the table, and the drives that there are.
+    """
+    if not family.own_drives:
+        return
+    names = dict.fromkeys(
+        name for leg in legs for spring in leg.springs if spring.actuated for name in (leg.name, name_of(spring))
+    )
+    for path, _ in family.own_drives:
+        table, _, name = path.partition(".")
+        choice(name, names, f'"{origin}": the leg or drive of [{table}.{toml_key(name)}]')
+
+
+def numbers_of_drive(machine: Machine, table: str, spring: Spring) -> Any:
+    """A table of `TABLES_OF_DRIVES` as a drive has it: its own fields in the place of those of all drives.
+
+    A table of the drive comes before that of its leg.
+
+    Args:
+        machine: with its tables.
+        table: "drives" or "servo".
+        spring: of the actuator.
+    """
+    shared = machine.tables[table]
+    for path in _own_paths(machine, table, spring):
+        shared = replace(shared, **vars(machine.tables[path]))
+    return shared
+
+
+def _own_paths(machine: Machine, table: str, spring: Spring) -> Iterator[str]:
+    """Paths of the tables that a drive has of its own, that of its leg first."""
+    name, part = name_of(spring), spring.of
+    for level in (0, 1):
+        for path, _ in machine.family.own_drives:
+            of, _, title = path.partition(".")
+            leg = part.leg == title if isinstance(part, PartName) else part.startswith(f"{title} ")
+            if of == table and (leg, title == name)[level]:
+                yield path
+
+
+def with_every_drive(machine: AnyMachine, changes: Mapping[str, float]) -> AnyMachine:
+    """The machine with fields of [drives] or [servo] replaced for every drive, whether it has its own or not.
+
+    Args:
+        machine: a machine.
+        changes: by path, such as "drives.lead", SI.
+    """
+    single = {
+        f"{path}.{field}": changes[f"{table}.{field}"]
+        for path, fields in machine.family.own_drives
+        for table in [path.partition(".")[0]]
+        for field in fields
+        if f"{table}.{field}" in changes
+    }
+    return with_values(machine, {**changes, **single})
+
+
+def values_of_drives(machine: Machine, path: str) -> list[Any]:
+    """All values that a machine has of a field of [drives] or [servo], shared ones first.
+
+    Args:
+        machine: a machine.
+        path: of the field, such as "drives.lead".
+    """
+    table, _, field = path.partition(".")
+    single = [name for name, fields in machine.family.own_drives if field in fields and name.startswith(f"{table}.")]
+    return [getattr(machine.tables[name], field) for name in (table, *single)]
