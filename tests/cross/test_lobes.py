@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from chatter import edges, growth
 from kinetostat import evaluate, load, lobes, modes
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.cutting import borders, milling, tried_frequencies, turning
@@ -12,8 +13,6 @@ from kinetostat.vibration.cutting import borders, milling, tried_frequencies, tu
 PRESSURE = 2e9
 HEXAPOD = ["tool.mass=12 kg", "cutting.direction=[1, 0.3, 0.2]", "cutting.pressure=2000 N/mm**2", "damping.ratio=0.03"]
 HEXAPOD.append("tool.inertia=[0.05, 0.06, 0.08, 0, 0, 0]")
-STEPS = 160
-"""Steps between two edges in the integration."""
 
 
 def one_mode(frequency, stiffness, ratio):
@@ -54,57 +53,28 @@ def test_a_slot_has_the_factors_of_altintas_and_budak():
     np.testing.assert_allclose(engagement.ways, [[1, 0, 0], [0, 1, 0]], atol=1e-15)
 
 
-def growth(vibration, ways, force, width, period):
-    """The factor by which a disturbance grows from edge to edge: the delayed equations, integrated in small steps.
-
-    Each mode: s q'' + 2 ratio sqrt(s) q' + q = t . F, the tool at sum t q; F = pressure width A(t) (u(t) - u(t - T)).
-    """
-    solution, ratio = vibration.solution, vibration.damping.ratio
-    count = solution.ringing
-    assert count == len(solution.squares)
-    squares, tool = solution.squares, ways @ solution.tool[3:]
-    size, step = 2 * count, period / STEPS
-    free = np.zeros((size, size))
-    free[:count, count:] = np.eye(count)
-    free[count:, :count] = -np.diag(1.0 / squares)
-    free[count:, count:] = -np.diag(2.0 * ratio / np.sqrt(squares))
-    inputs = np.vstack([np.zeros((count, len(ways))), (tool / squares).T])
-    delayed = STEPS * len(ways)
-    whole = np.eye(size + delayed)
-    for n in range(STEPS):
-        mean = PRESSURE * width * force((n + 0.5) / STEPS)
-        closed = free.copy()
-        closed[:, :count] += inputs @ mean @ tool
-        values, vectors = np.linalg.eig(closed)
-        inverse = np.linalg.inv(vectors)
-        exact = ((vectors * np.exp(values * step)) @ inverse).real
-        held = ((vectors * np.where(abs(values) > 0, np.expm1(values * step) / values, step)) @ inverse).real
-        rows = np.zeros((size + delayed, size + delayed))
-        rows[:size, :size] = exact
-        oldest = np.zeros((len(ways), size + delayed))
-        oldest[:, -len(ways) :] += 0.5 * np.eye(len(ways))
-        oldest[:, -2 * len(ways) : -len(ways)] += 0.5 * np.eye(len(ways))
-        rows[:size] += held @ inputs @ (-mean) @ oldest
-        rows[size : size + len(ways), :count] = tool
-        rows[size + len(ways) :, size : -len(ways)] = np.eye(delayed - len(ways))
-        whole = rows @ whole
-    return float(np.abs(np.linalg.eigvals(whole)).max())
+def grown(machine, ways, force, width, period):
+    """The factor by which a disturbance of the machine's tool grows from edge to edge."""
+    vibration = modes(machine)
+    solution = vibration.solution
+    assert solution.ringing == len(solution.squares)
+    return growth(
+        solution.squares,
+        vibration.damping.ratio,
+        ways @ solution.tool[3:],
+        lambda share: PRESSURE * width * force(share),
+        period,
+    )
 
 
-def cutter(teeth, entry, leaving, radial):
-    """Force of all edges per pressure, width and difference of paths, over the share of the time between two edges."""
+def edge(radial):
+    """Force of an edge at an angle, per pressure, width and difference of paths along the feed and across it."""
 
-    def force(share):
-        total = np.zeros((2, 2))
-        for tooth in range(teeth):
-            angle = 2.0 * math.pi * (share + tooth) / teeth
-            if entry <= angle <= leaving:
-                sine, cosine = math.sin(angle), math.cos(angle)
-                push = np.array([-cosine - radial * sine, sine - radial * cosine])
-                total += np.outer(push, [sine, cosine])
-        return total
+    def push(angle):
+        sine, cosine = math.sin(angle), math.cos(angle)
+        return np.outer([-cosine - radial * sine, sine - radial * cosine], [sine, cosine])
 
-    return force
+    return push
 
 
 @pytest.mark.parametrize("speed", [1500.0, 2500.0, 8000.0])
@@ -114,9 +84,7 @@ def test_a_turning_machine_begins_to_chatter_at_the_width(speed):
     direction = np.array([1, 0.3, 0.2]) / np.linalg.norm([1, 0.3, 0.2])
     width = answer.widths[0]
     for share, grows in ((0.97, False), (1.03, True)):
-        factor = growth(
-            modes(machine), direction[None], lambda _: np.array([[-1.0]]), share * width, 1.0 / answer.speeds[0]
-        )
+        factor = grown(machine, direction[None], lambda _: np.array([[-1.0]]), share * width, 1.0 / answer.speeds[0])
         assert (factor > 1.0) is grows
 
 
@@ -131,7 +99,7 @@ def test_a_milling_machine_begins_to_chatter_at_the_width(entry, leaving, teeth,
     width, period = answer.widths[0], 1.0 / (teeth * answer.speeds[0])
     ways = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     for share, grows in ((1.0 - agreed, False), (1.0 + agreed, True)):
-        factor = growth(modes(machine), ways, cutter(teeth, entry, leaving, 0.25), share * width, period)
+        factor = grown(machine, ways, edges(teeth, entry, leaving, edge(0.25)), share * width, period)
         assert (factor > 1.0) is grows
 
 
