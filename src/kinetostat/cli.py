@@ -22,7 +22,6 @@ from kinetostat.commands.common import (
     load_machine,
     no_answer,
     print_json,
-    said_when_slow,
     say_stopped,
     takes_machine,
 )
@@ -31,6 +30,7 @@ from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.report import add_report_commands
+from kinetostat.commands.silence import SilenceWatch, spoken_silence
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import as_typed
@@ -38,8 +38,10 @@ from kinetostat.spec.installation import as_typed
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
+DOING = "computing"
+"""Words while a command takes long that has none of its own."""
 LOOKING = "computing; if the pose is out of reach, the nearest one is looked for"
-"""Words beside the progress bar of a long analysis."""
+"""Words while a check takes long."""
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "machine files": ("list", "new", "schema", "check"),
@@ -91,8 +93,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stopped by Ctrl-C.
     """
     _take_surroundings()
+    with spoken_silence("starting") as watch:
+        return _run(arguments, watch)
+
+
+def _run(arguments: Sequence[str] | None, watch: SilenceWatch | None) -> int:
+    """Run one command, and say in a sentence why it could not be done."""
     try:
-        code = _run(arguments)
+        options = _options(arguments)
+        if watch is not None:
+            watch.say(getattr(options, "doing", DOING))
+            watch.once = getattr(options, "serves", False)
+        code = int(options.run(options))
         sys.stdout.flush()
         return code
     except InputError as error:
@@ -128,14 +140,13 @@ def _take_surroundings() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _run(arguments: Sequence[str] | None) -> int:
-    """Run one command; where only the help was wanted, print it, whole, and stop."""
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the words of a command; where only the help was wanted, print it, whole, and stop."""
     try:
-        options = _parser().parse_args(arguments)
+        return _parser().parse_args(arguments)
     except SystemExit:
         sys.stdout.flush()
         raise
-    return int(options.run(options))
 
 
 def _forget_output() -> None:
@@ -192,6 +203,7 @@ def _parser() -> Parser:
         "a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a long grid or "
         "search, whose checksums are then compared",
     )
+    check.set_defaults(doing=LOOKING)
     add_question(commands, "analyze")
     add_question(commands, "forward")
     add_question(commands, "identify")
@@ -271,8 +283,7 @@ def _check(options: argparse.Namespace) -> int:
     if is_study(options.machine):
         return _check_study(options)
     machine = load_machine(options)
-    with said_when_slow(LOOKING):
-        analysis = analyze(machine)
+    analysis = analyze(machine)
     print_machine(terminal(), machine, f"The file has no mistake. {analysis.message}")
     code = judge_requirements(machine)
     return no_answer(analysis.message) if analysis.status is not Status.OK else code

@@ -1,5 +1,6 @@
 """The commands as a new user types them: exit codes, messages, output."""
 
+import importlib
 import io
 import json
 import os
@@ -12,8 +13,9 @@ import threading
 import pytest
 
 from kinetostat.cli import main
-from kinetostat.commands import common
+from kinetostat.commands import silence
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER, STOPPED
+from kinetostat.commands.silence import CLEAR_LINE
 from kinetostat.engine.program_files import OFF, VARIABLE
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
@@ -305,23 +307,70 @@ def test_a_map_imports_no_array_library_that_xarray_finds():
         assert imported & {"dask", "dask.array", "pint"} == wanted
 
 
-def test_what_takes_long_is_said_on_a_terminal(monkeypatch):
-    class Terminal(io.StringIO):
-        """Standard error on a terminal that tells when something has been written."""
+class Terminal(io.StringIO):
+    """A terminal that tells when something has been written."""
 
-        written = threading.Event()
+    def __init__(self):
+        super().__init__()
+        self.written = threading.Event()
 
-        def isatty(self):
-            return True
+    def isatty(self):
+        return True
 
-        def write(self, text):
-            size = super().write(text)
-            self.written.set()
-            return size
+    def write(self, text):
+        size = super().write(text)
+        self.written.set()
+        return size
 
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
-    monkeypatch.setattr(common, "PATIENCE", 0.0)
-    with common.said_when_slow("looking"):
-        assert terminal.written.wait(60)
-    assert terminal.getvalue() == f"looking ...{common.CLEAR_LINE}"
+
+def terminals_of(monkeypatch):
+    """Standard output and standard error, both terminals, and no patience for silence.
+
+    No fixture: pytest takes both streams back between the fixtures and the test.
+    """
+    monkeypatch.setattr(silence, "PATIENCE", 0.0)
+    monkeypatch.setattr(silence, "COURTESY", 0.001)
+    streams = Terminal(), Terminal()
+    monkeypatch.setattr("sys.stdout", streams[0])
+    monkeypatch.setattr("sys.stderr", streams[1])
+    return streams
+
+
+def test_silence_on_a_terminal_has_words_until_something_is_printed(monkeypatch):
+    output, errors = terminals = terminals_of(monkeypatch)
+    with silence.spoken_silence("looking") as watch:
+        assert errors.written.wait(60)
+        watch.say("fitting")
+        errors.written.clear()
+        print("kinetostat: a note", file=sys.stderr)
+        while not errors.getvalue().endswith("fitting ..."):
+            assert errors.written.wait(60)
+            errors.written.clear()
+        print("the result")
+    assert (sys.stdout, sys.stderr) == terminals
+    assert errors.getvalue() == (
+        f"looking ...{CLEAR_LINE}fitting ...{CLEAR_LINE}kinetostat: a note\nfitting ...{CLEAR_LINE}"
+    )
+    assert output.getvalue() == "the result\n"
+
+
+def test_a_command_says_what_it_does_and_clears_it_before_its_answer(monkeypatch):
+    output, errors = terminals_of(monkeypatch)
+    analyze = importlib.import_module("kinetostat.studies.analysis").analyze
+
+    def slow(*arguments, **options):
+        assert errors.written.wait(60)
+        return analyze(*arguments, **options)
+
+    monkeypatch.setattr("kinetostat.studies.analysis.analyze", slow)
+    assert main(["check", "hexapod"]) == 0
+    assert "computing; if the pose is out of reach" in errors.getvalue()
+    assert errors.getvalue().endswith(CLEAR_LINE)
+    assert "The file has no mistake" in output.getvalue()
+
+
+def test_a_pipe_hears_no_words(monkeypatch, capsys):
+    monkeypatch.setattr(silence, "PATIENCE", 0.0)
+    with silence.spoken_silence("looking") as watch:
+        assert watch is None
+    assert capsys.readouterr().err == ""

@@ -5,7 +5,6 @@ The options of a question are added when its command is used, so that `kinetosta
 
 import argparse
 import sys
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from kinetostat.commands.common import (
     direction,
     give,
     load_machine,
-    said_when_slow,
     search_bar,
     takes_figures,
     takes_json,
@@ -75,6 +73,7 @@ def add_other_questions(commands: "Commands") -> None:
 def _fill(command: Parser, summary: str, question: Question) -> None:
     command.description = f"{summary[0].upper()}{summary[1:]}."
     command.epilog = f"example:\n  {question.example}\n"
+    command.set_defaults(doing=question.slow)
     takes_machine(command)
     for option in question.options:
         _add_option(command, option)
@@ -153,11 +152,12 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
     machine = load_machine(options, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
     given = {name: value for name, value in given.items() if value not in (None, [])}  # else the function's defaults
-    waiting = nullcontext() if question.reports_progress else said_when_slow(question.slow)
     try:
-        with waiting, search_bar(question.slow) as update:
-            reports = {"progress": partial(_advance, update)} if question.reports_progress else {}
-            answer = question.answer(machine, **given, **reports)
+        if question.reports_progress:
+            with search_bar(question.slow) as update:
+                answer = question.answer(machine, **given, progress=partial(_advance, update))
+        else:
+            answer = question.answer(machine, **given)
     except InputError as error:
         raise InputError(_in_words(question, str(error))) from None
     return show_answer(options, answer, to_files=bool(question.suffixes))

@@ -8,7 +8,6 @@ import json
 import re
 import sys
 import textwrap
-import threading
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -33,10 +32,6 @@ DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
-PATIENCE = 0.3
-"""Seconds for which an answer may take without a word."""
-CLEAR_LINE = "\r\x1b[K"
-"""Makes a terminal empty the line that it is in."""
 MEMORY = 600.0
 """Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
@@ -319,23 +314,6 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
         yield lambda done, total, words: bar.update(
             task, completed=done, total=total, description=f"{what} {words}".rstrip()
         )
-
-
-@contextmanager
-def said_when_slow(what: str) -> "Iterator[None]":
-    """Say on a terminal what is being done as soon as it takes longer than people wait without a word."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    words = sys.stderr
-    timer = threading.Timer(PATIENCE, lambda: print(f"{what} ...", end="", file=words, flush=True))
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()
-        print(CLEAR_LINE, end="", file=words, flush=True)
 
 
 def judge_requirements(machine: "Machine", printing: bool = True) -> int:

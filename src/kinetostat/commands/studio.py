@@ -25,6 +25,7 @@ def add_studio_command(commands: "Commands") -> None:
         commands, "studio", _studio, "open a page in the browser to see a machine, move it, and see where it is stiff",
         "kinetostat studio tripteron --port 8010",
     )  # fmt: skip
+    studio.set_defaults(doing="opening the studio", serves=True)
     studio.add_argument("machine", metavar="MACHINE", nargs="?", default=FIRST, help=f"{MACHINE}; default: {FIRST}")
     studio.add_argument(
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",

@@ -1,0 +1,112 @@
+"""Words on a terminal while a command has printed nothing for a moment, whatever it is doing. No command is known here.
+
+Reading a machine, compiling, computing and writing files may each take seconds. A watch hears all that is written to
+standard output and standard error, so that none of them has to say that it is busy, and two never say it at once.
+"""
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+PATIENCE = 0.3
+"""Seconds for which nothing may be printed without a word."""
+COURTESY = 0.1
+"""Seconds that a progress bar has for its next picture where one computation has held up all threads."""
+CLEAR_LINE = "\r\x1b[K"
+"""Makes a terminal empty the line that it is in."""
+
+
+class SilenceWatch:
+    """Says on a terminal what a command is doing while nothing is printed, until its result is.
+
+    Attributes:
+        once: whether a word on standard error is the last as well, as that of a server, which then waits.
+    """
+
+    once = False
+
+    def __init__(self, terminal: Any, words: str) -> None:
+        self._words = words
+        self._terminal = terminal
+        self._lock = threading.RLock()
+        self._heard = time.monotonic()
+        self._spoken = False
+        self._over = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def say(self, words: str) -> None:
+        """Say from now on that the command is doing this."""
+        with self._lock:
+            self._words = words
+            if self._spoken:
+                self._write(f"{CLEAR_LINE}{words} ...")
+
+    def hear(self) -> None:
+        """Note that something is about to be printed; the words make room for it."""
+        if self.once:
+            self._over.set()
+        with self._lock:
+            if self._spoken:
+                self._write(CLEAR_LINE)
+            self._spoken = False
+            self._heard = time.monotonic()
+
+    def end(self) -> None:
+        """Say no more: the result is being printed."""
+        self._over.set()
+        self.hear()
+
+    def _watch(self) -> None:
+        while not self._over.wait(max(self._heard + PATIENCE - time.monotonic(), COURTESY)):
+            if self._silent() and not self._over.wait(COURTESY) and self._silent():
+                with self._lock:
+                    if self._silent() and not self._over.is_set():
+                        self._write(f"{self._words} ...")
+                        self._spoken = True
+
+    def _write(self, text: str) -> None:
+        self._terminal.write(text)
+        self._terminal.flush()
+
+    def _silent(self) -> bool:
+        return not self._spoken and time.monotonic() >= self._heard + PATIENCE
+
+
+class HeardStream:
+    """A stream that says that it is written to before it is; in all else it is the stream."""
+
+    def __init__(self, stream: Any, heard: Any) -> None:
+        self._stream = stream
+        self._heard = heard
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        self._heard()
+        return int(self._stream.write(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def spoken_silence(words: str) -> Iterator[SilenceWatch | None]:
+    """Say on a terminal what is being done while nothing is printed; the first word on standard output ends it.
+
+    Its value is the watch, or None where standard error is not a terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    output, terminal = sys.stdout, sys.stderr
+    watch = SilenceWatch(terminal, words)
+    heard = HeardStream(output, watch.end), HeardStream(terminal, watch.hear)
+    sys.stdout, sys.stderr = heard  # type: ignore[assignment]
+    try:
+        yield watch
+    finally:
+        watch.end()
+        if (sys.stdout, sys.stderr) == heard:
+            sys.stdout, sys.stderr = output, terminal
