@@ -15,7 +15,7 @@ from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.report import gather
 from kinetostat.validation.comparison import validate
 from kinetostat.views.report.pdf import page_pictures
-from kinetostat.views.report.provenance import Origin
+from kinetostat.views.report.stiffness import Origin
 from kinetostat.views.report.writing import report_of
 
 ROOT = Path(__file__).parent.parent

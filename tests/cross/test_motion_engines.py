@@ -16,7 +16,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.dynamics import dynamics
-from kinetostat.validation.masses import rotor_inertia
+from kinetostat.validation.pieces import rotor_inertia
 from telescopes import telescopes
 
 AGREED = 1e-8

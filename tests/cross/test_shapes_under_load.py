@@ -10,7 +10,7 @@ from test_cables import HANGING, cables
 from kinetostat import build, carrying_legs, load, plot, save, under_load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
-from kinetostat.kinetostatics.deflected import deflected_links
+from kinetostat.kinetostatics.loading import deflected_links
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
 from kinetostat.views.scene.anatomy import proportions_of

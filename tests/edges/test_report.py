@@ -23,7 +23,7 @@ from kinetostat.studies.grid import usual_ranges
 from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page
-from kinetostat.views.report.provenance import Origin
+from kinetostat.views.report.stiffness import Origin
 from kinetostat.views.report.writing import report_of
 from pages import ROOT
 from studies import SMALL

@@ -15,9 +15,9 @@ from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
 from kinetostat.studies.budget.allocation import allocation_for, reach_of
-from kinetostat.studies.budget.data import contributions_csv
 from kinetostat.studies.budget.spread import Measures, first_order, measures_of, spread_of
 from kinetostat.studies.budget.tolerances import TolerancedPart, is_about, random_inputs, toleranced_parts
+from kinetostat.views.budget_data import contributions_csv
 
 LINES = {
     "hexapod": {"joints": "0.05 mm", "zeros": "0.02 mm normal", "gains": "20 um/m", "clearances": "5 um"},

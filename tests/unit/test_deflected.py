@@ -4,8 +4,7 @@ import pytest
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.deflected import DeflectedLink, deflected_links
-from kinetostat.kinetostatics.loading import deflection
+from kinetostat.kinetostatics.loading import DeflectedLink, deflected_links, deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from machines import every_machine

@@ -7,9 +7,8 @@ import pytest
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.deflected import deflected_links
 from kinetostat.kinetostatics.indices import Principal
-from kinetostat.kinetostatics.loading import deflection
+from kinetostat.kinetostatics.loading import deflected_links, deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import changed, load
 from kinetostat.views.scene.anatomy import anatomy, proportions_of

@@ -16,8 +16,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
 from kinetostat.studies.grid import field_of
 from kinetostat.studies.workspace import workspace
-from kinetostat.studies.workspace_borders import depth
-from kinetostat.studies.workspace_verdicts import BEYOND, INSIDE, Judge
+from kinetostat.studies.workspace_verdicts import BEYOND, INSIDE, Judge, depth
 from kinetostat.views.answers import plot
 from machines import load_without_limits as load
 from refusals import refused

@@ -19,7 +19,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
+from kinetostat.kinetostatics.loading import DeflectedLink, leg_links
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member

@@ -18,7 +18,7 @@ from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of,
 from kinetostat.exchange.results import reference_point
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
-from kinetostat.validation.masses import Heavy
+from kinetostat.validation.pieces import Heavy
 
 ROD_RADIUS = 0.008
 """Radius of a link in the picture, as a share of the machine's extent."""

@@ -27,17 +27,20 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import COINCIDENT, COINCIDENT_HINGES, RIGID_BLOCK, SOFT_CONSTRAINT
-from kinetostat.validation.masses import (
+from kinetostat.validation.pieces import (
     Heavy,
     HeavyLink,
+    Piece,
+    array,
     has_rotors,
+    joint_of,
     links,
     on_platform,
     one_body,
+    pieces,
     rotor_inertia,
     thin_rod,
 )
-from kinetostat.validation.pieces import Piece, array, joint_of, pieces
 
 NOMINAL_MASS = 1.0
 """kg, of every body where no mass is known: deflections do not depend on it."""

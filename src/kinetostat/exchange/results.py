@@ -19,14 +19,13 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, frame_of
 from kinetostat.machine.machine import springs as springs_of
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.plain_data import no_formula
-from kinetostat.studies.setting import frame_of
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.units import KINDS
+from kinetostat.views.data_forms import no_formula
 
 UNITS = {
     "stiffness": ("N·m/rad", "N/rad", "N/m"),

@@ -37,8 +37,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
 from kinetostat.tolerances import COINCIDENT_HINGES
-from kinetostat.validation.masses import Heavy, matrix_of, on_platform, one_body, thin_rod
-from kinetostat.validation.pieces import array
+from kinetostat.validation.pieces import Heavy, array, matrix_of, on_platform, one_body, thin_rod
 
 TIP = "_tip"
 """End of the name of the last link of a leg; what stands before it is the leg's."""

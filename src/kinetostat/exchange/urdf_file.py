@@ -18,7 +18,7 @@ from kinetostat.machine.common_tables import is_tensor_of_body
 from kinetostat.machine.parameters import TENSOR
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.validation.masses import Heavy, matrix_of
+from kinetostat.validation.pieces import Heavy, matrix_of
 
 MOST_JOINTS = 2000
 """Most joints of a file: more is a mistake."""

@@ -24,7 +24,7 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.tolerances import COINCIDENT_HINGES, INDEPENDENT_AXES, OPEN_LOOP
 from kinetostat.units import RIGID
-from kinetostat.validation.masses import one_body
+from kinetostat.validation.pieces import one_body
 
 CLOSING = ("fixed", "revolute", "continuous", "prismatic", "spherical")
 """Kinds of joints that may close a loop."""

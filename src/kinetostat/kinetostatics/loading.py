@@ -1,20 +1,32 @@
-"""A wrench on the platform: the displacement of the tool, and the loads of legs, springs and joints. One pose.
+"""Loads at one pose: the displacement of the tool and the loads of legs, springs and joints; deflected shape; internal.
 
-Source: theory (28) and (29). Wrenches and twists are in base axes, at the point that each function names.
+A wrench on the platform moves the tool, and to first order every joint and link. Internal loads are wrenches that legs
+exert on each other through the platform without any load on it: if a spring on their way deflects, elasticity decides
+how large they are; if everything is rigid, they are undecided, and no motion of the platform depends on them. Wrenches
+and twists are in base axes, at the point that each function names.
+
+Source: theory (28) and (29); theory (31) and (32) for the shape; theory (9) and theory section 7 for internal loads.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from math import isinf
+
+import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, total, weighted
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix
-from kinetostat.kinetostatics.leg import INFINITE
+from kinetostat.kinetostatics.leg import INFINITE, free_springs_as_joints
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Element, Joint, Leg, work_on_free
+from kinetostat.machine.leg import Element, Joint, Leg, LegScrews, Spring, work_on_free
+from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES
 
 
 @dataclass(frozen=True)
@@ -116,3 +128,205 @@ def _joints(element: Element) -> list[tuple[str, Joint]]:
     """The freedoms of an element by the name of their joint, also those that an actuator or a flexure holds."""
     springs = [s for s in element.springs if s.actuated or s.hinge]
     return [(j.name, j) for j in element.freedoms] + [(s.joint.name or s.name, s.joint) for s in springs]
+
+
+@dataclass(frozen=True)
+class DeflectedLink:
+    """A link of a leg with the small motions of its ends.
+
+    Attributes:
+        leg: its name.
+        start, end: before the load, base frame, m.
+        start_motion, end_motion: rotation (rad) and displacement (m) of each end, at that end, base axes.
+    """
+
+    leg: str
+    start: Vector
+    end: Vector
+    start_motion: Twist
+    end_motion: Twist
+
+    def point(self, share: float, factor: float) -> Vector:
+        """The point at a share of the link once it has bent, displacements times `factor`; base frame, m.
+
+        Cubic between its ends, as a beam without load between them bends.
+        """
+        span, s = self.end - self.start, share
+        turned = [motion.rotational.cross(span) for motion in (self.start_motion, self.end_motion)]
+        shift = (
+            self.start_motion.translational * (2 * s**3 - 3 * s**2 + 1)
+            + turned[0] * (s**3 - 2 * s**2 + s)
+            + self.end_motion.translational * (3 * s**2 - 2 * s**3)
+            + turned[1] * (s**3 - s**2)
+        )
+        return self.start + span * s + shift * factor
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """Small motions of a loaded machine.
+
+    Attributes:
+        load: at the tool point, base axes, N·m and N.
+        motion: of the tool point, rad and m.
+        links: deflected links of the legs.
+    """
+
+    load: Wrench
+    motion: Twist
+    links: tuple[DeflectedLink, ...]
+
+
+def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
+    """All links of a machine under a wrench at its tool point (N·m; N, base axes).
+
+    Springs give as they are loaded; passive joints and free springs move so that each leg's end follows the platform
+    (least squares of J_p q = t - J_e d, which has a solution because the statics hold).
+    """
+    platform = deflection(response.statics, load)
+    loads = iter(spring_loads(response, load))
+    links: list[DeflectedLink] = []
+    for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
+        pairs = [(twist, soft, next(loads)) for twist, soft in zip(screws.elastic, screws.compliance, strict=True)]
+        elastic = [None if isinf(soft) else twist * (load * soft) for twist, soft, load in pairs]
+        free = [twist for twist, soft, _ in pairs if isinf(soft)]
+        passive = [joint.twist(response.reference) for joint in leg.passive]
+        left = platform - _sum([twist for twist in elastic if twist is not None])
+        turned = _following([*passive, *free], left, float(response.configuration.length))
+        freed = iter(turned[len(passive) :])
+        given = [next(freed) if twist is None else twist for twist in elastic]
+        bodies = _bodies(leg, iter(turned[: len(passive)]), iter(given))
+        links += leg_links(leg, partial(_twist_at, bodies, response.reference))
+    return links
+
+
+def leg_links(leg: Leg, moved: Callable[[int, Vector], Twist]) -> Iterator[DeflectedLink]:
+    """The links between the points of a chain.
+
+    Args:
+        leg: at the pose.
+        moved: the motion, in base axes (rad, m), of a point of the body after so many elements.
+    """
+    at: Vector | None = None
+    leaving = 0
+    for number, element in enumerate(leg.chain):
+        points = _points(element)
+        for n, point in enumerate(points):
+            body = number + (n > 0)
+            if at is not None and (point - at).norm() > 0.0:
+                yield DeflectedLink(leg.name, at, point, moved(leaving, at), moved(body, point))
+            at, leaving = point, body
+        if len(points) == 1:
+            leaving = number + 1
+
+
+def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twist]:
+    """Motions of the passive joints that add up to `left`, by least squares; `length` (m) makes rows comparable."""
+    if not passive:
+        return []
+    scale = np.repeat([length, 1.0], 3)
+    columns = np.array([twist.components() for twist in passive], dtype=float).T * scale[:, None]
+    amounts = np.linalg.lstsq(columns, np.array(left.components(), dtype=float) * scale, rcond=1e-9)[0]
+    return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
+
+
+def _bodies(leg: Leg, turned: Iterator[Twist], given: Iterator[Twist]) -> list[Twist]:
+    """Motions of the bodies before, between and after the elements of a chain, added up from the base."""
+    motions = [Twist(ZERO, ZERO)]
+    for element in leg.chain:
+        moves = [next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs]
+        motions.append(motions[-1] + _sum(moves))
+    return motions
+
+
+def _twist_at(bodies: Sequence[Twist], reference: Vector, body: int, point: Vector) -> Twist:
+    return bodies[body].moved(point - reference)
+
+
+def _points(element: Element) -> tuple[Vector, ...]:
+    """The points of the chain at which an element lies: none for a slide."""
+    if isinstance(element, Joint | Spring):
+        point = element.mover.point
+        return () if point is None else (point,)
+    return element.path
+
+
+def _sum(twists: Sequence[Twist]) -> Twist:
+    result = Twist(ZERO, ZERO)
+    for twist in twists:
+        result = result + twist
+    return result
+
+
+@dataclass(frozen=True)
+class InternalLoads:
+    """Statically indeterminate loads of a machine.
+
+    Attributes:
+        degree: number of independent internal loads that the legs can carry: 0 for an isostatic machine.
+        undecided: number of these that deflect no spring.
+        legs: names of the legs that carry internal loads.
+        undecided_legs: names of the legs that carry undecided ones.
+    """
+
+    degree: int
+    undecided: int
+    legs: tuple[str, ...]
+    undecided_legs: tuple[str, ...]
+
+
+def internal_loads(
+    names: Sequence[str], legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()
+) -> InternalLoads:
+    """The internal loads of a machine at a regular pose.
+
+    They are the null space of the matrix whose columns are the wrenches of all legs (and of the guide): amounts of
+    these wrenches that add up to zero on the platform. Those among them that load no elastic spring are undecided.
+
+    Args:
+        names: names of the legs.
+        legs: their screws at one reference point, base axes.
+        length: characteristic length, m, by which moments are divided to compare them with forces.
+        guide: the wrenches by which a planar machine is kept in its plane; none for a spatial machine.
+    """
+    balanced = [free_springs_as_joints(leg) for leg in legs]
+    owners = np.repeat(np.arange(len(legs)), [len(leg.wrenches) for leg in balanced])
+    columns = [wrench.components() for leg in balanced for wrench in leg.wrenches]
+    columns += [wrench.components() for wrench in guide]
+    if not columns:
+        return InternalLoads(0, 0, (), ())
+    matrix = np.array(columns, dtype=float).T / np.repeat([length, 1.0], 3)[:, None]
+    sizes = np.linalg.norm(matrix, axis=0)
+    _, values, rows = np.linalg.svd(matrix / sizes)
+    internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
+    _, elastic, modes = np.linalg.svd(_load_shares(balanced) @ internal)
+    decided = int((elastic > CLOSING_ROUND_OFF).sum())
+    undecided = internal @ modes[decided:].T
+    return InternalLoads(
+        internal.shape[1],
+        internal.shape[1] - decided,
+        _involved_legs(names, owners, internal),
+        _involved_legs(names, owners, undecided),
+    )
+
+
+def _load_shares(legs: Sequence[LegScrews]) -> Array:
+    """Load in each elastic spring per unit of each leg's wrenches, over its order of size [springs x wrenches]."""
+    rows: list[Array] = []
+    count = sum(len(leg.wrenches) for leg in legs)
+    start = 0
+    for leg in legs:
+        for loads, compliance, square in zip(leg.loads, leg.compliance, leg.load_squares, strict=True):
+            if compliance > 0.0:
+                rows.append(np.zeros(count))
+                rows[-1][start : start + len(loads)] = np.array(loads, dtype=float) / math.sqrt(square)
+        start += len(leg.wrenches)
+    return np.array(rows).reshape(len(rows), count)
+
+
+def _involved_legs(names: Sequence[str], owners: Integers, loads: Array) -> tuple[str, ...]:
+    """Names of the legs that carry a share of any of these loads."""
+    if not loads.size:
+        return ()
+    carried = np.abs(loads).max(axis=1) > DEPENDENT_WRENCHES * np.abs(loads).max()
+    return tuple(name for i, name in enumerate(names) if carried[owners == i].any())

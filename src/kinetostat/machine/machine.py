@@ -5,7 +5,7 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 Points and axes are in the base frame.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -19,7 +19,7 @@ from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_in
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
-from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
+from kinetostat.machine.parameters import Given, check_contrast, parameters, read_numbers, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
@@ -27,7 +27,7 @@ from kinetostat.spec.immutable import FixedDict, Immutable, immutable_data
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.requirements import Requirement
 from kinetostat.spec.tolerance_table import Tolerance
-from kinetostat.units import UnitError
+from kinetostat.units import KINDS, UnitError
 
 
 @dataclass(frozen=True)
@@ -360,3 +360,25 @@ def _wrench(table: Any) -> Wrench:
 def springs(configuration: Configuration) -> list[Spring]:
     """All springs of the machine, leg by leg: the order of every per-spring result."""
     return [spring for leg in configuration.legs for spring in leg.springs]
+
+
+POSE_DIGITS = 6
+"""Digits of a coordinate, which people have written themselves."""
+
+
+def frame_of(machine: Machine, axes: str = "base") -> str:
+    """Name the axes, "base" or "platform", and the point to which K and C of a machine refer."""
+    return f"{axes} axes at the {machine.reference}"
+
+
+def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:
+    """List the coordinates of the pose that do not vary, in the units of its display; empty where all vary."""
+    here = values(machine)
+    fixed = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
+    shown = (machine.display.show(float(here[p.path]), KINDS[p.quantity.kind].unit, digits=POSE_DIGITS) for p in fixed)
+    return ", ".join(f"{p.path.removeprefix('pose.')} {text}" for p, text in zip(fixed, shown, strict=True))
+
+
+def setting_of(machine: Machine, varied: Collection[str] = ()) -> str:
+    """Write frame and pose in one line; the arguments are those of `pose_of`."""
+    return "; ".join(text for text in (frame_of(machine), pose_of(machine, varied)) if text)

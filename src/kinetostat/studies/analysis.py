@@ -29,7 +29,7 @@ from kinetostat.kinematics.mobility import (
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.indices import twist_condition
-from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
+from kinetostat.kinetostatics.loading import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import no_limits_sentence

@@ -16,12 +16,11 @@ from kinetostat.engine.kernel import Identical
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, frame_of, pose_of
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked
 from kinetostat.studies.evaluation import MACHINES_KEPT, MATRICES, PoseAnswers, answers_at
 from kinetostat.studies.poses import given_poses
-from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 # With its first dataset, xarray imports the other array libraries that it finds (pint 0.2 s, dask 0.5 s). This belongs

@@ -25,8 +25,8 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, limit_use, load_checks, why_beyond, within
 from kinetostat.kinematics.mobility import describe
 from kinetostat.kinematics.status import PLACELESS, Status
-from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.indices import free_stiffnesses
+from kinetostat.kinetostatics.loading import DeflectedLink
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine, springs

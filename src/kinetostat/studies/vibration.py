@@ -20,7 +20,7 @@ from kinetostat.equilibrium.links import loaded_links
 from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.deflected import Deflection
+from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Machine

@@ -27,8 +27,16 @@ from kinetostat.spec.renamed import former_names
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question
 from kinetostat.studies.poses import MOST_DIMENSIONS
-from kinetostat.studies.workspace_borders import borders
-from kinetostat.studies.workspace_verdicts import INSIDE, Demand, Judge, PoseCondition, Poses, demands, parse_condition
+from kinetostat.studies.workspace_verdicts import (
+    INSIDE,
+    Demand,
+    Judge,
+    PoseCondition,
+    Poses,
+    borders,
+    demands,
+    parse_condition,
+)
 
 COLOURING_QUANTITY = "least_translational_stiffness"
 """Quantity by which a workspace is coloured where no condition names another."""

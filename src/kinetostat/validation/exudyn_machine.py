@@ -22,16 +22,19 @@ from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, NO
 from kinetostat.validation.as_written import DrawnMachine, drawing
 from kinetostat.validation.comparison import Answer, Trial
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
-from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
 from kinetostat.validation.pieces import (
     Piece,
     StrutPiece,
     array,
     columns,
     end_compliance,
+    has_rotors,
     in_plane,
     joint_of,
+    links,
+    on_platform,
     pieces,
+    rotor_inertia,
     section_axes,
 )
 

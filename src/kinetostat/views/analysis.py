@@ -15,25 +15,25 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, pose_of
 from kinetostat.machine.parameters import POSE, shown, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import AXES, Analysis, analyze
 from kinetostat.studies.indices import indices_json
-from kinetostat.studies.setting import pose_of
 from kinetostat.views import analysis_tables as free
-from kinetostat.views.first_lines import first_lines
+from kinetostat.views.analysis_tables import first_lines
 from kinetostat.views.forward import actuator_coordinates
 from kinetostat.views.question import FIRST_FIELDS, MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 
 if TYPE_CHECKING:
     from kinetostat.equilibrium import solving
-    from kinetostat.studies import plain_data, requirements, under_load
+    from kinetostat.studies import requirements, under_load
     from kinetostat.studies.under_load import LoadedState
+    from kinetostat.views import data_forms
     from kinetostat.views import loaded_tables as loaded
 else:
     solving = LateModule("kinetostat.equilibrium.solving")
-    plain_data = LateModule("kinetostat.studies.plain_data")
+    data_forms = LateModule("kinetostat.views.data_forms")
     requirements = LateModule("kinetostat.studies.requirements")
     under_load = LateModule("kinetostat.studies.under_load")
     loaded = LateModule("kinetostat.views.loaded_tables")
@@ -159,7 +159,7 @@ def _mobility(mobility: Mobility | None) -> dict[str, Any] | None:
 
 def _attribution(analysis: Analysis) -> list[dict[str, Any]]:
     return [
-        {**vars(spring), "stiffness": plain_data.stiffness_of_spring(spring.stiffness)}
+        {**vars(spring), "stiffness": data_forms.stiffness_of_spring(spring.stiffness)}
         for spring in analysis.attribution
     ]
 

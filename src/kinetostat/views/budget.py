@@ -24,9 +24,9 @@ from kinetostat.studies.budget.budget import (
     budget,
     possible_errors,
 )
-from kinetostat.studies.budget.data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.studies.budget.tolerances import is_about
 from kinetostat.units import KINDS
+from kinetostat.views.budget_data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 

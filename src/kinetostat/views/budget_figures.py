@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.budget.budget import Budget
-from kinetostat.studies.budget.data import budget_dataset
-from kinetostat.studies.setting import setting_of
 from kinetostat.views.budget import ranked_by
+from kinetostat.views.budget_data import budget_dataset
 from kinetostat.views.figures import (
     COLOURS,
     contour_maps,

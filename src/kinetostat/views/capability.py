@@ -6,8 +6,8 @@ Source: theory (81)-(84).
 import math
 from collections.abc import Iterator
 
+from kinetostat.machine.machine import pose_of
 from kinetostat.studies.capability import Capability, capability
-from kinetostat.studies.setting import pose_of
 from kinetostat.views.analysis_tables import direction_words
 from kinetostat.views.question import FIRST_FIELDS, LOADS_LEFT_OUT, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+from kinetostat.machine.machine import setting_of
 from kinetostat.numerics.polytopes import outline
 from kinetostat.studies.capability import Capability, CapabilitySet
-from kinetostat.studies.setting import setting_of
 from kinetostat.tolerances import DEPENDENT
 from kinetostat.views.capability import TITLES
 from kinetostat.views.figures import COLOURS, new_figure

@@ -16,7 +16,7 @@ from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
-from kinetostat.studies.plain_data import columns_csv
+from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.forward import coordinate_text
 from kinetostat.views.question import LAW_TOLERANCE, MESSAGE, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table

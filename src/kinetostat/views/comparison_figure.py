@@ -11,9 +11,9 @@ from matplotlib.patches import Patch
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.display import Display
+from kinetostat.machine.machine import frame_of
 from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
-from kinetostat.studies.setting import frame_of
 from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 

@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.closing import POINT
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
 from kinetostat.studies.motion_deflection import ModesAlong
-from kinetostat.studies.plain_data import columns_csv
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.studies.setting import setting_of
+from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, new_figure, note_setting
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table

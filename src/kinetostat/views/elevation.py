@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
-from kinetostat.studies.plain_data import columns_csv
-from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
+from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, look_of, new_figure
 from kinetostat.views.question import (
     FIRST_FIELDS,

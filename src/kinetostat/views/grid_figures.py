@@ -15,10 +15,10 @@ from matplotlib.patches import Patch
 from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
-from kinetostat.studies.setting import setting_of
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import (
     axis_values,

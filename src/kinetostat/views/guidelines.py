@@ -12,7 +12,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import LEAST_EFFECT, MATTERS, limit_of, statements
 from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guidelines
-from kinetostat.studies.plain_data import stiffness_of_spring
+from kinetostat.views.data_forms import stiffness_of_spring
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LOADS_LEFT_OUT,

@@ -17,11 +17,11 @@ from matplotlib.lines import Line2D
 from kinetostat.arrays import Array
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import limit_of
 from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import PER, Sensitivity
-from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.levels import usual_range

@@ -11,10 +11,9 @@ from matplotlib.lines import Line2D
 
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number
-from kinetostat.kinetostatics.deflected import Deflection
+from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.machine import Machine
-from kinetostat.studies.setting import setting_of
+from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, new_figure, set_title

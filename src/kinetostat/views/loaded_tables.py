@@ -8,8 +8,7 @@ from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.under_load import LoadedState, SpringState
 from kinetostat.tolerances import NO_REACTION
-from kinetostat.views.analysis_tables import entry_unit
-from kinetostat.views.first_lines import softest_sentence, stiffness_sentence
+from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiffness_sentence
 from kinetostat.views.question import Lines
 from kinetostat.views.tables import FittedTable, numeric_table
 

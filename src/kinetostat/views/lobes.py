@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kinetostat.display import number
+from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
-from kinetostat.studies.setting import pose_of, setting_of
 from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
-from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.measured import SOURCE_WORDS

@@ -11,11 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.display import DASH, number
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.drives import root_mean_square
 from kinetostat.studies.motors import MotorChoice, MotorFit, motors
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table

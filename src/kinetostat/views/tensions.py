@@ -7,7 +7,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from kinetostat.display import number
-from kinetostat.studies.setting import setting_of
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.tensions import Tensions, tensions
 from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records

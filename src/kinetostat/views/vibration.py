@@ -7,8 +7,8 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import Display, number
 from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.machine import pose_of
 from kinetostat.studies.attribution import ranking_of
-from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.vibration.coupling import FreeTool
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from kinetostat.arrays import Array
-from kinetostat.studies.setting import setting_of
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
 from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.loaded_figures import moved_figure

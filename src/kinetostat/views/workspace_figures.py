@@ -22,7 +22,6 @@ from kinetostat.arrays import Array
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.grid import field_of
 from kinetostat.studies.workspace import BORDER_VARIABLES, COLOURING_QUANTITY, Workspace
-from kinetostat.studies.workspace_borders import depth, surface
 from kinetostat.studies.workspace_verdicts import (
     BEYOND,
     CONDITION_VERDICT,
@@ -30,7 +29,9 @@ from kinetostat.studies.workspace_verdicts import (
     LIMIT_VERDICT,
     STATUS_VERDICTS,
     PoseCondition,
+    depth,
     phrase,
+    surface,
 )
 from kinetostat.views.figures import (
     COLOURS,

@@ -17,11 +17,10 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
-from kinetostat.studies.optimisation.genetic import Genetic
-from kinetostat.studies.optimisation.gradient import Gradient
 from kinetostat.studies.optimisation.log import ROWS, Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
+from kinetostat.studies.optimisation.steps import Genetic, Gradient
 from kinetostat.studies.result_file import ROW_NUMBER, RowFile
 from kinetostat.studies.study_folder import (
     DATA,

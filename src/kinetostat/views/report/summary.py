@@ -18,8 +18,8 @@ from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
+from kinetostat.views.analysis_tables import first_lines, margins
 from kinetostat.views.drawing import three_views
-from kinetostat.views.first_lines import first_lines, margins
 from kinetostat.views.loaded_tables import actuator_loads, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset

@@ -14,14 +14,13 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, pose_of
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.report import REPORT_STEPS, Answers, Texts, gather, texts_of
-from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.answers import plain_of
@@ -37,8 +36,14 @@ from kinetostat.views.report.content import InnerPage, Paragraph, Report, Sectio
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
-from kinetostat.views.report.provenance import Origin, method_section, record_section
-from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
+from kinetostat.views.report.stiffness import (
+    Origin,
+    load_section,
+    method_section,
+    record_section,
+    stiffness_section,
+    workspace_section,
+)
 from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
 
 SUFFIXES = (".html", ".pdf")

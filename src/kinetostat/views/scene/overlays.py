@@ -12,9 +12,8 @@ from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Rotation, Vector, rotation_along
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.deflected import Deflection, deflected_links
 from kinetostat.kinetostatics.indices import Principal
-from kinetostat.kinetostatics.loading import deflection
+from kinetostat.kinetostatics.loading import Deflection, deflected_links, deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.studies.analysis import Analysis

@@ -8,8 +8,8 @@ import xarray as xr
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.budget.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
-from kinetostat.studies.plain_data import columns_csv
 from kinetostat.units import KINDS
+from kinetostat.views.data_forms import columns_csv
 
 
 def varied_fields(answer: Budget) -> dict[str, tuple[Any, str]]:

@@ -1,0 +1,367 @@
+"""Methods of search, each a row of steps: generations of designs, and descents with exact derivatives.
+
+A generation is a function of the one before it and of the seed, real-coded, for one objective or, as NSGA-II, for
+several. Operators are pymoo's, with its defaults: simulated binary crossover, polynomial mutation, non-dominated
+sorting and crowding. Choices of a catalogue have no order: they are exchanged between parents and drawn again.
+
+A descent goes from one design downhill to where it ends. Sequential quadratic programming keeps within bounds and
+constraints. What is the worst over poses has kinks where two poses are equally bad; there the worst poses each become a
+condition f(pose) <= t, and t is minimised (the epigraph). Other aggregates over several poses change smoothly except
+where the order of poses does; their derivatives are those of the order at hand.
+
+Sources: Deb and Agrawal, Simulated binary crossover for continuous search space, Complex Systems 9 (1995); Deb, An
+efficient constraint handling method for genetic algorithms, Comput. Methods Appl. Mech. Eng. 186 (2000); Deb et al., A
+fast and elitist multiobjective genetic algorithm: NSGA-II, IEEE Trans. Evolutionary Computation 6 (2002); Kraft, A
+software package for sequential quadratic programming, DFVLR-FB 88-28 (1988), as in scipy.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pymoo.operators.crossover.sbx import cross_sbx
+from pymoo.operators.mutation.pm import mut_pm
+
+from kinetostat.arrays import Array, Integers
+from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
+from kinetostat.studies.optimisation.assessment import Assessor, Outcome, join_outcomes
+from kinetostat.studies.optimisation.log import Log, Step
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.slopes import Local, Surveyor
+from kinetostat.studies.optimisation.terms import PoseTerm
+
+if TYPE_CHECKING:
+    from pymoo.operators.survival.rank_and_crowding import metrics
+    from pymoo.util.nds import non_dominated_sorting as sorting
+    from scipy import optimize
+else:  # a genetic search does not descend, and with one objective sorts nothing
+    metrics = LateModule("pymoo.operators.survival.rank_and_crowding.metrics")
+    sorting = LateModule("pymoo.util.nds.non_dominated_sorting")
+    optimize = LateModule("scipy.optimize")
+
+CROSSED = 0.9
+"""Share of the couples whose children are not copies of them."""
+GENE_CROSSED = 0.5
+"""Share of the genes of a couple that are crossed."""
+CROSSOVER_INDEX = 15.0
+"""Of simulated binary crossover: the larger, the nearer children are to their parents."""
+MUTATION_INDEX = 20.0
+"""Of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
+ATTEMPTS = 20
+"""Times that couples are mated to replace children that exist already."""
+
+
+@dataclass(frozen=True)
+class Genetic:
+    """A genetic search.
+
+    Attributes:
+        assess: judges designs.
+        crowded: whether it keeps designs apart along a front (NSGA-II), for several objectives.
+    """
+
+    assess: Assessor
+    crowded: bool = False
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is searched."""
+        return self.assess.problem
+
+    @property
+    def steps(self) -> int:
+        """Generations."""
+        return self.problem.study.optimizer.generations
+
+    def step(self, number: int, log: Log) -> Step:
+        """One generation: the first is random, around the machine as it is; the others are children of the kept."""
+        source = np.random.default_rng([self.problem.study.optimizer.seed, 1, number])
+        if number == 0:
+            genes, parents = self._random(source), np.empty(0, dtype=np.int64)
+        else:
+            parents = log.kept
+            genes = self._children(log.genes(parents), self._order(log.outcome(parents))[0], source)
+        outcome = self.assess(genes)
+        family = np.concatenate([parents, log.count + np.arange(len(genes))])
+        order, _ = self._order(join_outcomes([log.outcome(parents), outcome]) if number else outcome)
+        best = np.argsort(order, kind="stable")[: self.problem.study.optimizer.population]
+        return Step(genes, outcome, family[best])
+
+    def _random(self, source: np.random.Generator) -> Array:
+        """The first generation: the machine as it is, if that is allowed, and random designs."""
+        space, count = self.problem.space, self.problem.study.optimizer.population
+        genes = source.random((count, space.size))
+        picked = space.catalogue > 0
+        genes[:, picked] = np.floor(genes[:, picked] * space.catalogue[picked])
+        if space.holds(space.initial):
+            genes[0] = space.initial
+        return genes
+
+    def _order(self, outcome: Outcome) -> tuple[Integers, Integers]:
+        """Place of each design among all, the best first, and the front that it is on."""
+        signs = np.array([objective.sign for objective in self.problem.objectives])
+        wanted = signs * outcome.objectives
+        front = np.zeros(len(wanted), dtype=np.int64)
+        if not self.crowded:
+            order = np.lexsort([wanted[:, 0], outcome.violation])
+        else:
+            feasible = np.flatnonzero(outcome.violation == 0.0)
+            front[:], lonely = len(wanted), np.zeros(len(wanted))
+            crowding = metrics.get_crowding_function("cd")
+            for rank, members in enumerate(sorting.NonDominatedSorting().do(wanted[feasible]) if feasible.size else []):
+                front[feasible[members]] = rank
+                lonely[feasible[members]] = crowding.do(wanted[feasible[members]], n_remove=0)
+            order = np.lexsort([-lonely, front, outcome.violation])
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        return place, front
+
+    def _children(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
+        """As many new designs as there are parents, none of them twice or one of the parents, as far as possible."""
+        children = np.empty((0, parents.shape[1]))
+        for _ in range(ATTEMPTS):
+            fresh = self._mate(parents, place, source)
+            children = np.concatenate([children, fresh[_new(fresh, np.concatenate([parents, children]))]])
+            if len(children) >= len(parents):
+                break
+        return children[: len(parents)] if len(children) else self._mate(parents, place, source)
+
+    def _mate(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
+        count, size = parents.shape
+        couples = (count + 1) // 2
+        rounds = [source.permutation(count) for _ in range(-(-4 * couples // count))]
+        pairs = np.concatenate(rounds)[: 4 * couples].reshape(-1, 2)
+        winners = np.where(place[pairs[:, 0]] < place[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
+        both = parents[winners.reshape(2, couples)]
+        children = self._cross(both, source)
+        copied = source.random(couples) >= CROSSED
+        children[:, copied] = both[:, copied]
+        return self._mutate(children.reshape(-1, size)[:count], source)
+
+    def _cross(self, both: Array, source: np.random.Generator) -> Array:
+        """Children of couples [2 x couples x variables]."""
+        couples, size = both.shape[1:]
+        index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), 0.5)
+        picked = self.problem.space.catalogue > 0
+        upper = np.where(picked, 0.0, 1.0)  # equal bounds: the operator leaves choices alone
+        children = cross_sbx(both, np.zeros(size), upper, index, GENE_CROSSED, swap, random_state=source)
+        exchanged = (source.random((couples, size)) < 0.5) & picked
+        children[:, :, picked] = both[:, :, picked]
+        children[:, exchanged] = both[::-1, exchanged]
+        return children
+
+    def _mutate(self, genes: Array, source: np.random.Generator) -> Array:
+        count, size = genes.shape
+        catalogue = self.problem.space.catalogue
+        picked = catalogue > 0
+        upper = np.where(picked, 0.0, 1.0)
+        index, share = np.full(count, MUTATION_INDEX), np.full(count, 1.0 / size)
+        mutated = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=source)
+        drawn = np.floor(source.random((count, size)) * np.maximum(catalogue, 1))
+        redrawn = (source.random((count, size)) < 1.0 / size) & picked
+        mutated[:, picked] = genes[:, picked]
+        return np.where(redrawn, drawn, mutated)
+
+
+def _new(fresh: Array, known: Array) -> Integers:
+    """Flags of the designs that are neither known nor earlier in the list."""
+    seen = {row.tobytes() for row in known}
+    numbers = []
+    for number, row in enumerate(fresh):
+        key = row.tobytes()
+        if key not in seen:
+            seen.add(key)
+            numbers.append(number)
+    return np.array(numbers, dtype=np.int64)
+
+
+ITERATIONS = 100
+"""Of one descent."""
+PRECISION = {False: 1e-13, True: 1e-9}
+"""Relative change of the objective at which a descent ends, without and with kinks: along the bottom of a curved one
+it would creep for thousands of steps."""
+WORST_POSES = 24
+"""Conditions that stand for the worst of all poses; more than a design has variables at nearly all kinks."""
+ROUNDS = 5
+"""Descents with newly chosen worst poses, until nothing is gained."""
+GAIN = 1e-7
+"""Relative gain below which a round has gained nothing."""
+BLOCKED = 1e6
+"""Value that counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
+there."""
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Descents from the machine as it is and from designs spread over the space.
+
+    Attributes:
+        assess: judges designs.
+    """
+
+    assess: Assessor
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is searched."""
+        return self.assess.problem
+
+    @property
+    def steps(self) -> int:
+        """Descents."""
+        return self.problem.study.optimizer.starts
+
+    @cached_property
+    def _survey(self) -> Surveyor:
+        return Surveyor(self.problem, searching=True)
+
+    def step(self, number: int, log: Log) -> Step:
+        """One descent."""
+        return self.descend(self._start(number), log)
+
+    def _start(self, number: int) -> Array:
+        """The machine as it is, if that is allowed, then designs spread evenly along every variable."""
+        space, settings = self.problem.space, self.problem.study.optimizer
+        if number == 0 and space.holds(space.initial):
+            return space.initial
+        source = np.random.default_rng([settings.seed, 2])
+        cells = np.stack([source.permutation(settings.starts) for _ in range(space.size)], axis=1)
+        genes = (cells + source.random(cells.shape))[number] / settings.starts
+        return np.where(space.catalogue > 0, np.floor(genes * np.maximum(space.catalogue, 1)), genes)
+
+    def descend(self, start: Array, log: Log) -> Step:
+        """Downhill from a design [variables]; everything that was tried is judged and logged."""
+        descent = _Descent(self.problem, self._survey, start)
+        descent.run()
+        genes = np.unique(np.array(descent.tried), axis=0)
+        outcome = self.assess(genes)
+        signed = self.problem.objectives[0].sign * outcome.objectives[:, 0]
+        best = int(np.lexsort([signed, outcome.violation])[0])
+        kept = [log.count + best]
+        if log.steps:
+            kept = self._better(log, log.kept[0], kept[0], signed[best], float(outcome.violation[best]))
+        return Step(genes, outcome, np.array(kept), {"method": "gradient"})
+
+    def _better(self, log: Log, old: int, new: int, value: float, violation: float) -> list[int]:
+        """The better of the best so far and a new design, then the other."""
+        known = log.outcome([int(old)])
+        before = (
+            float(known.violation[0]),
+            self.problem.objectives[0].sign * float(known.objectives[0, 0]),
+        )
+        return [new, int(old)] if (violation, value) < before else [int(old), new]
+
+
+@dataclasses.dataclass
+class _Descent:
+    """One descent: genes of continuous variables, all else held."""
+
+    problem: Problem
+    survey: Surveyor
+    start: Array
+    tried: list[Array] = field(default_factory=list)
+    _last: tuple[bytes, Local] | None = None
+
+    def run(self) -> None:
+        """Descend; new rounds where the worst poses have to be chosen again."""
+        self.tried.append(self.start)
+        first = self._at(self.start[self.survey.free])
+        if not first.sound:
+            return
+        kinked = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0 and first.reached.size > 1
+        kinked = kinked and (self.problem.robust is None or self.problem.robust.share == 1.0)
+        scale = abs(self._objective(first)[0]) or 1.0
+        genes, value = self.start[self.survey.free], np.inf
+        for _ in range(ROUNDS if kinked else 1):
+            genes = self._minimise(genes, scale, kinked)
+            here = self._at(genes)
+            reached = self._objective(here)[0] / scale if here.sound else np.inf
+            if not value - reached > GAIN:
+                break
+            value = reached
+
+    @property
+    def _term(self) -> Any:
+        return self.problem.objectives[0].term
+
+    def _at(self, genes: Array) -> Local:
+        """The surroundings of a design, remembered from one question to the next."""
+        clipped = np.clip(genes, 0.0, 1.0)
+        key = clipped.tobytes()
+        if self._last is None or self._last[0] != key:
+            whole = self.start.copy()
+            whole[self.survey.free] = clipped
+            self.tried.append(whole)
+            self._last = key, self.survey(whole)
+        return self._last[1]
+
+    def _objective(self, here: Local) -> tuple[float, Array]:
+        sign = self.problem.objectives[0].sign
+        value, slope = here.term(self._term, sign > 0)
+        return sign * value, sign * slope
+
+    def _minimise(self, genes: Array, scale: float, kinked: bool) -> Array:
+        """One call of the solver; in the epigraph the last unknown is the bound t."""
+        count = len(genes)
+        sign = self.problem.objectives[0].sign
+        conditions = [self._condition(c.term, c.sign, c.bound, c.scale) for c in self.problem.constraints]
+
+        def plain(x: Array) -> tuple[float, Array]:
+            here = self._at(x)
+            if not here.sound:
+                return BLOCKED, np.zeros(count)
+            value, slope = self._objective(here)
+            return value / scale, slope / scale
+
+        worst = self._at(genes).worst(self._term, WORST_POSES) if kinked else np.empty(0, dtype=np.int64)
+
+        def pieces(x: Array) -> tuple[Array, Array]:
+            here, rows = self._at(x[:count]), np.zeros((len(worst), count + 1))
+            rows[:, count] = 1.0
+            if not here.sound:
+                return np.full(len(worst), x[count] - BLOCKED), rows
+            values, slopes = here.pieces(self._term, worst)
+            rows[:, :count] = -sign * slopes / scale
+            return x[count] - sign * values / scale, rows
+
+        unknowns, bounds, function = genes, [(0.0, 1.0)] * count, plain
+        if kinked:
+            unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
+            bounds = [*bounds, (-BLOCKED, BLOCKED)]
+            conditions.append({"type": "ineq", "fun": lambda x: pieces(x)[0], "jac": lambda x: pieces(x)[1]})
+            function = _last_unknown
+        solution = optimize.minimize(
+            function,
+            unknowns,
+            jac=True,
+            bounds=bounds,
+            constraints=conditions,
+            method="SLSQP",
+            options={"maxiter": ITERATIONS, "ftol": PRECISION[kinked]},
+        )
+        return np.clip(solution.x[:count], 0.0, 1.0)
+
+    def _condition(self, term: Any, sign: float, bound: float, scale: float) -> dict[str, Any]:
+        """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""
+        size = len(self.survey.free)
+
+        def at(x: Array) -> tuple[float, Array]:
+            here = self._at(x[:size])
+            slope = np.zeros(len(x))
+            if not here.sound:
+                return -1.0, slope
+            value, slope[:size] = here.term(term, sign > 0)
+            return sign * (bound - value) / scale, -sign * slope / scale
+
+        fun: Callable[[Array], float] = lambda x: at(x)[0]  # noqa: E731
+        return {"type": "ineq", "fun": fun, "jac": lambda x: at(x)[1]}
+
+
+def _last_unknown(x: Array) -> tuple[float, Array]:
+    slope = np.zeros(len(x))
+    slope[-1] = 1.0
+    return float(x[-1]), slope
