@@ -74,6 +74,7 @@ KINDS = {
         Kind("linear density", "kg/m", "3.5 kg/m"),
         Kind("mass", "kg", "12 kg"),
         Kind("moment of inertia", "kg·m**2", "2e-4 kg*m**2"),
+        Kind("linear moment of inertia", "kg·m", "1.2e-3 kg*cm**2/mm"),
         Kind("inertia", "kg·m**2", "0.4 kg*m**2"),
         Kind("ratio", "", "0.02"),
         Kind("linear damping", "N·s/m", "500 N*s/m"),

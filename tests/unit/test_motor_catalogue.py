@@ -9,7 +9,7 @@ from kinetostat import InputError, build, bundled, drives, load, motors, require
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.machine.loading import as_toml
-from kinetostat.studies.motors import MotorRating, read_catalogue
+from kinetostat.studies.motors import MotorRating, read_catalogue, with_transmission
 from kinetostat.views.motors import MOTORS, motors_figure
 
 SETTINGS = [
@@ -51,6 +51,18 @@ def test_gears_pass_on_the_torque_that_their_data_sheet_prints_behind_them():
         gear = catalogue.gears[name]
         assert before * gear.ratio * gear.efficiency == pytest.approx(behind, rel=2e-3)
         assert "p. 3-7" in catalogue.sources["gears", name]
+
+
+def test_shafts_of_screws_turn_as_solid_steel_of_their_diameter():
+    """The inertia per length that the tables print, by another route: pi/32 rho d^4 of steel, to their three digits."""
+    catalogue = read_catalogue()
+    for name, screw in catalogue.screws.items():
+        diameter, lead = (1e-3 * float(size) for size in name.removeprefix("thk-").split("x"))
+        assert screw.lead == pytest.approx(lead)
+        assert screw.shaft == pytest.approx(np.pi / 32.0 * 7850.0 * diameter**4, rel=4e-3)
+        assert "THK" in catalogue.sources["screws", name]
+    _, beside = with_transmission(load("hexapod"), catalogue, "", "thk-20x5")
+    assert beside == pytest.approx(1.23e-3 * 1e-4 * 300.0)
 
 
 def test_limits_are_constant_then_of_constant_power_then_nothing():

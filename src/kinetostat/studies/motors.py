@@ -76,7 +76,9 @@ class ScrewRating:
 
     lead: Annotated[float, Quantity("length", "travel per turn of the motor", True)]
     efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
-    inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it")] = 0.0
+    inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it beside the shaft")] = 0.0
+    shaft: Annotated[float, Quantity("linear moment of inertia", "of the screw shaft per length")] = 0.0
+    length: Annotated[float, Quantity("length", "of the screw shaft")] = 0.0
 
 
 SOURCE = "source"
@@ -266,7 +268,7 @@ def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str)
         if name:
             part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
             settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
-            beside += part.inertia
+            beside += part.inertia + (part.shaft * part.length if isinstance(part, ScrewRating) else 0.0)
     return with_every_drive(machine, settings), beside
 
 

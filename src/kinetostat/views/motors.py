@@ -63,7 +63,7 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
     shown = answer.fits[:MOST_DRAWN]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
-    note = "dark: for ever; light: for a short while; lines: the drives; circles: RMS"
+    note = "dark: for ever; light: for a short while; lines: the drives; +: peak; circles: RMS"
     with new_figure(
         (0.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name), setting_of(answer.machine), note
     ) as figure:
@@ -88,6 +88,9 @@ def _diagram(panel: Axes, answer: MotorChoice, fit: MotorFit) -> None:
             panel.plot(speed * PER_MINUTE, np.abs(curves.motor_torque[k]) * scale.factor, color=colour, linewidth=0.8)
             mean = float(root_mean_square(fit.loads.motion.times, speed)) * PER_MINUTE
             panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=4)
+            peak = int(np.argmax(np.abs(curves.motor_torque[k])))
+            torque = abs(float(curves.motor_torque[k, peak])) * scale.factor
+            panel.plot(speed[peak] * PER_MINUTE, torque, "+", color=colour, markersize=7)
     panel.set(xlabel="speed (1/min)", ylabel=scale.label("torque"))
     panel.set_title(f"{fit.name}: {'fits' if fit.fits else 'does not fit'}", loc="left", parse_math=False)
     panel.set_xlim(left=0.0)
