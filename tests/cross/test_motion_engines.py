@@ -27,20 +27,28 @@ MASSES = (
     "tool.centre_of_mass=[0.02, 0.01, 0.03]",
 )
 ROTORS = ("drives.rotor_inertia=1e-4", "drives.lead=10 mm", "drives.ratio=5")
-MOVING = ("hexapod-rus", "planar-3rrr", "tripteron", "hexapod-hardware", "passive-leg-4dof-rus")
+MOVING = (
+    "delta",
+    "delta-linear",
+    "hexapod-rus",
+    "planar-3rrr",
+    "tripteron",
+    "hexapod-hardware",
+    "passive-leg-4dof-rus",
+)
 STRETCHED = ("hexapod", "zhang-gosselin-4dof")
 STENCIL = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0, np.array([2, -27, 270, -490, 270, -27, 2]) / 180.0
 """Differences of order six for a first and a second derivative."""
 STEP = 4e-3
 
 
-def massive(name):
+def massive(name, *more):
     """A bundled machine in which everything has a mass."""
     plain = load(name)
     links = [f"{p.path}=2 kg/m" for p in parameters(plain.family) if p.path.startswith("linear_density.")]
     down = "load.gravity=[1, 2, 0]" if plain.family.planar else "load.gravity=[1, 2, -9.81]"
     inside = ["tool.centre_of_mass=[0.02, 0.01, 0]"] if plain.family.planar else []
-    return load(name, [*MASSES, *ROTORS, *links, down, *inside])
+    return load(name, [*MASSES, *ROTORS, *links, down, *inside, *more])
 
 
 def motions(machine, seed, count=3):
@@ -93,12 +101,12 @@ class Engine:
         self.platform = self.model.joint("platform").dofadr[0] + np.arange(6)
         joints = [self.model.joint(i) for i in range(self.model.njnt)]
         bodies = build(analysis.state.configuration).world.every()
-        driven = [freedom.name for body in bodies for freedom in body.freedoms if freedom.actuated]
+        driven = [freedom.name for body in bodies for freedom in body.freedoms if freedom.drive]
         self.drives = [self.model.joint(name).dofadr[0] for name in driven]
         for body in bodies:
             for freedom in body.freedoms if len(body.freedoms) > 1 else ():
                 # Between springs in a row on one body the model has a little inertia, so that it can be stepped.
-                rotor = rotor_inertia(machine, slides=freedom.point is None) if freedom.actuated else 0.0
+                rotor = rotor_inertia(machine, freedom.drive) if freedom.drive else 0.0
                 self.model.dof_armature[self.model.joint(freedom.name).dofadr[0]] = rotor
         self.held = [j.dofadr[0] for j in joints if float(np.ravel(j.stiffness)[0]) > 0.0 and j.name not in driven]
 
@@ -156,6 +164,16 @@ def apart(machine, moving):
 @pytest.mark.parametrize("name", MOVING)
 def test_drives_do_what_mujoco_asks_for(name):
     assert apart(massive(name), 1.0) < AGREED
+
+
+@pytest.mark.parametrize("name", STRETCHED)
+def test_they_do_so_along_motions_with_struts_that_weigh_nothing(name):
+    """The paper's machine among them: its passive leg, its platform and its rotors are massive."""
+    assert apart(massive(name, "linear_density.legs=0"), 1.0) < AGREED
+
+
+def test_a_rotor_that_one_drive_has_of_its_own_is_that_of_the_engine():
+    assert apart(massive("delta", "drives.leg 2.rotor_inertia=5e-4", "drives.leg 3.ratio=9"), 1.0) < AGREED
 
 
 def test_telescopes_of_cylinders_and_rods_do_so():

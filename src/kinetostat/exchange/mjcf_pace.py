@@ -209,12 +209,17 @@ def _on_bodies(
 def _spread(
     link: HeavyLink, model: Model, between: Sequence[Piece], armatures: dict[str, float]
 ) -> Iterator[tuple[Body, Heavy]]:
-    """Give the bodies that carry a link and what each carries: both bars of a parallelogram half of it."""
+    """Give the bodies that carry a link and what each carries: both bars of a parallelogram, or the bar that it is."""
     chain, first, last = model.chains[link.leg], link.bodies[0], link.bodies[-1]
     if len(link.points) == 1:
         yield chain[first], Heavy(link.mass, link.points[0], link.inertia)
         return
     start, end = link.points
+    for (leg, _), halves in model.bars.items():
+        for near, far in halves if leg == link.leg and len(halves) > 1 else ():
+            if float(np.linalg.norm(near.at - start)) < COINCIDENT_HINGES:  # one of two bars
+                yield from _halves((near, far), (start, end), link.mass, armatures)
+                return
     while first < last and _turns_at(between[first], start):
         first += 1
     while first < last and _turns_at(between[last - 1], end):
