@@ -46,6 +46,8 @@ SURELY_APART = 1e-9
 """Share of the machine's length by which a leg must miss its platform, so that this shows it to be out of reach."""
 SAME_CENTRE = 1e-9
 """Distance, m, below which the centres of joints in a row coincide as written in a file."""
+SAME_DIRECTION = 4e-15
+"""Sine of an angle, or cosine of one from a right angle, that is the round-off of directions as written in a file."""
 LEAST_NORM_DAMPING = 1e-15
 """Damping as a share of the trace of the squared rates: far below what a regular direction weighs, enough for a joint
 coordinate that moves nothing."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from kinetostat.algebra.screw import Twist, force_along
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinematics.mobility import conditioning, describe, free_twist, why_singular
-from kinetostat.machine.leg import LegScrews
+from kinetostat.machine.leg_screws import LegScrews
 from machines import CASES, every_machine, few, regular
 from numeric import U, columns
 

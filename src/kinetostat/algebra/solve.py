@@ -58,13 +58,16 @@ class _Triangular:
         return steps
 
 
-def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
+def dual_basis(
+    basis: Sequence[Sequence[Scalar]], squares: Sequence[Scalar | None] | None = None
+) -> tuple[list[Row], Scalar]:
     """Return the n vectors xi_a with xi_a . w_b = 1 if a = b, else 0, for n vectors w_b of n components.
 
     With the w_b as columns of W, the xi_a are the rows of W^-1.
 
     Args:
         basis: the vectors w_b, each of n scalars; components of comparable size (scale rows before).
+        squares: of each vector that the margin takes with unit size, the square of its size; None of the others.
 
     Returns:
         The n dual vectors, and the singularity margin n / (|W| |W^-1|), Frobenius norms: the reciprocal of a
@@ -72,16 +75,16 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         vectors meaningless.
     """
     solved = _triangularise(basis)
-    dual: list[Row] = [[] for _ in basis]
-    images = solved.images
-    for k in reversed(range(len(basis))):
-        here, row = solved.order[k], solved.pivots[k]
-        later = solved.order[k + 1 :]
-        inverse = reciprocal(solved.vectors[here][row])
-        for column, rows in enumerate(images):
-            known = total([solved.vectors[j][row] * dual[j][column] for j in later])
-            dual[here].append(weighted(inverse, rows[row] - known))
-    return dual, _singularity_margin(basis, dual, solved.least)
+    inverse = [list(row) for row in zip(*solved.inverse(), strict=True)]
+    dual: list[Row] = []
+    for known in inverse:  # a row of R^-1, and of W^-1 = R^-1 Q^T when it has been reflected
+        row: Row = [0.0] * len(basis)
+        for pivot, component in zip(solved.pivots, known, strict=True):
+            row[pivot] = component
+        for reflection in reversed(solved.reflections):
+            reflection.apply(row)
+        dual.append(row)
+    return dual, _singularity_margin(basis, inverse, solved.least, squares)
 
 
 def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
@@ -113,12 +116,30 @@ def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
 
 
 def _singularity_margin(
-    vectors: Sequence[Sequence[Scalar]], inverse: Sequence[Sequence[Scalar]], least: Scalar
+    vectors: Sequence[Sequence[Scalar]],
+    inverse: Sequence[Sequence[Scalar]],
+    least: Scalar,
+    squares: Sequence[Scalar | None] | None = None,
 ) -> Scalar:
-    """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent."""
-    squares = [total([c * c for row in rows for c in row]) for rows in (vectors, inverse)]
-    margin = float(len(vectors)) * reciprocal(sqrt(squares[0] * squares[1]))
+    """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent.
+
+    Vectors whose square is given are divided by their size, and the rows of the inverse multiplied by it.
+    """
+    given = squares or [None] * len(vectors)
+    sizes = [
+        [
+            _square(vector) if square is None else 1.0,
+            _square(row) if square is None else square * _square(row),
+        ]
+        for vector, row, square in zip(vectors, inverse, given, strict=True)
+    ]
+    whole = [total(list(column)) for column in zip(*sizes, strict=True)]
+    margin = float(len(vectors)) * reciprocal(sqrt(whole[0] * whole[1]))
     return where(least > ZERO_PIVOT, smaller(1.0, margin), 0.0)
+
+
+def _square(vector: Sequence[Scalar]) -> Scalar:
+    return total([c * c for c in vector])
 
 
 def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:

@@ -6,8 +6,9 @@ Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Rob
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
-from kinetostat.algebra.scalar import Scalar, cos, is_one, sin, sqrt
+from kinetostat.algebra.scalar import Scalar, cos, is_one, is_zero, reciprocal, sin, sqrt, where
 from kinetostat.frozen import dataclass
 
 
@@ -77,6 +78,8 @@ class Rotation:
         return self.x * v.x + self.y * v.y + self.z * v.z
 
     def __matmul__(self, other: "Rotation") -> "Rotation":
+        if self is IDENTITY or other is IDENTITY:
+            return other if self is IDENTITY else self
         return Rotation(self.apply(other.x), self.apply(other.y), self.apply(other.z))
 
     def inverse(self) -> "Rotation":
@@ -86,6 +89,98 @@ class Rotation:
 
 
 IDENTITY = Rotation(X_AXIS, Y_AXIS, Z_AXIS)
+
+
+class TriadRotation(Rotation):
+    """The rotation that takes one right-handed triad of unit vectors to another; columns are made when asked for.
+
+    What it turns is `Carried`: products of vectors that one rotation has turned are those from before.
+    """
+
+    def __init__(self, before: Sequence[Vector], after: Sequence[Vector]) -> None:
+        object.__setattr__(self, "_before", tuple(before))
+        object.__setattr__(self, "_after", tuple(after))
+
+    @cached_property
+    def x(self) -> Vector:  # type: ignore[override]
+        """Image of the x axis."""
+        return self.apply(X_AXIS)
+
+    @cached_property
+    def y(self) -> Vector:  # type: ignore[override]
+        """Image of the y axis."""
+        return self.apply(Y_AXIS)
+
+    @cached_property
+    def z(self) -> Vector:  # type: ignore[override]
+        """Image of the z axis."""
+        return self.apply(Z_AXIS)
+
+    def apply(self, v: Vector) -> Vector:
+        """Q v; exactly a vector of the second triad for one of the first."""
+        members = (axis for unit, axis in zip(self._before, AXES, strict=True) if unit.is_at(v))
+        parts = next(members, None) or Vector(*(unit.dot(v) for unit in self._before))
+        first, second, third = self._after
+        image = first * parts.x + second * parts.y + third * parts.z
+        return Carried(*image.components(), self, parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Carried(Vector):
+    """A vector that a rotation has turned.
+
+    Attributes:
+        rotation: the rotation.
+        parts: its components along the rotation's triad.
+    """
+
+    rotation: TriadRotation
+    parts: Vector
+
+    def dot(self, other: Vector) -> Scalar:
+        """Inner product: that of the components along the triad, where one rotation has turned both."""
+        if isinstance(other, Carried) and other.rotation is self.rotation:
+            return self.parts.dot(other.parts)
+        return super().dot(other)
+
+
+@dataclass(frozen=True, eq=False)
+class Normal(Vector):
+    """A unit vector at right angles to others.
+
+    Attributes:
+        others: these vectors.
+    """
+
+    others: tuple[Vector, ...]
+
+    def dot(self, other: Vector) -> Scalar:
+        """Inner product: exactly 0 with the vectors to which it is normal."""
+        return 0.0 if any(other is each for each in self.others) else super().dot(other)
+
+
+def axis_between(first: Vector, last: Vector, to_first: Scalar, to_last: Scalar, side: Scalar) -> tuple[Vector, Scalar]:
+    """Find the unit vector that has given products with two unit vectors (theory (74)).
+
+    Args:
+        first, last: the unit vectors.
+        to_first, to_last: the products.
+        side: a number with the sign of the vector's product with first x last.
+
+    Returns:
+        The vector, NaN where there is none, and the square of what it misses.
+    """
+    normal, sign = first.cross(last), where(side < 0.0, -1.0, 1.0)
+    if is_zero(to_first) and is_zero(to_last):
+        unit = normal * (reciprocal(normal.norm()) * sign)
+        axis: Vector = Normal(*unit.components(), (first, last))
+    else:
+        slant, shrink = first.dot(last), reciprocal(normal.dot(normal))
+        alpha, beta = (to_first - to_last * slant) * shrink, (to_last - to_first * slant) * shrink
+        aside = sqrt((1.0 - alpha * to_first - beta * to_last) * shrink)
+        axis = first * alpha + last * beta + normal * (aside * sign)
+    excess = axis.dot(axis) - 1.0
+    return axis, excess * excess
 
 
 def rotation_x(c: Scalar, s: Scalar) -> Rotation:

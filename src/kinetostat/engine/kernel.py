@@ -24,6 +24,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.catalogue import family_text
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
+from kinetostat.machine.written.family import at_home
 
 PROGRAMS_KEPT = 128
 """Programs kept in memory, of some 20 kB each."""
@@ -186,7 +187,8 @@ def program_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[
     plan = plan_for(machine, quantities)
     if plan is not None:
         arguments = (*arguments, 0, True, plan)
-    program = program_of(Recipe(objectives_of, Specimen(machine), form, arguments))
+    kind = Specimen(at_home(machine, varying) if closed else machine)
+    program = program_of(Recipe(objectives_of, kind, form, arguments))
     return ProgramFill(machine, form, fixed, program, closed)
 
 

@@ -36,6 +36,7 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
+from kinetostat.machine.written.family import at_home
 from kinetostat.motion.response import response_in_motion
 from kinetostat.vibration.modes import frequencies
 from kinetostat.vibration.receptance import cut_receptances
@@ -228,7 +229,8 @@ class RestFill:
         """
         self._machine, self._closed, self._count = machine, closed, len(quantities)
         self._form, self._fixed = form_of(machine, paths)
-        kind, objectives = Specimen(machine), tuple(((name, 1.0),) for name in quantities)
+        kind = Specimen(at_home(machine, paths))
+        objectives = tuple(((name, 1.0),) for name in quantities)
         self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
         self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
         arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities), legs)
@@ -283,7 +285,8 @@ class StatePrograms:
             closed: whether joints are closed inside the programs.
             native: whether to compile.
         """
-        self._kind, self._form, self._closed, self._native = Specimen(machine), form, closed, native
+        self._kind = Specimen(at_home(machine, form.varying) if native else machine)
+        self._form, self._closed, self._native = form, closed, native
         self._making = Lock()
         self._first = self._step(first=True)
         self._size = self._first.rows - 1  # the last result is how long the step is

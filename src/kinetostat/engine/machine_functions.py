@@ -32,6 +32,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values
+from kinetostat.machine.written.family import at_home
 from kinetostat.spec.errors import InputError, choice
 
 LOADS = frozenset(("force", "moment", "gravity", "preload", "temperature_rise"))
@@ -74,7 +75,7 @@ class MachineFunctions:
     @cached_property
     def specimen(self) -> Specimen:
         """The machine as a kind."""
-        return Specimen(self.machine)
+        return Specimen(at_home(self.machine, self.inputs))
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:
@@ -156,7 +157,7 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     if machine.loaded and not rests:  # what no program brings to rest is the free machine in all of them
         machine = replace(machine, loaded=False)
     form = form_with_numbers(machine, paths)
-    placement = placement_of(Specimen(machine), form, paths, closed)
+    placement = placement_of(Specimen(at_home(machine, paths)), form, paths, closed)
     return MachineFunctions(machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests)
 
 

@@ -160,11 +160,14 @@ class ClosedForms:
         for inverse, steps in zip(chains.inverses, chains.legs, strict=True):
             if inverse is None:
                 raise ValueError("a leg without a closed form")
-            leg_amounts, closure = inverse.amounts(steps, motion)
-            amounts += leg_amounts
-            reached = (clearance(closure) >= 0.0) & reached
-            end = leg_end(steps, chains.home, iter(leg_amounts)).platform
-            gap = gap + squared_distance(end, placement, chains.length)
+            leg = inverse.close(steps, motion)
+            amounts += leg.amounts
+            reached = (clearance(leg.closure) >= 0.0) & reached
+            left = leg.gap
+            if left is None:
+                end = leg_end(steps, chains.home, iter(leg.amounts)).platform
+                left = squared_distance(end, placement, chains.length)
+            gap = gap + left
         status = where(gap < CLOSED * CLOSED, int(Status.OK), int(Status.NOT_CONVERGED))
         return Joints(tuple(amounts), where(reached, status, int(Status.OUT_OF_REACH)))
 

@@ -15,7 +15,8 @@ from kinetostat.algebra.screw import COMPONENTS, Screw, Wrench
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.machine.leg import Joint, Leg, LegScrews, Spring
+from kinetostat.machine.leg import Joint, Leg, Spring
+from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import DEPENDENT, NEGLIGIBLE_COMPONENT, PURE_TRANSLATION

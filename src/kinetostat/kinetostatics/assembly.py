@@ -24,7 +24,7 @@ from kinetostat.kinetostatics.leg import (
     leg_resistance,
     modes_of,
 )
-from kinetostat.machine.leg import LegScrews
+from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNFELT, UNREACHED_COMPONENT
 
 NO_MOTION = Twist(ZERO, ZERO)
@@ -127,11 +127,12 @@ class _Shared:
 def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
     """The shares of the legs in any load."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
-    balanced = [free_springs_as_joints(leg) for leg in legs] if redundant else legs
+    balanced = [free_springs_as_joints(leg.with_unit_wrenches) for leg in legs] if redundant else legs
     modes = [modes_of(leg) if redundant or _in_series(leg) else _wrenches_as_modes(leg) for leg in balanced]
     wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
-        twists, singularity_margin = dual_twists(wrenches, length)
+        squares = [square for leg in balanced for square in leg.wrench_squares or [None] * len(leg.wrenches)]
+        twists, singularity_margin = dual_twists(wrenches, length, [*squares, *[None] * len(guide)])
         rows, doubt = in_modes(modes, [twist.components() for twist in twists]), 0.0
     else:
         rows, doubt, singularity_margin = least_energy_rows(modes, wrenches, length)
@@ -240,19 +241,22 @@ def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
     return Symmetric6.total(shares)
 
 
-def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist], Scalar]:
+def dual_twists(
+    wrenches: Sequence[Wrench], length: Scalar, squares: Sequence[Scalar | None] | None = None
+) -> tuple[list[Twist], Scalar]:
     """Return six twists, each worked on by only one of six wrenches: the rows of W^-1.
 
     Args:
         wrenches: columns of W, at P in base axes.
         length: m; moments are compared with forces through it.
+        squares: as for `solve.dual_basis`.
 
     Returns:
         The twists at P in base axes, and the singularity margin as in `solve.dual_basis`.
     """
     shrink = reciprocal(length)
     scaled = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
-    rows, singularity_margin = dual_basis(scaled)
+    rows, singularity_margin = dual_basis(scaled, squares)
     return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], singularity_margin
 
 

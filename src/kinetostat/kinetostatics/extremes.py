@@ -14,7 +14,8 @@ from kinetostat.algebra.solve import handedness
 from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
-from kinetostat.machine.leg import Leg, comparable
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.leg_screws import comparable
 from kinetostat.machine.machine import springs
 from kinetostat.machine.rods import rods
 
@@ -162,7 +163,10 @@ def aspect(response: Response) -> Scalar:
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         if not leg.lines:
             needed = [twist for i, twist in enumerate(screws.passive) if i not in leg.idle]
-            sign = sign * handedness([comparable(twist, shrink) for twist in needed]) * _ball_signs(leg)
+            # A basis of wrenches is the complement by which handedness turns; the force along a line is to be named.
+            lines = screws.wrenches if screws.wrench_squares else ()
+            named = [Wrench(line.rotational * shrink, line.translational).components() for line in lines]
+            sign = sign * handedness([*(comparable(twist, shrink) for twist in needed), *named]) * _ball_signs(leg)
     return sign
 
 

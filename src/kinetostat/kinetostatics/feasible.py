@@ -20,7 +20,8 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import INFINITE, combine, free_springs_as_joints
-from kinetostat.machine.leg import LegScrews, Spring
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration
 from kinetostat.tolerances import DEPENDENT_GENERATORS, UNREACHED_COMPONENT

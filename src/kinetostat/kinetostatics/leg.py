@@ -13,7 +13,7 @@ from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
-from kinetostat.machine.leg import LegScrews
+from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
 
 AnyScrew = TypeVar("AnyScrew", bound=Screw)

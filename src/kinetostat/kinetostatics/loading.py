@@ -25,7 +25,8 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix
 from kinetostat.kinetostatics.leg import INFINITE, free_springs_as_joints
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Element, Joint, Leg, LegScrews, Spring, work_on_free
+from kinetostat.machine.leg import Element, Joint, Leg, Spring
+from kinetostat.machine.leg_screws import LegScrews, work_on_free
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES
 
 

@@ -23,7 +23,8 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_
 from kinetostat.kinetostatics.drive_limits import DriveLimits, drive_limits
 from kinetostat.kinetostatics.feasible import Face, Transmission, acceleration_faces, transmission, wrench_faces
 from kinetostat.late import LateModule
-from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
+from kinetostat.machine.leg import Joint, Spring
+from kinetostat.machine.leg_screws import LegScrews, reciprocal_wrenches
 from kinetostat.machine.limits import limits_loads
 from kinetostat.machine.loads import load_on_platform, moving_mass
 from kinetostat.machine.machine import Configuration, Machine, springs

@@ -11,12 +11,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
-from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
-from kinetostat.algebra.solve import complement
-from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
+from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
+from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import CLOSING_ROUND_OFF, SAME_CENTRE
+from kinetostat.machine.leg_screws import LegScrews, reciprocal_wrenches, work_on_free
+from kinetostat.machine.two_centres import BALL, PAIR, TwoCentres, two_centres
+from kinetostat.tolerances import SAME_CENTRE
 
 RIGID = float("inf")
 """Stiffness of a rigid part: exactly infinite, not merely large."""
@@ -42,11 +43,31 @@ Station = tuple[int, Vector]
 
 
 @dataclass(frozen=True)
+class RevolutePlace:
+    """The place of a revolute at a pose, base frame.
+
+    Attributes:
+        axis, point: of the revolute; a unit vector, and m.
+        motion: the displacement, from the home pose, of what follows it.
+    """
+
+    axis: Vector
+    point: Vector
+    motion: Displacement
+
+
+@dataclass(frozen=True)
 class Turn:
-    """An angle by its cosine and sine: what closed forms find, and all that placing a revolute needs."""
+    """An angle by its cosine and sine: what closed forms find, and all that placing a revolute needs.
+
+    Attributes:
+        cosine, sine: of the angle.
+        placement: where the revolute then is, if the closed form knows it; otherwise the joints before it say so.
+    """
 
     cosine: Scalar
     sine: Scalar
+    placement: RevolutePlace | None = None
 
 
 @dataclass(frozen=True)
@@ -221,29 +242,6 @@ class Line:
         return Line(motion.apply(self.point), motion.rotation.apply(self.direction))
 
 
-@dataclass(frozen=True)
-class LegScrews:
-    """The screws by which a leg acts on the platform, at one reference point in base axes (theory section 2).
-
-    Attributes:
-        passive: unit twists that span what the passive joints allow (J_p).
-        elastic: unit twist of each spring (J_e).
-        compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
-        wrenches: basis of what the leg can carry (W): no work on any passive twist.
-        loads: load in each spring per unit of each wrench (J_e^T W).
-        load_squares: order of the square of each load, moments of wrenches over the characteristic length (N², N²m²).
-        singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
-    """
-
-    passive: tuple[Twist, ...]
-    elastic: tuple[Twist, ...]
-    compliance: tuple[Scalar, ...]
-    wrenches: tuple[Wrench, ...]
-    loads: tuple[tuple[Scalar, ...], ...]
-    load_squares: tuple[Scalar, ...]
-    singularity_margin: Scalar
-
-
 def rows_about_one_point(centres: Sequence[Sequence[float] | None]) -> tuple[tuple[int, ...], ...]:
     """Return the numbers of joints in a row that turn about one point, two or more: universal and ball joints.
 
@@ -330,20 +328,29 @@ class Leg:
             absent: freedoms that a planar machine does not have: the leg carries nothing against them.
         """
         passive = tuple(joint.twist(reference) for joint in (*self.passive, *absent))
-        if self.lines:
-            wrenches, singularity_margin = tuple(line.wrench(reference) for line in self.lines), 1.0
+        lines, centres = self.lines, None if absent else self._two_centres()
+        squares: tuple[Scalar, ...] = ()
+        if centres:
+            squares = (centres.square(reference, length),)
+            lines = (Line(centres.point, self._slide_along(centres.along)),)
+            singularity_margin = centres.singularity_margin(reference, length)
+        elif lines:
+            singularity_margin = 1.0
         else:
             needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
             wrenches, singularity_margin = reciprocal_wrenches(needed, length)
+        if lines:
+            wrenches = tuple(line.wrench(reference) for line in lines)
         elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
         return LegScrews(
             passive=passive,
             elastic=elastic,
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
             wrenches=wrenches,
-            loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
+            loads=tuple(_loads(s, t, wrenches, lines) for s, t in zip(self.springs, elastic, strict=True)),
             load_squares=self._load_squares(elastic, length),
             singularity_margin=singularity_margin,
+            wrench_squares=squares,
         )
 
     def _load_squares(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
@@ -352,25 +359,30 @@ class Leg:
         square = 1.0 if turning is None else length * length + turning.translational.dot(turning.translational)
         return tuple(1.0 if twist.slides else square for twist in elastic)
 
-    def _loads(self, spring: Spring, twist: Twist, wrenches: Sequence[Wrench]) -> tuple[Scalar, ...]:
-        """Load in a spring per unit of each wrench, by virtual work; exactly 1 in a slide along the line of force."""
-        along = [spring.joint.point is None and line.direction is spring.joint.axis for line in self.lines]
-        if any(along):
-            return tuple(1.0 if same else wrench.work(twist) for same, wrench in zip(along, wrenches, strict=True))
-        if is_zero(spring.stiffness):
-            return tuple(work_on_free(wrench, twist) for wrench in wrenches)
-        return tuple(wrench.work(twist) for wrench in wrenches)
+    def _slide_along(self, direction: Vector) -> Vector:
+        """A direction as the axis of a sprung slide along it has it, which may know more: how its link carries it."""
+        axes = (spring.joint.axis for spring in self.springs if spring.joint.point is None)
+        return next((axis for axis in axes if axis.is_at(direction)), direction)
+
+    def _two_centres(self) -> TwoCentres | None:
+        """Its passive axes, if they turn about two points, two about one and three about the other."""
+        passive = self.passive
+        rows = [[passive[i] for i in row if i not in self.idle] for row in self.centred]
+        if len(passive) - len(self.idle) != PAIR + BALL or sorted(map(len, rows)) != [PAIR, BALL]:
+            return None
+        start, end = (point for row in rows for point in row[0].path)
+        first, second = ([joint.axis for joint in row] for row in rows)
+        return two_centres(start, end, first, second)
 
 
-def work_on_free(wrench: Wrench, twist: Twist) -> Scalar:
-    """The work of a wrench on the twist of a free spring, exactly 0 if it is only round-off.
-
-    A free spring gives way to the least load, so that round-off would move it without end. Both are at one point.
-    """
-    turning = wrench.rotational.norm() * twist.rotational.norm()
-    size = turning + wrench.translational.norm() * twist.translational.norm()
-    load = wrench.work(twist)
-    return where(abs(load) > CLOSING_ROUND_OFF * size, load, 0.0)
+def _loads(spring: Spring, twist: Twist, wrenches: Sequence[Wrench], lines: Sequence[Line]) -> tuple[Scalar, ...]:
+    """Load in a spring per unit of each wrench, by virtual work; exactly 1 in a slide along the line of force."""
+    along = [spring.joint.point is None and line.direction.is_at(spring.joint.axis) for line in lines]
+    if any(along):
+        return tuple(1.0 if same else wrench.work(twist) for same, wrench in zip(along, wrenches, strict=True))
+    if is_zero(spring.stiffness):
+        return tuple(work_on_free(wrench, twist) for wrench in wrenches)
+    return tuple(wrench.work(twist) for wrench in wrenches)
 
 
 def two_force_leg(
@@ -414,31 +426,6 @@ def two_force_legs(
 def with_numbers(legs: Iterable[Leg]) -> list[Leg]:
     """Return the actuated legs of a family with their numbers, which drawings write beside them."""
     return [replace(leg, number=i, short=leg.short or str(i)) for i, leg in enumerate(legs, 1)]
-
-
-def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple[Wrench, ...], Scalar]:
-    """Wrenches that do no work on any of `passive`: a basis of the reciprocal space (J_p^T W = 0).
-
-    Args:
-        passive: a independent unit twists, at P in base axes.
-        length: m; translations are compared with rotations through it, the space does not depend on it.
-
-    Returns:
-        W, 6 - a wrenches at P in base axes (orthonormal once moments are divided by `length`), and the singularity
-        margin: 0 where the twists are dependent.
-    """
-    if not passive:
-        return (*(force_along(axis, ZERO) for axis in AXES), *(pure_moment(axis) * length for axis in AXES)), 1.0
-    shrink = reciprocal(length)
-    basis, singularity_margin = complement([comparable(twist, shrink) for twist in passive])
-    return tuple(Wrench(Vector(*row[:3]) * length, Vector(*row[3:])) for row in basis), singularity_margin
-
-
-def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
-    """The components of a unit twist, translations times `shrink` (1/m); a slide stays of unit size."""
-    if twist.slides:
-        return twist.components()
-    return Twist(twist.rotational, twist.translational * shrink).components()
 
 
 def series(stiffness: Scalar, other: Scalar) -> Scalar:

@@ -136,11 +136,27 @@ class Step:
     moves: bool
 
 
+@dataclass(frozen=True)
+class ClosedLeg:
+    """Joint coordinates of a leg in closed form.
+
+    Attributes:
+        amounts: a coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the leg
+            cannot reach.
+        closure: the condition for the leg to reach.
+        gap: square of what keeps the leg from closing, without a unit; None where only the place of its end says it.
+    """
+
+    amounts: Sequence[Scalar | Turn]
+    closure: Closure
+    gap: Scalar | None = None
+
+
 class Inverse(Protocol):
     """The closed form of a leg's joint coordinates."""
 
-    def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
-        """Coordinates that displace the platform end by `motion`, and the condition for the leg to reach."""
+    def close(self, steps: Sequence[Step], motion: Displacement) -> ClosedLeg:
+        """Find the coordinates that displace the platform end by `motion`."""
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,25 @@ Source: theory (73)-(75); R. M. Murray, Z. Li and S. S. Sastry, A Mathematical I
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, where
-from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
+from kinetostat.algebra.vector import (
+    Carried,
+    Displacement,
+    Rotation,
+    TriadRotation,
+    Vector,
+    axis_between,
+    rotation_along,
+)
 from kinetostat.frozen import dataclass
-from kinetostat.machine.leg import Joint, Turn
+from kinetostat.machine.leg import Joint, RevolutePlace, Turn
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Closure, Inverse, Step
-from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SAME_CENTRE
+from kinetostat.machine.machine import ClosedLeg, Closure, Inverse, Step
+from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SAME_CENTRE, SAME_DIRECTION
 
 
 @dataclass(frozen=True)
@@ -45,16 +54,12 @@ class ParallelAxes:
     signs: tuple[float, ...]
     bend: float
 
-    def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
+    def close(self, steps: Sequence[Step], motion: Displacement) -> ClosedLeg:
         """Find joint coordinates that displace the platform end by `motion` as far as the leg can, on the home branch.
 
         Args:
             steps: the leg at the home pose.
             motion: the motion of the platform from its home pose, base frame.
-
-        Returns:
-            One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the links
-            cannot reach, as the condition that comes with them says.
         """
         movers = [step.element.mover for step in steps if step.moves]
         axis = movers[self.revolutes[0]].axis
@@ -71,7 +76,7 @@ class ParallelAxes:
             amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
             amounts[self.slide] = self.signs[self.slide] * axis.dot(goal - last)
-        return amounts, closure
+        return ClosedLeg(amounts, closure)
 
     def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
         """Direction of the lower link, and the condition for the two links to bridge the span."""
@@ -133,70 +138,189 @@ class BallLeg:
         leg: its name.
         backwards: whether the ball is at the base, so that the leg is read from the platform.
         pair_first: whether, read so, the two revolutes about one point come before the single joint.
+        upright: whether the axes of the pair, and its second axis and the arm, are at right angles.
+        aligned: whether the single joint slides along the arm: 1 away from the pair, -1 towards it, 0 if it does not.
     """
 
     leg: str
     backwards: bool
     pair_first: bool
+    upright: bool = False
+    aligned: float = 0.0
 
-    def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
+    def at_home(self, steps: Sequence[Step]) -> "BallLeg":
+        """The same with what the numbers of the leg say at the home pose, which is `upright` and `aligned`."""
+        movers = [step.element.mover for step in steps if step.moves]
+        row = movers[::-1] if self.backwards else movers
+        pair, single = (row[:2], row[2]) if self.pair_first else (row[1:3], row[0])
+        arm = point_of(row[3]) - point_of(pair[0])
+        arm = arm * (1.0 / arm.norm())
+        products = pair[0].axis.dot(pair[1].axis), pair[1].axis.dot(arm)
+        along = single.axis.dot(arm)
+        slides = self.pair_first and single.point is None and single.axis.cross(arm).norm() < SAME_DIRECTION
+        upright = all(abs(product) < SAME_DIRECTION for product in products)
+        return replace(self, upright=upright, aligned=math.copysign(1.0, along) if slides else 0.0)
+
+    def close(self, steps: Sequence[Step], motion: Displacement) -> ClosedLeg:
         """Find the joint coordinates at which the platform has moved by `motion`, on the branches of the home pose.
+
+        The condition for the single joint to reach comes with them. Where it holds and the coordinates are NaN all the
+        same, the pair does not reach on this branch, and Newton's method finds out why.
 
         Args:
             steps: the leg at the home pose.
             motion: the motion of the platform from its home pose, base frame.
-
-        Returns:
-            One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the leg
-            cannot reach. The condition for the single joint to reach comes with them. Where it holds and the
-            coordinates are NaN all the same, the pair does not reach on this branch, and Newton's method finds out why.
         """
         movers = [step.element.mover for step in steps if step.moves]
         if not self.backwards:
             return self._solve(movers, motion)
-        amounts, closure = self._solve(movers[::-1], motion.inverse())
-        return [_opposite(amount) for amount in reversed(amounts)], closure
+        leg = self._solve(movers[::-1], motion.inverse())
+        # Seen from the base, what follows a joint is what comes before it as seen from the platform.
+        amounts: list[Scalar | Turn] = []
+        following = motion
+        for amount, joint in zip(leg.amounts, movers[::-1], strict=True):
+            back = _opposite(amount)
+            if isinstance(amount, Turn) and isinstance(back, Turn) and amount.placement:
+                there = amount.placement
+                axis, point = motion.rotation.apply(there.axis), motion.apply(there.point)
+                back = replace(back, placement=RevolutePlace(axis, point, following))
+                following = motion @ there.motion
+            else:
+                following = following @ joint.moved(amount)[1]
+            amounts.append(back)
+        return ClosedLeg(amounts[::-1], leg.closure, leg.gap)
 
-    def _solve(self, movers: Sequence[Joint], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
+    def _solve(self, movers: Sequence[Joint], motion: Displacement) -> ClosedLeg:
         """Find the coordinates of a leg whose ball comes last."""
-        arm, ball = movers[:3], movers[3:]
+        ball = movers[3:]
         centre = point_of(ball[0])
         goal = motion.apply(centre)
         if self.pair_first:
-            fixed = point_of(arm[0])
-            square = _square(goal - fixed)
-            single, limits = to_distance(arm[2], centre, centre, fixed, square)
-            turns = by_two_axes(arm[:2], arm[2].moved(single)[1].apply(centre) - fixed, goal - fixed, centre - fixed)
-            amounts: list[Scalar | Turn] = [*turns, single]
+            *pair, single = movers[:3]
+            fixed = point_of(pair[0])
+            end = goal - fixed
+            square = _square(end)
+            amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
+            start = single.moved(amount)[1].apply(centre) - fixed
         else:
-            fixed = point_of(arm[1])
-            square = _square(centre - fixed)
-            back, limits = to_distance(arm[0], goal, centre, fixed, square)
-            reached = arm[0].moved(back)[1].apply(goal)
-            amounts = [_opposite(back), *by_two_axes(arm[1:], centre - fixed, reached - fixed, centre - fixed)]
-        return [*amounts, *_ball_turns(arm, amounts, ball, motion)], Closure(self.leg, sqrt(square), *limits)
+            single, *pair = movers[:3]
+            fixed = point_of(pair[0])
+            start = centre - fixed
+            square = _square(start)
+            back, limits = to_distance(single, goal, centre, fixed, square)
+            end = single.moved(back)[1].apply(goal) - fixed
+            amount = _opposite(back)
+        size = reciprocal(sqrt(square))
+        before = single.axis * self.aligned if self.aligned else start * size
+        turns, gap = self._pair(pair, before, end * size, centre - fixed)
+        moved = single.moved(amount)[1]
+        if self.pair_first:
+            whole = turns[1].placement.motion @ moved
+            amounts = [*turns, _with_placement(amount, single, turns[1].placement.motion, whole)]
+        else:
+            turns = [_after(moved, turn) for turn in turns]
+            whole = turns[1].placement.motion
+            amounts = [_with_placement(amount, single, moved, moved), *turns]
+        ball_turns, left = _ball_turns(ball, whole.rotation, goal, motion)
+        return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + left)
+
+    def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
+        """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.
+
+        Args:
+            pair: two revolutes about one point, from the base.
+            start, end: unit vectors of the arm, as if the pair had not turned and as it is.
+            home: the arm at the home pose, m.
+        """
+        first, second = (joint.axis for joint in pair)
+        slant, low = (0.0, 0.0) if self.upright else (first.dot(second), start.dot(second))
+        axis, gap = axis_between(first, end, slant, low, first.cross(home).dot(second))
+        across = sqrt(1.0 - low * low)
+        shrink = reciprocal(across)
+        across_start, across_end = (second - start * low) * shrink, (axis - end * low) * shrink
+        rotation = TriadRotation(
+            (start, across_start, start.cross(across_start)), (end, across_end, end.cross(across_end))
+        )
+        turns = [
+            turn_about(first, (second, axis), first, (second, second)),
+            turn_about(axis, (first, end), second, (first, start)),
+        ]
+        point = point_of(pair[0])
+        half = rotation_along(first, turns[0].cosine, turns[0].sine)
+        motions = [Displacement(turn, point - turn.apply(point)) for turn in (half, rotation)]
+        axes = first, Carried(*axis.components(), rotation, Vector(low, across, 0.0))
+        places = [RevolutePlace(way, point, there) for way, there in zip(axes, motions, strict=True)]
+        return [replace(turn, placement=place) for turn, place in zip(turns, places, strict=True)], gap
 
 
 def _ball_turns(
-    arm: Sequence[Joint], amounts: Sequence[Scalar | Turn], ball: Sequence[Joint], motion: Displacement
-) -> list[Turn]:
-    """Turns of a ball's axes that are left of a motion after that of the joints before it (theory (75))."""
-    first, middle, last = ball
-    turn = IDENTITY
-    for joint, amount in zip(arm, amounts, strict=True):
-        turn = turn @ joint.moved(amount)[1].rotation
-    back = turn.inverse()
-    wanted = back.apply(motion.rotation.apply(last.axis))
-    two = by_two_axes((first, middle), last.axis, wanted, last.axis)
-    across_last = across(middle.axis, last.axis)
-    turned = back.apply(motion.rotation.apply(across_last))
-    for joint, amount in zip((first, middle), two, strict=True):
-        turned = rotation_along(joint.axis, amount.cosine, -amount.sine).apply(turned)
-    return [*two, turn_between(last.axis, across_last, across(turned, last.axis))]
+    ball: Sequence[Joint], arm: Rotation, centre: Vector, motion: Displacement
+) -> tuple[list[Turn], Scalar]:
+    """Turns of a ball's axes that are left of a motion after that of the joints before it (theory (75)).
+
+    Args:
+        ball: its joints at the home pose.
+        arm: the rotation of what is before it.
+        centre: its centre at the pose, m.
+        motion: the displacement of what follows it.
+
+    Returns:
+        The turns with their placements, and the square of what they miss.
+    """
+    first, second, third = (joint.axis for joint in ball)
+    start, end = arm.apply(first), motion.rotation.apply(third)
+    slants = first.dot(second), third.dot(second)
+    axis, gap = axis_between(start, end, *slants, first.cross(third).dot(second))
+    near, far = arm.apply(second), motion.rotation.apply(second)
+    turns = [
+        turn_about(start, (near, axis), first, (second, second)),
+        turn_about(axis, (start, end), second, (first, third)),
+        turn_about(end, (axis, far), third, (second, second)),
+    ]
+    home = point_of(ball[0])
+    rotations = [
+        rotation_along(start, turns[0].cosine, turns[0].sine) @ arm,
+        rotation_along(end, turns[2].cosine, -turns[2].sine) @ motion.rotation,
+    ]
+    motions = [*(Displacement(turn, centre - turn.apply(home)) for turn in rotations), motion]
+    places = [RevolutePlace(way, centre, there) for way, there in zip((start, axis, end), motions, strict=True)]
+    return [replace(turn, placement=place) for turn, place in zip(turns, places, strict=True)], gap
+
+
+def turn_about(axis: Vector, pair: tuple[Vector, Vector], home_axis: Vector, home: tuple[Vector, Vector]) -> Turn:
+    """The turn about an axis by which one vector goes from the other, beyond the turn between them at the home pose.
+
+    Args:
+        axis, home_axis: unit vectors, at the pose and at the home pose.
+        pair, home: the vectors likewise; only what is across the axis counts.
+    """
+    (c, s), (c0, s0) = _product(axis, *pair), _product(home_axis, *home)
+    size = reciprocal(c0 * c0 + s0 * s0)
+    return Turn((c * c0 + s * s0) * size, (s * c0 - c * s0) * size)
+
+
+def _product(axis: Vector, a: Vector, b: Vector) -> tuple[Scalar, Scalar]:
+    """Cosine and sine of the angle about an axis from one vector to another, times the sizes of both across it."""
+    return a.dot(b) - a.dot(axis) * b.dot(axis), axis.dot(a.cross(b))
+
+
+def _with_placement(amount: Scalar | Turn, joint: Joint, before: Displacement, after: Displacement) -> Scalar | Turn:
+    """The amount of the single joint with its placement, between the motions of what is before and behind it."""
+    if not isinstance(amount, Turn):
+        return amount
+    axis, point = before.rotation.apply(joint.axis), before.apply(point_of(joint))
+    return replace(amount, placement=RevolutePlace(axis, point, after))
+
+
+def _after(moved: Displacement, turn: Turn) -> Turn:
+    """A turn whose placement a joint before it has displaced."""
+    place = turn.placement
+    axis, point = moved.rotation.apply(place.axis), moved.apply(place.point)
+    return replace(turn, placement=RevolutePlace(axis, point, moved @ place.motion))
 
 
 def to_distance(
-    joint: Joint, point: Vector, home: Vector, centre: Vector, square: Scalar
+    joint: Joint, point: Vector, home: Vector, centre: Vector, square: Scalar, aligned: float = 0.0
 ) -> tuple[Scalar | Turn, tuple[Scalar, Scalar]]:
     """Find how far a joint must move for a point to lie at a distance from a centre (theory (73)).
 
@@ -206,6 +330,7 @@ def to_distance(
         home: where it is at the home pose, where the joint need not move: this chooses one of the two solutions.
         centre: the centre, m.
         square: of the distance, m².
+        aligned: 1 if the joint slides along the line from the centre to the point, -1 if against it.
 
     Returns:
         The movement, m or a turn, NaN where there is none; and the least and the greatest distance that there are, m.
@@ -213,6 +338,8 @@ def to_distance(
     span = point - centre
     if joint.point is None:
         along = span.dot(joint.axis)
+        if aligned:
+            return sqrt(square) * aligned - along, (0.0, math.inf)
         aside = _square(across(span, joint.axis))
         root = sqrt(square - aside)
         return root * _sign((home - centre).dot(joint.axis)) - along, (sqrt(aside), math.inf)
@@ -233,28 +360,6 @@ def _bend(joint: Joint, home: Vector, centre: Vector) -> Scalar:
     """Half the rate of the squared distance from a centre by a revolute at the home pose."""
     arm = across(home - point_of(joint), joint.axis)
     return (home - centre).dot(joint.axis.cross(arm))
-
-
-def by_two_axes(joints: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> list[Turn]:
-    """Find the turns about two axes through one point that take one arm from there to another (theory (74)).
-
-    Args:
-        joints: two revolutes, from the base.
-        start, end: the arms, of one length; the second axis turns the first of them, and the first axis the result.
-        home: both of them at the home pose: the arm between the turns stays on the side of both axes where this lies.
-    """
-    first, second = (joint.axis for joint in joints)
-    normal, slant = first.cross(second), first.dot(second)
-    shrink = reciprocal(normal.dot(normal))
-    high, low = end.dot(first), start.dot(second)
-    alpha, beta = (high - slant * low) * shrink, (low - slant * high) * shrink
-    square = _square(start) - alpha * alpha - beta * beta - 2.0 * slant * (alpha * beta)
-    side = sqrt(square * shrink) * _sign(home.dot(normal))
-    between = first * alpha + second * beta + normal * side
-    return [
-        turn_between(first, across(between, first), across(end, first)),
-        turn_between(second, across(start, second), across(between, second)),
-    ]
 
 
 def ball_leg(name: str, movers: Sequence[Joint]) -> BallLeg | None:

@@ -3,7 +3,7 @@
 Which coordinates close the chains at a pose is found in `kinematics.closure`. Points and axes are in the base frame.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial, reduce
 from typing import Any, cast
@@ -15,15 +15,19 @@ from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Statio
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import turned_tensor
-from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
+from kinetostat.machine.machine import Chains, Configuration, Family, Machine, Member, Plane, Step
 from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.machine.series import springs_in_a_row
+from kinetostat.machine.written.closed_form import BallLeg
 from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
 from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
 from kinetostat.tolerances import LEAST_LENGTH, ONE_PLACE
+
+LEGS = "legs."
+"""Beginning of the leaf paths of all numbers of legs."""
 
 
 @lru_cache(KEPT_FAMILIES)
@@ -40,6 +44,33 @@ def family_of(plan: Plan) -> Family:
         members=partial(members, plan),
         recipe=(family_of, (plan,)),
     )
+
+
+def at_home(machine: Machine, varying: Iterable[str]) -> Machine:
+    """The machine with closed forms that know its home pose: for programs in which no number of a leg varies.
+
+    Axes at right angles and slides along their legs then cost no arithmetic.
+
+    Args:
+        machine: of any family.
+        varying: leaf paths of the parameters that vary.
+    """
+    if machine.family.chains is None or any(path.startswith(LEGS) for path in varying):
+        return machine
+    return replace(machine, family=_family_at_home(machine.family, machine.chains()))
+
+
+def _family_at_home(family: Family, home: Chains) -> Family:
+    maker, arguments = family.recipe or (None, ())
+    if maker is not family_of:  # a family that another function makes of one
+        made = [_family_at_home(each, home) if isinstance(each, Family) else each for each in arguments]
+        return maker(*made) if maker else family
+    (plan,) = arguments
+    legs = tuple(
+        replace(leg, inverse=leg.inverse.at_home(steps)) if isinstance(leg.inverse, BallLeg) else leg
+        for leg, steps in zip(plan.legs, home.legs, strict=True)
+    )
+    return family_of(replace(plan, legs=legs))
 
 
 def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Configuration:
@@ -81,12 +112,19 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
         placed = step.element.displaced(motion)
         if step.moves:
             amount, mover = next(coordinates), step.element.mover
+            known = amount.placement if isinstance(amount, Turn) else None
+            if known is not None:
+                placed, motion = _at(placed, point=known.point, axis=known.axis), known.motion
+                chain.append(placed)
+                continue
             placed, moved = placed.moved(amount)
-            if moved.rotation is IDENTITY or mover.point is None or not is_zero(mover.pitch):
+            if mover.point is None:
+                motion, home = Displacement(motion.rotation, motion.translation + moved.translation), ZERO
+            elif moved.rotation is IDENTITY or not is_zero(mover.pitch):
                 motion, home = moved @ motion, ZERO
             else:
                 if mover.point is home:
-                    placed = _at_point(placed, centre)
+                    placed = _at(placed, point=centre)
                 home, centre = mover.point, placed.mover.point
                 turn = motion.rotation @ step.element.moved(amount)[1].rotation
                 motion = Displacement(turn, centre - turn.apply(home))
@@ -94,11 +132,11 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
     return chain, motion
 
 
-def _at_point(element: Joint | Spring, point: Vector) -> Joint | Spring:
-    """A revolute, or a spring on one, with its place as it is known from the joint before it."""
+def _at(element: Joint | Spring, **place: Vector) -> Joint | Spring:
+    """A revolute, or a spring on one, with its point and its axis as they are known otherwise."""
     if isinstance(element, Spring):
-        return replace(element, joint=replace(element.joint, point=point))
-    return replace(element, point=point)
+        return replace(element, joint=replace(element.joint, **place))
+    return replace(element, **place)
 
 
 def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
