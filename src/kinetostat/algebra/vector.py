@@ -97,6 +97,9 @@ class TriadRotation(Rotation):
     What it turns is `Carried`: products of vectors that one rotation has turned are those from before.
     """
 
+    _before: tuple[Vector, ...]
+    _after: tuple[Vector, ...]
+
     def __init__(self, before: Sequence[Vector], after: Sequence[Vector]) -> None:
         object.__setattr__(self, "_before", tuple(before))
         object.__setattr__(self, "_after", tuple(after))
@@ -122,7 +125,7 @@ class TriadRotation(Rotation):
         parts = next(members, None) or Vector(*(unit.dot(v) for unit in self._before))
         first, second, third = self._after
         image = first * parts.x + second * parts.y + third * parts.z
-        return Carried(*image.components(), self, parts)
+        return Carried(image.x, image.y, image.z, self, parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +176,7 @@ def axis_between(first: Vector, last: Vector, to_first: Scalar, to_last: Scalar,
     normal, sign = first.cross(last), where(side < 0.0, -1.0, 1.0)
     if is_zero(to_first) and is_zero(to_last):
         unit = normal * (reciprocal(normal.norm()) * sign)
-        axis: Vector = Normal(*unit.components(), (first, last))
+        axis: Vector = Normal(unit.x, unit.y, unit.z, (first, last))
     else:
         slant, shrink = first.dot(last), reciprocal(normal.dot(normal))
         alpha, beta = (to_first - to_last * slant) * shrink, (to_last - to_first * slant) * shrink

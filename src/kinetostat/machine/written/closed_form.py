@@ -215,11 +215,11 @@ class BallLeg:
         turns, gap = self._pair(pair, before, end * size, centre - fixed)
         moved = single.moved(amount)[1]
         if self.pair_first:
-            whole = turns[1].placement.motion @ moved
-            amounts = [*turns, _with_placement(amount, single, turns[1].placement.motion, whole)]
+            whole = _place(turns[1]).motion @ moved
+            amounts = [*turns, _with_placement(amount, single, _place(turns[1]).motion, whole)]
         else:
             turns = [_after(moved, turn) for turn in turns]
-            whole = turns[1].placement.motion
+            whole = _place(turns[1]).motion
             amounts = [_with_placement(amount, single, moved, moved), *turns]
         ball_turns, left = _ball_turns(ball, whole.rotation, goal, motion)
         return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + left)
@@ -248,7 +248,7 @@ class BallLeg:
         point = point_of(pair[0])
         half = rotation_along(first, turns[0].cosine, turns[0].sine)
         motions = [Displacement(turn, point - turn.apply(point)) for turn in (half, rotation)]
-        axes = first, Carried(*axis.components(), rotation, Vector(low, across, 0.0))
+        axes = first, Carried(axis.x, axis.y, axis.z, rotation, Vector(low, across, 0.0))
         places = [RevolutePlace(way, point, there) for way, there in zip(axes, motions, strict=True)]
         return [replace(turn, placement=place) for turn, place in zip(turns, places, strict=True)], gap
 
@@ -312,9 +312,15 @@ def _with_placement(amount: Scalar | Turn, joint: Joint, before: Displacement, a
     return replace(amount, placement=RevolutePlace(axis, point, after))
 
 
+def _place(turn: Turn) -> RevolutePlace:
+    if turn.placement is None:
+        raise ValueError("a turn without a placement")
+    return turn.placement
+
+
 def _after(moved: Displacement, turn: Turn) -> Turn:
     """A turn whose placement a joint before it has displaced."""
-    place = turn.placement
+    place = _place(turn)
     axis, point = moved.rotation.apply(place.axis), moved.apply(place.point)
     return replace(turn, placement=RevolutePlace(axis, point, moved @ place.motion))
 
