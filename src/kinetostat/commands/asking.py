@@ -179,7 +179,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     """
     from kinetostat.views.answers import description_of
     from kinetostat.views.data_forms import json_of
-    from kinetostat.views.terminal import tell
+    from kinetostat.views.tables import tell
 
     description, output = description_of(answer), getattr(options, "output", None)
     answered, message = description.answered(answer), getattr(answer, "message", "")

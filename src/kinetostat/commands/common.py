@@ -324,8 +324,7 @@ def judge_requirements(machine: "Machine", printing: bool = True) -> int:
 
     verdicts = requirements(machine)
     if printing:
-        from kinetostat.views.tables import terminal
-        from kinetostat.views.terminal import print_requirements
+        from kinetostat.views.tables import print_requirements, terminal
 
         print_requirements(terminal(), verdicts, machine.display)
     return DONE if all(verdict.met for verdict in verdicts) else NO_ANSWER

@@ -115,7 +115,7 @@ def _validate(options: argparse.Namespace) -> int:
     from kinetostat.tolerances import AGREED
     from kinetostat.validation.comparison import validate
     from kinetostat.views.data_forms import json_of
-    from kinetostat.views.terminal import tell
+    from kinetostat.views.tables import tell
     from kinetostat.views.validation import VALIDATION
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]

@@ -99,7 +99,7 @@ def _show(options: argparse.Namespace, result: "Result", keys: "Sequence[str]" =
     """Write the files of a result, and print it; of its JSON only some keys where any are named."""
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.optimisation import RESULT, write_result
-    from kinetostat.views.terminal import tell
+    from kinetostat.views.tables import tell
 
     result = result.in_units(options.units) if options.units else result
     written = []

@@ -167,8 +167,8 @@ def failures(dataset: xr.Dataset) -> dict[Status, int]:
     return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
 
 
-MOST_RANGES = 2
-"""Greatest number of ranges, because a map has two axes."""
+MOST_RANGES_OF_MAPS = 2
+"""Greatest number of ranges of the maps of a report: a map has two axes."""
 PROBE_STEPS = 48
 """Number of poses to each side that are tried along a coordinate."""
 LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}
@@ -202,7 +202,7 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
         low, high = _extent(machine, parameter, reach)
         if high > low:
             ranges.append(f"{parameter.path}={low:.9g}:{high:.9g}:{count}")
-        if len(ranges) == MOST_RANGES:
+        if len(ranges) == MOST_RANGES_OF_MAPS:
             break
     return ranges
 

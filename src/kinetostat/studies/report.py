@@ -29,7 +29,7 @@ from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.drives import drives
 from kinetostat.studies.elevation import elevation
-from kinetostat.studies.grid import MOST_RANGES, coarser_ranges, evaluate_grid, usual_ranges
+from kinetostat.studies.grid import MOST_RANGES_OF_MAPS, coarser_ranges, evaluate_grid, usual_ranges
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.lobes import lobes
@@ -231,7 +231,7 @@ def gather(
     """
     for part in without:
         choice(part, REPORT_PARTS, "the part of a report to leave out")
-    if len(ranges) > MOST_RANGES:
+    if len(ranges) > MOST_RANGES_OF_MAPS:
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
     record = read_fit(fit) if fit else None
     if record:

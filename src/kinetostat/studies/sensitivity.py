@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 WITHOUT_INFLUENCE = (
     "load.", "limits.", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
 )  # fmt: skip
-"""Beginnings of the fields on which no index depends: loads, limits, weights, buckling and growth."""
-NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
-"""Those on which nothing else depends that has derivatives."""
-OF_LOST_MOTION = ("drives.", "servo.", "damping.")
-"""Those on which lost motion depends."""
-NOT_EVEN_LOADED = ("load.min_tension", "load.max_tension")
-"""Those on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
+"""Beginnings of the fields on which no index of the free machine depends: loads, limits, buckling and growth."""
+WITHOUT_DERIVATIVES = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
+"""Beginnings of the fields on which no quantity with derivatives depends, but lost motion on some of them."""
+FIELDS_OF_LOST_MOTION = ("drives.", "servo.", "damping.")
+"""Beginnings of the fields on which lost motion depends."""
+TENSION_BOUNDS = ("load.min_tension", "load.max_tension")
+"""Fields on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
 FAR_AWAY = (
     "Newton's method does not lead from the unloaded pose to a stable state of rest nearby, so that there are no "
     "derivatives here. Look at the loaded state (analyze --loaded), and reduce the loads."
@@ -57,8 +57,8 @@ FAR_AWAY = (
 MOST_NAMED = 12
 """Greatest number of parameters without influence that are named."""
 
-PER = "percent per percent, for an angle per 0.01 rad"
-"""Says what the numbers mean. A percent of an angle has no meaning, because the zero of an angle is a convention."""
+UNIT_OF_PERCENTS = "percent per percent, for an angle per 0.01 rad"
+"""Unit of the percentages. A percent of an angle has no meaning, because the zero of an angle is a convention."""
 
 RIGID = "because rigid (a relative change is undefined)"
 FREE = "because free (C is infinite, or does not depend on it)"
@@ -223,10 +223,21 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
     known = [p for p in candidates if not reasons[p.path]]
     influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
-    shown = tuple(strongest_first([item for item in influences if item.greatest > NO_INFLUENCE]))
-    quiet = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
-    skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
-    return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped, uncounted)
+    ranked = tuple(strongest_first([item for item in influences if item.greatest > NO_INFLUENCE]))
+    without_influence = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
+    without_derivative = tuple((path, reason) for path, reason in reasons.items() if reason)
+    return Sensitivity(
+        machine,
+        status,
+        status.sentence,
+        names,
+        indices,
+        length,
+        ranked,
+        without_influence,
+        without_derivative,
+        uncounted,
+    )
 
 
 def _without_round_off(machine: Machine, name: str, value: float, response: Response) -> float:
@@ -250,9 +261,9 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
     loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
     accelerated = needs_masses(names)
-    if path.startswith(OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in wanted):
+    if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in wanted):
         return here[path] != 0.0
-    if path.startswith(NEVER) or (path.startswith(VIBRATION_FIELDS) and not (modal or accelerated)):
+    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(VIBRATION_FIELDS) and not (modal or accelerated)):
         return False
     modal = modal or accelerated
     if parameter.quantity.kind == "inertia":
@@ -261,10 +272,10 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     if modal and massive and not path.startswith("tool."):
         return here[path] != 0.0  # a link or rotor without mass has no motion of its own
     if loaded:
-        return not path.startswith(NOT_EVEN_LOADED)
+        return not path.startswith(TENSION_BOUNDS)
     driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
     if driven and path.startswith(("load.", "tool.")):
-        return not path.startswith(NOT_EVEN_LOADED)  # to first order, actuators carry the loads and the platform
+        return not path.startswith(TENSION_BOUNDS)  # to first order, actuators carry the loads and the platform
     if ".centre_of_mass." in path or (modal and path.startswith("tool.")):
         return modal
     return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not massive)

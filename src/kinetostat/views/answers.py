@@ -46,7 +46,7 @@ class Kind:
     def tell(self, console: "Console", answer: object) -> None:
         """Print a result of this kind."""
         if self.description:
-            late("views.terminal.tell")(console, late(self.description), answer)
+            late("views.tables.tell")(console, late(self.description), answer)
         else:
             late("views.tables.print_machine")(console, answer)
 

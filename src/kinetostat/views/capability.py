@@ -20,7 +20,7 @@ TITLES = {
     "acceleration": "acceleration without turning",
     "angular acceleration": "acceleration of turning alone",
 }
-"""Subject of each set."""
+"""Heads of the rows of the table and of the panels of the figure, by set."""
 NO_END = "no limit"
 """Words for a load that no drive feels."""
 
@@ -43,6 +43,7 @@ def _weakest(answer: Capability) -> str:
 
 
 def _names(names: tuple[str, ...]) -> str:
+    """List names of drives in a phrase; of many, the first one and the number of the others."""
     if len(names) > 3:
         return f"{names[0]} and {len(names) - 1} others"
     return " and ".join(([", ".join(names[:-1])] if len(names) > 1 else []) + [names[-1]])
@@ -98,6 +99,7 @@ SETS = (
     Field("limited_by", lambda part: list(part.limited_by), long_name="drives at their limits there", forms=("json",)),
     Field("vertices", lambda part: part.vertices.tolist(), long_name="of the polytope, SI, base axes", forms=("json",)),
 )
+"""Values of each set of loads or speeds."""
 DRIVES = (
     Field("drive", "name"),
     Field("carried", long_name="load by what counts already, N or N·m"),
@@ -105,7 +107,7 @@ DRIVES = (
     Field("upper", lambda drive: _finite(drive.upper), long_name="greatest load, N or N·m"),
     Field("speed", lambda drive: _finite(drive.speed), long_name="greatest speed, m/s or rad/s"),
 )
-
+"""Values of each drive."""
 
 CAPABILITY = Description(
     title="What the drives can do",

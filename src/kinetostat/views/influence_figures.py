@@ -21,7 +21,7 @@ from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import limit_of
 from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
-from kinetostat.studies.sensitivity import PER, Sensitivity
+from kinetostat.studies.sensitivity import UNIT_OF_PERCENTS, Sensitivity
 from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.levels import usual_range
@@ -47,7 +47,11 @@ def sensitivity_figure(sensitivity: Sensitivity, title: str = "{}") -> Figure:
     rows = {with_leg(sensitivity.machine, influence.path): influence.percents for influence in sensitivity.parameters}
     heads = [QUANTITIES[name].symbol for name in sensitivity.quantities]
     return coloured_table(
-        (title.format(sensitivity.machine.name), setting_of(sensitivity.machine)), rows, heads, "RdBu_r", PER
+        (title.format(sensitivity.machine.name), setting_of(sensitivity.machine)),
+        rows,
+        heads,
+        "RdBu_r",
+        UNIT_OF_PERCENTS,
     )
 
 

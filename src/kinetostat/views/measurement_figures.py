@@ -17,14 +17,12 @@ from kinetostat.views.lettering import width_of
 from kinetostat.views.measured import SOURCE_WORDS
 from kinetostat.views.question import Drawing
 
-FEW_NAMES = 60
-"""Unknowns whose paths still fit beside a matrix."""
-NAME_SIZE = 6.0
-"""Of the letters of these paths, in points."""
+MOST_PATHS = 60
+"""Greatest number of unknowns whose paths fit beside a matrix."""
+PATH_SIZE = 6.0
+"""Size of the letters of these paths, points."""
 LEAST_PATH_WIDTH = 1.4
-"""Inches for them, at least."""
-
-
+"""Least room for these paths, inches."""
 FIT_CAPTIONS = {
     "residuals": "What is left of every measured value, as drawn and as identified.",
     "correlations": "Correlations of the numbers: which ones were found together.",
@@ -79,16 +77,16 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     hidden = ~np.isfinite(answer.fit.sure)
     matrix[hidden] = matrix[:, hidden] = np.nan
     size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
-    few = answer.unknowns if len(matrix) <= FEW_NAMES else ()
+    few = answer.unknowns if len(matrix) <= MOST_PATHS else ()
     names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in few]
-    beside = max(LEAST_PATH_WIDTH, width_of(names, NAME_SIZE))
+    beside = max(LEAST_PATH_WIDTH, width_of(names, PATH_SIZE))
     with new_figure((size + beside + 0.8, size + beside + 0.2), title.format(answer.machine.name)) as figure:
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)
         if names:
-            panel.set_yticks(range(len(names)), names, fontsize=NAME_SIZE)
-            panel.set_xticks(range(len(names)), names, fontsize=NAME_SIZE, rotation=90)
+            panel.set_yticks(range(len(names)), names, fontsize=PATH_SIZE)
+            panel.set_xticks(range(len(names)), names, fontsize=PATH_SIZE, rotation=90)
         slim_bar(figure.colorbar(image, ax=panel, shrink=0.5, pad=0.02, label="correlation"))
     return figure
 
@@ -110,7 +108,7 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
 
 
 MOST_BARS_OF_ENTRIES = 60
-"""Measured numbers that have bars; of more, those with the largest differences."""
+"""Greatest number of measured entries that have bars; of more, those with the largest differences."""
 
 
 def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and computed stiffness") -> Figure:

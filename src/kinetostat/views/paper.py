@@ -34,8 +34,8 @@ from kinetostat.views.optimisation import designs_dataset
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.page import Markup, figure, table, whole_page
 from kinetostat.views.question import Description, Drawing, Field, Lines
+from kinetostat.views.tables import tell as tell_answer
 from kinetostat.views.tables import text_table
-from kinetostat.views.terminal import tell as tell_answer
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"

@@ -1,7 +1,7 @@
 """Questions about a machine, and answers that describe themselves: the nouns from which every surface is made.
 
 A question names the function that answers it and its options. The description of the answer lists fields, sentences,
-tables and figures once. Other files make the surfaces of both: `data_forms`, `terminal`, `notebook`, `report.answers`,
+tables and figures once. Other files make the surfaces of both: `data_forms`, `tables`, `notebook`, `report.answers`,
 `commands.asking`, `studio.question_tab`.
 """
 

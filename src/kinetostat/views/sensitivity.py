@@ -6,7 +6,7 @@ from typing import Any
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.sensitivity import PER, Sensitivity, notes, sensitivity
+from kinetostat.studies.sensitivity import UNIT_OF_PERCENTS, Sensitivity, notes, sensitivity
 from kinetostat.units import KINDS, RIGID
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -32,7 +32,7 @@ def influence_table(answer: Sensitivity, count: int) -> FittedTable:
     """Return the first parameters by rank, with their values and their effect on each index."""
     group, machine = group_of(answer.quantities), answer.machine
     heads = [plain_name(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{plain_name(group)}, {PER}" if group else PER
+    title = f"{plain_name(group)}, {UNIT_OF_PERCENTS}" if group else UNIT_OF_PERCENTS
     table = numeric_table(f"{machine.name}: {title}", "parameter", ["value", *heads])
     for influence in answer.parameters[:count]:
         value = machine.display.show(influence.value, KINDS[influence.kind].unit, RIGID, DIGITS_OF_PARAMETERS)
@@ -91,7 +91,7 @@ PARAMETER = (
     Field("units", long_name="unit of the parameter"),
     Field("one_percent_of", forms=("json", "csv")),
     Field("derivatives", long_name="derivative of each index, SI", axes=("quantity",)),
-    Field("percent_per_percent", unit="1", long_name=PER, axes=("quantity",)),
+    Field("percent_per_percent", unit="1", long_name=UNIT_OF_PERCENTS, axes=("quantity",)),
 )
 SENSITIVITY = Description(
     title="Sensitivity",

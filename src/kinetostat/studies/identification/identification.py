@@ -254,14 +254,14 @@ def _tied_error(model: ErrorModel, name: str, terms: str) -> tuple[MachineError,
             share = float(factor) if star else 1.0
         except ValueError:
             raise InputError(f'in the tie {name}, {shorten(factor)} is not a number; write "0.5 * PATH".') from None
-        found_errors = [error for error in model.errors if _matches(error, pattern)]
-        if not found_errors:
+        fitting_errors = [error for error in model.errors if _matches(error, pattern)]
+        if not fitting_errors:
             raise InputError(
                 f'the tie {name}: "{pattern}" names no error of {model.machine.name}; give paths with *, such as '
                 f'"{model.errors[0].path}".'
             )
-        named += found_errors
-        shares |= {error.path: shares.get(error.path, 0.0) + share for error in found_errors}
+        named += fitting_errors
+        shares |= {error.path: shares.get(error.path, 0.0) + share for error in fitting_errors}
     kinds = {error.kind for error in named}
     if len(kinds) > 1:
         raise InputError(

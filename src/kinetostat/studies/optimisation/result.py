@@ -14,6 +14,7 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
@@ -201,7 +202,7 @@ def _worst(problem: Problem, machine: Machine, names: list[str]) -> dict[str, fl
     anywhere = next(path for path in numbers if path.startswith("pose."))
     columns = dict(problem.poses.columns) or {anywhere: np.array([float(numbers[anywhere])])}
     answers = evaluate(machine, PointTable(columns), names)
-    reached = answers.status == 0
+    reached = answers.status == Status.OK
     return {name: float(answers.values[name][reached].max()) if reached.any() else float("nan") for name in names}
 
 

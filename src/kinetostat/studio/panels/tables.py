@@ -24,7 +24,7 @@ from kinetostat.studio.wording import bars, engineering, entry, heading, paragra
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
 from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
 from kinetostat.views.report.content import as_table
-from kinetostat.views.terminal import headline, requirement_lines
+from kinetostat.views.tables import headline, requirement_lines
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}

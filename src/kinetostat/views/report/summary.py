@@ -24,8 +24,7 @@ from kinetostat.views.loaded_tables import actuator_loads, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
-from kinetostat.views.tables import machine_table
-from kinetostat.views.terminal import headline, requirement_lines
+from kinetostat.views.tables import headline, machine_table, requirement_lines
 from kinetostat.views.validation import verdict
 
 LINES_OF_THE_POSE = ("Pose", "Margin")
