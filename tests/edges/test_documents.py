@@ -2,6 +2,7 @@
 
 import configparser
 import io
+import os
 import re
 import subprocess
 import tomllib
@@ -10,6 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from jobs import TRUTHS
 from report_pages import small_pictures
 
 from cad import starts
@@ -31,6 +33,9 @@ NOT_RUN = {
 }
 """What no test runs, by the words it starts with, and why."""
 
+MOST_SECONDS = 20.0
+"""Of processor time for each command of a job whose truth is known."""
+
 PAGES = [page.relative_to(ROOT) for page in pages()]
 
 
@@ -49,6 +54,7 @@ class Reader:
         self.rewriting = rewriting
         self.corrections: list[tuple[str, str]] = []
         self.said = ""
+        self.spent: list[float] = []
         self.names: dict[str, object] = {"__name__": "__main__"}
 
     def do(self, block):
@@ -137,12 +143,13 @@ class Reader:
         if words[-1].endswith(".step") and not starts():
             return 0
         *words, target = words if words[-2] == ">" else (*words, None)
-        told, warned = io.StringIO(), io.StringIO()
+        told, warned, before = io.StringIO(), io.StringIO(), os.times()
         with redirect_stdout(told), redirect_stderr(warned):
             try:
                 code = main([word for word in words[1:] if word != ">"])
             except SystemExit as stop:
                 code = stop.code
+        self.spent.append(sum(os.times()[:4]) - sum(before[:4]))
         if target:
             (self.folder / target).write_text(told.getvalue(), "utf-8")
         self.said += told.getvalue() + warned.getvalue()
@@ -191,6 +198,9 @@ def test_what_a_page_says_is_so(page, reader):
         text = text.replace(old, new)
     if reader.corrections:
         (ROOT / page).write_text(text, "utf-8")
+    if page.stem in TRUTHS:
+        assert max(reader.spent) < MOST_SECONDS
+        TRUTHS[page.stem](reader.folder)
 
 
 def test_a_quotation_is_corrected_by_what_resembles_it_most():
@@ -253,7 +263,7 @@ def test_equations_are_numbered_in_order_and_those_that_are_named_exist():
 @pytest.mark.parametrize("job", ["cable-robot", "delta-printer", "machine-tool", "telescope"])
 def test_a_job_takes_ten_commands_at_most_and_ends_in_a_file(job):
     """The page itself is the script of the job: the test above runs it from its first word to its last file."""
-    read = blocks(ROOT / "docs" / "tutorials" / f"{job}.md")
+    read = [*blocks(ROOT / "docs" / "tutorials" / f"{job}.md")]
     lines = [words for block in read if block.kind == "console" for words, _ in dialogues(block.text)]
     lines += [words for block in read if block.kind == "sh" for words in commands(block.text)]
     assert 0 < len(lines) <= 10

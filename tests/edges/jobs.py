@@ -1,54 +1,13 @@
-"""Whole jobs of new users, from the words of a tutorial to its last file: few commands, none long, and known truth."""
+"""Known truth about jobs of tutorials: `test_documents` does what a page says, and compares the files with it."""
 
 import csv
 import json
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from kinetostat import load, modes
-from pages import ROOT, blocks, commands, dialogues
-
-MOST_COMMANDS = 10
-MOST_SECONDS = 20.0
-"""Of processor time for each command."""
-
-
-def lines_of(page):
-    """The commands of a page, and its other blocks, in order."""
-    for block in blocks(page):
-        if block.kind == "console":
-            yield from (words for words, _ in dialogues(block.text))
-        elif block.kind == "sh":
-            yield from commands(block.text)
-        else:
-            yield block
-
-
-def follow(page, folder):
-    """Do what a page says, each command in a process of its own; the processor time of each, s."""
-    spent = []
-    for step in lines_of(page):
-        if not isinstance(step, list):
-            if step.kind in ("toml", "csv") and step.words[1:] == ():
-                (folder / step.words[0]).write_text(step.text, "utf-8")
-            elif step.kind == "python":
-                subprocess.run([sys.executable, "-c", step.text], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-            continue
-        words, target = (step[:-2], step[-1]) if step[-2:-1] == [">"] else (step, None)
-        with open(folder / (target or "said"), "w", encoding="utf-8") as said:
-            running = subprocess.Popen([sys.executable, "-m", *words], cwd=folder, stdout=said)
-            _, status, usage = os.wait4(running.pid, 0)
-        running.returncode = os.waitstatus_to_exitcode(status)
-        # A requirement that is missed is an answer as well, with an exit code of its own.
-        assert running.returncode in (0, 1), " ".join(words)
-        spent.append(usage.ru_utime + usage.ru_stime)
-    return spent
-
 
 PUBLISHED = (361.2, 361.6, 387.3, 355.2, 337.7, 386.7, 367.8, 367.5)
 """Tensions of least norm of CoGiRo without payload at its home pose, N."""
@@ -92,11 +51,5 @@ def machine_tool(folder):
     assert "free_stiffness_x" in (folder / "mill.html").read_text("utf-8")
 
 
-@pytest.mark.slow
-@pytest.mark.documents
-@pytest.mark.parametrize(("page", "truth"), [("cable-robot", cable_robot), ("machine-tool", machine_tool)])
-def test_a_job_is_done_in_few_commands_and_tells_the_truth(page, truth, tmp_path):
-    spent = follow(ROOT / "docs" / "tutorials" / f"{page}.md", tmp_path)
-    assert len(spent) <= MOST_COMMANDS
-    assert max(spent) < MOST_SECONDS
-    truth(tmp_path)
+TRUTHS = {"cable-robot": cable_robot, "machine-tool": machine_tool}
+"""The tutorials whose files are compared with known truth, each by what asserts it of the page's folder."""
