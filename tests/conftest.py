@@ -9,6 +9,7 @@ import gc
 import os
 import re
 import shutil
+import sys
 import sysconfig
 import tempfile
 from functools import partial
@@ -69,6 +70,9 @@ MARKERS = {
 """Files of tests that plain `pytest` leaves out, because they take long; `-m slow` runs them. A single test of
 another file that takes long carries one of these markers itself."""
 
+# Where no bytecode may be written, all processes of the tests, and those that tests start, compile every file anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
 """Messages quote commands as they are typed in the shell: in tests `kinetostat` is on the path, as in the docs."""

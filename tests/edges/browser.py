@@ -17,10 +17,10 @@ from playwright import sync_api
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SOFTWARE_GRAPHICS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
-PATIENCE = 120_000
-"""Milliseconds for a step: software graphics on a busy machine take seconds for a picture."""
-OPENINGS = 6
-"""Times that a list is opened at most."""
+PATIENCE = 600_000
+"""Milliseconds for a step, half of what pytest gives a whole test: on a busy machine, software graphics are slow."""
+OPENINGS = 30
+"""Times that a list is opened at most; each time it has such a part of a step to show what it offers."""
 
 
 def chromium() -> str | None:
@@ -120,7 +120,7 @@ class Watched:
 def browser() -> Iterator[Any]:
     """A function that opens a new, watched tab; everything is closed at the end."""
     with sync_api.sync_playwright() as play:
-        running = play.chromium.launch(executable_path=chromium(), args=list(SOFTWARE_GRAPHICS))
+        running = play.chromium.launch(executable_path=chromium(), args=list(SOFTWARE_GRAPHICS), timeout=PATIENCE)
 
         def new_tab(width: int = 1280, height: int = 800, scale: float = 1.0) -> Watched:
             tab = running.new_page(viewport={"width": width, "height": height}, device_scale_factor=scale)

@@ -1,10 +1,12 @@
-"""Reports for tests: made by the command, and read back from their pages."""
+"""Reports for tests: made by the command, drawn as far as a test looks at them, and read back from their pages."""
 
 import io
 import json
 import re
 from html.parser import HTMLParser
 
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 
 from kinetostat.cli import main
@@ -32,6 +34,17 @@ def no_pictures(patch):
     blank = io.BytesIO()
     Image.new("RGB", (8, 6)).save(blank, "png")
     patch.setattr(pictures, "picture", lambda *_: blank.getvalue())
+
+
+def no_layout(patch):
+    """Leave the parts of figures where they are first put: `test_files_and_figures` looks at the places of texts."""
+    patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+
+
+def no_drawing(patch):
+    """Leave all figures blank, where a test asks for their files at most."""
+    no_layout(patch)
+    patch.setattr(Figure, "draw", lambda *_: None)
 
 
 class Page(HTMLParser):

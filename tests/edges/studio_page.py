@@ -24,9 +24,9 @@ from kinetostat.studio.serving import show
 from studies import LOOK
 
 KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)
-PATIENCE = 300
-"""Tenths of a second in which a page appears, on a busy machine."""
 """What is drawn in the browser."""
+PATIENCE = 6000
+"""Tenths of a second in which a page appears, half of what pytest gives a whole test."""
 
 
 def _of_the_studio(task: str) -> bool:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from report_pages import no_layout
 
 import kinetostat as k
 from kinetostat.spec.errors import InputError
+from kinetostat.views import notebook
 from kinetostat.views.answers import description_of
 from kinetostat.views.notebook import html_of
 
@@ -54,7 +56,9 @@ UNDRAWN = {"analyze", "analyze out of reach", "forward", "command", "command at 
 
 
 @pytest.mark.parametrize("name", ANSWERS)
-def test_an_answer_has_every_surface(machine, name, tmp_path):
+def test_an_answer_has_every_surface(machine, name, tmp_path, monkeypatch):
+    no_layout(monkeypatch)
+    monkeypatch.setattr(notebook, "PICTURE_PIXELS", (160, 120))
     answer = ANSWERS[name](machine)
     assert len(repr(answer)) < 200 or name.startswith("evaluate")
     if name in UNDRAWN:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from report_pages import no_pictures
+from report_pages import no_drawing, no_pictures
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import load
@@ -36,6 +36,11 @@ FREE = {
 }
 """Commands whose answers are about the free machine, with what they need besides it."""
 FIRST_LINES = 12
+
+
+@pytest.fixture(autouse=True)
+def blank_figures(monkeypatch):
+    no_drawing(monkeypatch)
 
 
 def said_by(capsys, tmp_path, command, *more):

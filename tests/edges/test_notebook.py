@@ -11,6 +11,7 @@ from IPython.core.interactiveshell import InteractiveShell
 
 import kinetostat
 from kinetostat import analyze, changed, compare, evaluate_grid, load, machine_picture, plot, workspace
+from kinetostat.views import notebook
 
 VOID = {"img", "br"}
 
@@ -53,7 +54,9 @@ def shell():
 
 
 @pytest.fixture
-def shown(shell):
+def shown(shell, monkeypatch):
+    """Everything is shown by IPython's formatter, machines in small pictures, which take longest."""
+    monkeypatch.setattr(notebook, "PICTURE_PIXELS", (160, 120))
     return lambda thing: shell.display_formatter.format(thing)[0]
 
 
@@ -120,8 +123,8 @@ def test_importing_in_a_notebook_is_enough_and_loads_only_the_list_of_answers():
     code = (
         "import sys; from IPython.core.interactiveshell import InteractiveShell as S; s = S.instance();"
         "import kinetostat; print([m for m in sys.modules if m.startswith('kinetostat.')]);"
-        "from kinetostat import load;"
-        "print('kinetostat' in s.display_formatter.format(load('planar-3rpr'))[0]['text/html'])"
+        "from kinetostat import analyze, load; there = analyze(load('delta', ['pose.z=-30 m']));"
+        "print('kinetostat' in s.display_formatter.format(there)[0]['text/html'])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = ["kinetostat.views", "kinetostat.views.questions"]

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from report_pages import Page, no_pictures
+from report_pages import Page, no_drawing, no_pictures
 
 import kinetostat
 from kinetostat import (
@@ -278,6 +278,7 @@ def test_a_machine_is_exported_as_by_the_command(tmp_path, monkeypatch):
 def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     no_pictures(monkeypatch)
+    no_drawing(monkeypatch)
     machine = load("tripteron", ["pose.x=45 cm"])
     page = Page(report(machine, "our-own.html", without=REPORT_PARTS, author="N. N.").read_text("utf-8"))
     save(machine, "machine.toml")

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 
 import pytest
+from report_pages import no_drawing
 
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
@@ -97,6 +98,7 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
 def test_a_wrong_model_is_found_out(monkeypatch, tmp_path, capsys):
     wrong = (printed.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed.TABLE_4[0].values), *printed.TABLE_4[1:])
     monkeypatch.setattr(printed, "TABLE_4", wrong)
+    no_drawing(monkeypatch)
     assert main(["reproduce", "-o", str(tmp_path), "--json"]) == NO_ANSWER
     found = json.loads(capsys.readouterr().out)
     assert found["explained"] is False
