@@ -1,5 +1,7 @@
 """Drives balance the load: its virtual work over every motion of the mechanism is that of the springs that it moves."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -60,6 +62,24 @@ def place(machine):
     return columns, np.array(response.reference.components(), dtype=float), drives
 
 
+@cache
+def motions_of_the_pose(machine):
+    """By each coordinate of the pose: the twist that a small change of it gives, and how far each drive moves."""
+    length = float(respond(machine).configuration.length)
+    kinds = {path: p.quantity.kind for p in parameters(machine.family) for path in p.leaves if path.startswith("pose.")}
+    motions = {}
+    for path, kind in kinds.items():
+        step = AHEAD * (length if kind == "length" else 1.0)
+        (before, start, q), (after, end, p) = (
+            place(with_values(machine, {path: values(machine)[path] + sign * step})) for sign in (-1.0, 1.0)
+        )
+        turned = after @ before.T
+        skew = 0.5 * (turned - turned.T)
+        rotation = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        motions[path] = np.concatenate([rotation, end - start]), {leg: p[leg] - q[leg] for leg in q}
+    return motions
+
+
 @two_sided
 @settings(max_examples=4)
 @given(wrench=directions)
@@ -71,17 +91,8 @@ def test_drives_of_bundled_machines_balance_every_load(case, wrench):
     assert state.rest is Rest.OK
     # Parts of a drive in a row carry one load, and a drive of stiffness 0 carries none.
     carried = {spring.leg: spring.load for spring in state.springs if spring.actuated}
-    kinds = {path: p.quantity.kind for p in parameters(machine.family) for path in p.leaves if path.startswith("pose.")}
-    for path, kind in kinds.items():
-        step = AHEAD * (length if kind == "length" else 1.0)
-        (before, start, q), (after, end, p) = (
-            place(with_values(machine, {path: values(machine)[path] + sign * step})) for sign in (-1.0, 1.0)
-        )
-        turned = after @ before.T
-        skew = 0.5 * (turned - turned.T)
-        rotation = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-        twist = np.concatenate([rotation, end - start])
-        resisted = sum(carried.get(leg, 0.0) * (p[leg] - q[leg]) for leg in q)
+    for path, (twist, moved) in motions_of_the_pose(machine).items():
+        resisted = sum(carried.get(leg, 0.0) * distance for leg, distance in moved.items())
         assert balanced(twist, wrench, resisted, length), (path, twist * wrench, resisted)
 
 
