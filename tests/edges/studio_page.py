@@ -1,6 +1,7 @@
 """A studio page without a browser: opened, worked with, and waited for until nothing is being computed any more."""
 
 import asyncio
+import gc
 import logging
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import closing, contextmanager
@@ -183,5 +184,6 @@ def on_page(
             if failed is not None:
                 raise failed
 
+    gc.freeze()  # NiceGUI collects garbage before and after each page: all that is older need not be looked through
     with TemporaryDirectory() as own:
         asyncio.run(run(Workshop(state or Path(own))))
