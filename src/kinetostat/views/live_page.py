@@ -31,7 +31,7 @@ from kinetostat.engine.machine_functions import (
     functions_of,
     sample_points,
 )
-from kinetostat.engine.printed import CALLS, NOTATION, pack_graph
+from kinetostat.engine.printed import NOTATION, pack_graph
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -159,8 +159,6 @@ def _compressed_text(content: object) -> str:
 
 
 def _page(name: str, content: object) -> str:
-    functions = {operation: f"Math.{operation}" for operation in CALLS}
-    operations = [form.format("{0}", "{1}", "{2}", **functions) for form in NOTATION.values()]
     words = {
         "name": escape(name),
         "version": version("kinetostat"),
@@ -169,7 +167,7 @@ def _page(name: str, content: object) -> str:
         "script": (TEMPLATES / "page.js").read_text("utf-8"),
         "formulas": (TEMPLATES / "formulas.js")
         .read_text("utf-8")
-        .replace("$operations", json.dumps(operations))
+        .replace("$operations", json.dumps([*NOTATION]))
         .replace("$statuses", json.dumps([status.sentence for status in Status])),
     }
     body = Template((TEMPLATES / "page.html").read_text("utf-8")).substitute(words)

@@ -1,17 +1,25 @@
 // Programs of a machine: made of data, and the loops around them.
 "use strict";
 const FORMAT = 1;
+// Operations by their names: the instruction of WebAssembly for a vector of two numbers, and its operands in the order in which it
+// takes them. Conditions are masks. The letters of packed programs count through the names in their order.
+const INSTRUCTIONS = {
+  add: [[0xfd, 0xf0, 1], 0, 1], sub: [[0xfd, 0xf1, 1], 0, 1], mul: [[0xfd, 0xf2, 1], 0, 1], div: [[0xfd, 0xf3, 1], 0, 1],
+  neg: [[0xfd, 0xed, 1], 0], abs: [[0xfd, 0xec, 1], 0], sqrt: [[0xfd, 0xef, 1], 0], steady: [[], 0],
+  lt: [[0xfd, 0x49], 0, 1], le: [[0xfd, 0x4b], 0, 1], and: [[0xfd, 0x4e], 0, 1], where: [[0xfd, 0x52], 1, 2, 0],
+  // The only one that is a call, once for each number: both operands wait in locals 0 and 1.
+  atan2: [[0x21, 1, 0x21, 0, ...[0, 1].flatMap((lane) => [0x20, 0, 0xfd, 0x21, lane, 0x20, 1, 0xfd, 0x21, lane, 0x10, 0, ...(lane ? [0xfd, 0x22, 1] : [0xfd, 0x14])])], 0, 1],
+};
 const OPERATIONS = $operations;
 const STATUSES = $statuses;
 const LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 const MOST_LETTERS = 400000, MOST_BYTES = 4e6;
 
-// A packed program as a function of inputs p and the coordinates of a state s, with results in o; it returns the last one.
-// The program is data: letters of the table above and numbers; nothing else of it becomes source code.
-function compile({ code, references, numbers }, inputs, states) {
+// A packed program as its operations by their names, and its results, of which the last is a code: names or numbers. A value
+// that is given, an input or a coordinate of a state, has the number of its place as its name.
+function unpacked({ code, references, numbers }, given) {
   if (code.length > MOST_LETTERS) throw new Error("the program is too long");
-  const names = (word, count) => Array.from({ length: count }, (_, k) => `${word}[${k}]`);
-  const kept = [...names("p", inputs), ...names("s", states)], stack = [], lines = [];
+  const kept = Array.from({ length: given }, (_, k) => `g${k}`), stack = [], rows = new Map();
   let place = 0;
   const count = () => {
     for (let value = 0, size = 1; ; size *= 32) {
@@ -24,7 +32,7 @@ function compile({ code, references, numbers }, inputs, states) {
   const literal = (number) => {
     const value = { inf: Infinity, "-inf": -Infinity, nan: NaN }[number] ?? number;
     if (typeof value !== "number") throw new Error("a number is damaged");
-    return value < 0 || Object.is(value, -0) ? `(${Object.is(value, -0) ? "-0" : value})` : String(value);
+    return value;
   };
   for (const letter of code) {
     if (letter === "#") { stack.push(literal(numbers[count()])); continue; }
@@ -34,17 +42,98 @@ function compile({ code, references, numbers }, inputs, states) {
       kept.unshift(name); stack.push(name);
       continue;
     }
-    const form = OPERATIONS[letter.toLowerCase().charCodeAt(0) - 97];
-    const arity = form ? new Set(form.match(/\{\d\}/g)).size : 0;
-    if (!form || stack.length < arity) throw new Error("an operation is damaged");
-    const operands = stack.splice(-arity);
-    const name = `v${lines.length}`;
-    lines.push(`const ${name} = ${form.replace(/\{(\d)\}/g, (_, k) => operands[k])};`);
+    const operation = OPERATIONS[letter.toLowerCase().charCodeAt(0) - 97], arity = operation && INSTRUCTIONS[operation].length - 1;
+    if (!operation || stack.length < arity) throw new Error("an operation is damaged");
+    const operands = stack.splice(-arity), name = `v${rows.size}`;
+    rows.set(name, { operation, operands });
     stack.push(name);
     if (letter < "a") kept.unshift(name);
   }
-  const results = stack.slice(0, -1).map((value, k) => `o[${k}] = ${value};`);
-  return new Function("p", "o", "s", `"use strict";\n${lines.join("\n")}\n${results.join("\n")}\nreturn ${stack.at(-1)};`);
+  return { rows, results: stack };
+}
+
+// The bytes of WebAssembly: counts, lists, and numbers of two points, which are 16 bytes apart.
+function counted(value) {
+  const bytes = [];
+  for (; value > 127; value = Math.floor(value / 128)) bytes.push(128 + (value % 128));
+  return [...bytes, value];
+}
+const listed = (items) => [...counted(items.length), ...items.flat()];
+const section = (number, bytes) => [number, ...counted(bytes.length), ...bytes];
+const word = (text) => listed([...text].map((letter) => letter.charCodeAt(0)));
+const constant = (value) => [0xfd, 0x0c, ...new Uint8Array(new Float64Array([value, value]).buffer)];
+const memory16 = (place) => [4, ...counted(16 * place)];
+const NUMBER = 0x7c, PAIR = 0x7b;
+
+// An unpacked program as WebAssembly for two points at once: it takes what is given from the start of the memory, and leaves
+// results and the code behind it. With some results alone it does only what these need; if all are NaN on one condition,
+// what they need waits for it.
+function assembled({ rows, results }, wanted, given) {
+  const code = results.at(-1), values = wanted.map((k) => results[k]), uses = new Map();
+  for (const waiting = [code, ...values]; waiting.length;) {
+    const name = waiting.pop();
+    if (!rows.has(name)) continue;
+    if (!uses.has(name)) waiting.push(...rows.get(name).operands);
+    uses.set(name, (uses.get(name) ?? 0) + 1);
+  }
+  const [accepted, ...others] = new Set(values.map((value) => {
+    const row = rows.get(value);
+    return row?.operation === "where" && Number.isNaN(row.operands[2]) ? row.operands[0] : undefined;
+  }));
+  const waits = accepted !== undefined && !others.length;
+  const again = [...uses.keys()].filter((name) => uses.get(name) > 1 || (waits && name === accepted));
+  const locals = new Map(again.map((name, k) => [name, counted(2 + k)])), done = new Set(), body = [];
+  const emit = (first) => {
+    for (const tasks = [first]; tasks.length;) {
+      const task = tasks.pop(), row = rows.get(task);
+      if (Array.isArray(task)) for (const byte of task) body.push(byte);
+      else if (typeof task === "number") tasks.push(constant(task));
+      else if (!row) tasks.push([0x41, 0, 0xfd, 0, ...memory16(Number(task.slice(1)))]);
+      else if (done.has(task)) tasks.push([0x20, ...locals.get(task)]);
+      else {
+        const [instruction, ...order] = INSTRUCTIONS[row.operation];
+        if (locals.has(task)) { done.add(task); tasks.push([0x22, ...locals.get(task)]); }
+        tasks.push(instruction, ...order.map((k) => row.operands[k]).reverse());
+      }
+    }
+  };
+  const store = (value, k) => { emit([0x41, 0]); emit(value); emit([0xfd, 0x0b, ...memory16(given + k)]); };
+  store(code, values.length);
+  if (waits) {
+    emit(accepted);
+    emit([0xfd, 0x53, 0x45, 0x04, 0x40]);
+    values.forEach((_, k) => store(NaN, k));
+    emit([0x0f, 0x0b]);
+  }
+  values.forEach(store);
+  const text = [...listed([[...counted(2 + locals.size), PAIR]]), ...body, 0x0b];
+  return new Uint8Array([
+    0x00, 0x61, 0x73, 0x6d, 1, 0, 0, 0,
+    ...section(1, listed([[0x60, ...listed([]), ...listed([])], [0x60, ...listed([NUMBER, NUMBER]), ...listed([NUMBER])]])),
+    ...section(2, listed([[...word("m"), ...word("atan2"), 0x00, 1]])),
+    ...section(3, listed([0])), ...section(5, listed([[0, ...counted(Math.ceil((given + values.length + 1) / 4096))]])),
+    ...section(7, listed([[...word("run"), 0x00, 1], [...word("memory"), 0x02, 0]])),
+    ...section(10, listed([[...counted(text.length), ...text]])),
+  ]);
+}
+
+// A program as a function of inputs p and the coordinates of a state s, with results in o; it returns the code. Its `pair` takes
+// two points, [p, s] each, and returns the first result of both.
+async function compiled(program, wanted, inputs, states) {
+  const module = await WebAssembly.compile(assembled(program, wanted, inputs + states));
+  const { run, memory } = (await WebAssembly.instantiate(module, { m: { atan2: Math.atan2 } })).exports;
+  const numbers = new Float64Array(memory.buffer), first = 2 * (inputs + states);
+  const take = (lane, p, s) => {
+    for (let k = 0; k < inputs; k++) numbers[2 * k + lane] = p[k];
+    for (let k = 0; k < states; k++) numbers[2 * (inputs + k) + lane] = s[k];
+  };
+  const each = (p, o, s) => {
+    take(0, p, s); take(1, p, s); run();
+    for (let k = 0; k < wanted.length; k++) o[k] = numbers[first + 2 * k];
+    return numbers[first + 2 * wanted.length];
+  };
+  each.pair = (one, other) => { take(0, ...one); take(1, ...other); run(); return [numbers[first], numbers[first + 1]]; };
+  return each;
 }
 
 // The content of an address: a compressed text.
@@ -62,14 +151,20 @@ async function inflated(text) {
   return JSON.parse(await new Blob(parts).text());
 }
 
-// A machine with its programs as functions.
-function functionsOf({ format, data, packed }) {
+// A machine with its programs as functions, and `result`, which gives the function of one result alone, as maps need it.
+async function functionsOf({ format, data, packed }) {
   if (format !== FORMAT) throw new Error("it is of another version of kinetostat");
-  const programs = {};
-  for (const [name, program] of Object.entries(packed)) {
-    programs[name] = compile(program, data.inputs.length, data.rest && ["step", "loaded"].includes(name) ? data.rest.states : 0);
-  }
-  return { data, programs };
+  const programs = {}, alone = new Map(), inputs = data.inputs.length;
+  const statesOf = (name) => (data.rest && ["step", "loaded"].includes(name) ? data.rest.states : 0);
+  const rows = Object.fromEntries(Object.entries(packed).map(([name, program]) => [name, unpacked(program, inputs + statesOf(name))]));
+  const make = (name, wanted) => compiled(rows[name], wanted, inputs, statesOf(name));
+  await Promise.all(Object.entries(rows).map(async ([name, { results }]) => { programs[name] = await make(name, [...results.slice(0, -1).keys()]); }));
+  const result = (name, k) => {
+    const key = `${name} ${k}`;
+    if (!alone.has(key)) alone.set(key, make(name, [k]));
+    return alone.get(key);
+  };
+  return { data, programs, result };
 }
 
 // Coordinates of the state of rest, by Newton's method.

@@ -1,7 +1,7 @@
 // The page of a machine: a picture, matrices and a map that follow the sliders. Nothing is requested.
 const $ = (id) => document.getElementById(id);
 
-function openMachine(data, programs) {
+function openMachine({ data, programs, result }) {
   const { inputs, actuators, quantities, parts, rest, planar, samples } = data;
   const NAMES = ["rx", "ry", "rz", "x", "y", "z"];
   const at = inputs.map((input) => input.home);
@@ -40,10 +40,11 @@ function openMachine(data, programs) {
     return programs.loaded(point, loaded, restOf(point, rest, programs));
   };
   const place = (values) => { programs.places(prepared(values), places); return places; };
-  const entry = (matrix, i, j) => {
+  const placeOf = (matrix, i, j) => {
     const [a, b] = i < j ? [i, j] : [j, i];
-    return answers[(matrix === "K" ? 21 : 0) + 6 * a - (a * (a - 1)) / 2 + b - a];
+    return (matrix === "K" ? 21 : 0) + 6 * a - (a * (a - 1)) / 2 + b - a;
   };
+  const entry = (matrix, i, j) => answers[placeOf(matrix, i, j)];
 
   // The program against numbers that Python computed pose by pose.
   function selfCheck() {
@@ -190,31 +191,41 @@ function openMachine(data, programs) {
 
   const picture = pictureOf($("picture"), data, actuators.length);
 
-  // The map: a quantity over two inputs, the others as they are.
-  const mapped = ["K", "C"].flatMap((name) => data.components.map((k) => {
-    const [factor, word] = BLOCKS[name][block(k, k)];
-    return { label: `${name} ${NAMES[k]}`, unit: word, value: (point) => (answer(point) === 0 ? entry(name, k, k) * factor : NaN) };
-  }));
-  free.forEach(({ name, si }, k) => mapped.push({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], value: (point) => (number(point) === 0 ? numbers[k] * unit(si)[0] : NaN) }));
-  quantities.filter((quantity) => quantity.loaded).forEach(({ name, si }, k) =>
-    mapped.push({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], value: (point) => (answerAtRest(point) === 0 ? loaded[6 + k] * unit(si)[0] : NaN) }));
+  // The map: a quantity over two inputs, the others as they are, by the part of its program that gives it alone.
+  const described = ({ name, si }) => ({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], factor: unit(si)[0] });
+  const mapped = [
+    ...["K", "C"].flatMap((name) => data.components.map((k) => {
+      const [factor, word] = BLOCKS[name][block(k, k)];
+      return { label: `${name} ${NAMES[k]}`, unit: word, factor, of: ["answers", placeOf(name, k, k)] };
+    })),
+    ...free.map((quantity, k) => ({ ...described(quantity), of: ["quantities", k] })),
+    ...quantities.filter((quantity) => quantity.loaded).map((quantity, k) => ({ ...described(quantity), of: ["loaded", 6 + k] })),
+  ];
   const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const CELLS = 41;
   function paint(share) {
     const place = Math.max(0, Math.min(1, share)) * (STOPS.length - 1), k = Math.min(STOPS.length - 2, Math.floor(place));
     return STOPS[k].map((value, c) => value + (place - k) * (STOPS[k + 1][c] - value));
   }
-  function drawMap() {
+  let latest = 0;
+  async function drawMap() {
     const [choice, first, second] = ["map-of", "map-x", "map-y"].map((id) => Number($(id).value));
-    const of = mapped[choice], values = new Float64Array(CELLS * CELLS), point = [...at];
+    const of = mapped[choice], turn = ++latest, run = await result(...of.of);
+    if (turn !== latest) return; // another map has been asked for meanwhile
+    const values = new Float64Array(CELLS * CELLS), point = [...at];
     const step = (k, n) => inputs[k].low + ((inputs[k].high - inputs[k].low) * n) / (CELLS - 1);
+    const cell = (n) => {
+      point[first] = step(first, n % CELLS); point[second] = step(second, Math.floor(n / CELLS));
+      const here = prepared(point);
+      return [here, of.of[0] === "loaded" ? restOf(here, rest, programs) : undefined];
+    };
     const began = performance.now();
-    for (let row = 0; row < CELLS; row++) for (let column = 0; column < CELLS; column++) {
-      point[first] = step(first, column); point[second] = step(second, row);
-      values[row * CELLS + column] = of.value(point);
+    for (let n = 0; n < values.length; n += 2) {
+      const [one, other] = run.pair(cell(n), cell(Math.min(n + 1, values.length - 1)));
+      values[n] = one * of.factor;
+      if (n + 1 < values.length) values[n + 1] = other * of.factor;
     }
     document.documentElement.dataset.mapTime = performance.now() - began;
-    answer(at);
     let low = Infinity, high = -Infinity;
     for (const value of values) if (Number.isFinite(value)) { low = Math.min(low, value); high = Math.max(high, value); }
     const image = new ImageData(CELLS, CELLS);
@@ -312,8 +323,7 @@ async function openAddress() {
     return;
   }
   try {
-    const { data, programs } = globalThis.opened = functionsOf(given ? await inflated(given) : own);
-    openMachine(data, programs);
+    openMachine(globalThis.opened = await functionsOf(given ? await inflated(given) : own));
     document.body.classList.remove("closed");
   } catch (error) {
     $("status").textContent = `The machine in this address cannot be opened: ${error.message}.`;
