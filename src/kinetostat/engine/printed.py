@@ -47,46 +47,78 @@ class Printed:
     """Source code of a graph.
 
     Attributes:
-        lines: declarations of constants, in order.
-        results: expressions of the results, in order.
+        first: declarations of constants that the condition and the code need, in order.
+        condition: of which all results but the code are NaN unless it holds; empty if there is none.
+        code: expression of the code.
+        then: declarations of what else the results need.
+        results: expressions of the results, in order, where the condition holds.
         operations: number of operations.
     """
 
-    lines: tuple[str, ...]
+    first: tuple[str, ...]
+    condition: str
+    code: str
+    then: tuple[str, ...]
     results: tuple[str, ...]
     operations: int
 
 
-def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequence[Operand]) -> Printed:
-    """Print what some results need, in C.
+def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequence[Operand], code: Operand) -> Printed:
+    """Print what some results and a code need, in C.
 
     Args:
         inputs: all inputs of the graph.
         names: how they are written.
         results: nodes of the graph, or numbers.
+        code: the same.
 
     Raises:
         ValueError: a result needs another input.
     """
     written = {given.number: name for given, name in zip(inputs, names, strict=True)}
-    used = needed_nodes(results)
+    condition, values = _accepted(results)
+    decided = [code] if condition is None else [condition, code]
+    before = needed_nodes(decided)
+    used = [*before, *(node for node in needed_nodes([*values, *decided]) if node not in set(before))]
     uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
-    uses.update(result.number for result in results if isinstance(result, Node))
+    uses.update(result.number for result in (*values, *decided) if isinstance(result, Node))
     lines: list[str] = []
-    for node in used:
-        if node.number in written:
-            continue
-        if node.operation == "input":
-            raise ValueError("a result depends on an input that has no name")
-        text = _expression(node, written)
-        if uses[node.number] > 1 or len(text) > LONGEST_EXPRESSION:
-            name = f"v{len(lines)}"
-            kind = "const int" if isinstance(node, Condition) else "const double"
-            lines.append(f"{kind} {name} = {text};")
-            text = name
-        written[node.number] = text
-    values = tuple(_operand(result, written) for result in results)
-    return Printed(tuple(lines), values, sum(node.operation != "input" for node in used))
+    first = 0
+    for place, node in enumerate(used, 1):
+        if node.number not in written:
+            if node.operation == "input":
+                raise ValueError("a result depends on an input that has no name")
+            text = _expression(node, written)
+            if uses[node.number] > 1 or len(text) > LONGEST_EXPRESSION:
+                name = f"v{len(lines)}"
+                kind = "const int" if isinstance(node, Condition) else "const double"
+                lines.append(f"{kind} {name} = {text};")
+                text = name
+            written[node.number] = text
+        if place == len(before):
+            first = len(lines)
+    return Printed(
+        tuple(lines[:first]),
+        "" if condition is None else _operand(condition, written),
+        _operand(code, written),
+        tuple(lines[first:]),
+        tuple(_operand(value, written) for value in values),
+        sum(node.operation != "input" for node in used),
+    )
+
+
+def _accepted(results: Sequence[Operand]) -> tuple[Condition | None, list[Operand]]:
+    """The condition of which all results are NaN unless it holds, and their values where it does."""
+    values, conditions = [], set()
+    for result in results:
+        if isinstance(result, Node) and result.operation == "where":
+            condition, value, otherwise = result.operands
+            if isinstance(otherwise, float) and math.isnan(otherwise):
+                conditions.add(condition)
+                values.append(value)
+    if len(values) < len(results) or len(conditions) != 1:
+        return None, [*results]
+    return conditions.pop(), values
 
 
 def _expression(node: Node, written: dict[int, str]) -> str:

@@ -164,9 +164,14 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
     """Print a body as a function that returns its code; columns after the inputs are the coordinates of a state."""
     given = len(functions.inputs)
     names = [f"in[{k}]" if k < given else f"state[{k - given}]" for k in range(len(body.columns))]
-    printed = print_graph(body.columns, names, [*body.results, body.code])
-    lines = [*printed.lines, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results[:-1]))]
-    lines.append(f"return (int)({printed.results[-1]});")
+    printed = print_graph(body.columns, names, body.results, body.code)
+    lines = [*printed.first]
+    if printed.condition:
+        lines.append(f"if (!({printed.condition})) {{")
+        lines += [f"    for (int k = 0; k < {len(printed.results)}; k++) {{", "        out[k] = NAN;", "    }"]
+        lines += [f"    return (int)({printed.code});", "}"]
+    lines += [*printed.then, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results))]
+    lines.append(f"return (int)({printed.code});")
     state = "const double *state, " if len(body.columns) > given else ""
     unused = [f"(void){word};" for word in ("in", "state") if not any(f"{word}[" in line for line in lines)]
     unused = [line for line in unused if state or "state" not in line]
