@@ -6,8 +6,9 @@ Source: theory (35).
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -115,6 +116,8 @@ class ElasticLeg:
         rod: joint centres nearer to the base and to the platform in the free state [n x 3], of a leg that only carries
             a force between them and has its masses there; None of others.
         ends: how many of its motions carry what so many of its elements carry, from none to all of them.
+        spin: number of the first of three coordinates that turn about the centre of a ball joint, and the way to the
+            centre of the next one [n x 3], if the link between both is free to spin about it; None without one.
     """
 
     name: str
@@ -129,6 +132,7 @@ class ElasticLeg:
     dampers: Array
     rod: tuple[Array, Array] | None = None
     ends: tuple[int, ...] = ()
+    spin: tuple[int, Array] | None = None
 
     @property
     def size(self) -> int:
@@ -143,7 +147,8 @@ class ElasticLeg:
     def at(self, rows: Integers) -> "ElasticLeg":
         """The leg at some of n poses [rows]."""
         parts = {name: getattr(self, name)[rows] for name in ("stiffness", "preload", "idle", "rotors", "dampers")}
-        return replace(self, chain=self.chain.at(rows), masses=self.masses.at(rows), **parts)
+        spin = self.spin and (self.spin[0], self.spin[1][rows])
+        return replace(self, chain=self.chain.at(rows), masses=self.masses.at(rows), spin=spin, **parts)
 
 
 @dataclass(frozen=True)
@@ -366,7 +371,10 @@ def elastic_leg(
     row = _Row(units, amounts, links, travels)
     row.grow(0)
     row.carried.append((0, len(row.twists)))
+    joints: dict[int, Joint] = {}
     for number, element in enumerate(leg.chain, 1):
+        if not isinstance(element, Parallelogram):
+            joints.update(enumerate(element.freedoms, len(row.springs)))
         row.add(element, number)
     count, masses, size = len(units.length), row.masses(), len(row.springs)
     twists = np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6))
@@ -385,7 +393,36 @@ def elastic_leg(
         np.zeros((count, size)),
         _rod(leg, units, [weight.point for weight in masses]),
         tuple(whole for _, whole in row.carried),
+        _spin(row, joints, masses),
     )
+
+
+def _spin(row: _Row, joints: Mapping[int, Joint], masses: Sequence[Weight]) -> tuple[int, Array] | None:
+    """The link of a leg that spins between two ball joints, see `ElasticLeg`: it bears no mass beside their centres.
+
+    Args:
+        row: the motions of the leg.
+        joints: its joints by the numbers of their coordinates.
+        masses: that it carries.
+    """
+    passive = [number for number, spring in enumerate(row.springs) if spring is None]
+    groups = [passive[k : k + 3] for k in range(len(passive) - 2)]
+    balls = [ball for ball in groups if ball[2] == ball[0] + 2 and _centre(joints, ball) is not None]
+    for near, far in pairwise(balls):
+        start, end = _centre(joints, near), _centre(joints, far)
+        if start is None or end is None or start.is_at(end) or passive.index(far[0]) != passive.index(near[2]) + 1:
+            continue
+        between = range(row.coordinate.index(near[0]) + 1, row.coordinate.index(far[2]) + 1)
+        if all(mass.carried not in between or mass.point.is_at(start) or mass.point.is_at(end) for mass in masses):
+            return near[0], row.units.points([end])[:, 0] - row.units.points([start])[:, 0]
+    return None
+
+
+def _centre(joints: Mapping[int, Joint], ball: Sequence[int]) -> Vector | None:
+    """The point about which three coordinates turn; None if they have no common one."""
+    points = [joints[number].point for number in ball if number in joints and is_zero(joints[number].pitch)]
+    point = points[0] if len(points) == len(ball) else None
+    return point if point is not None and all(other is not None and point.is_at(other) for other in points) else None
 
 
 def _rod(leg: Leg, units: Units, weights: Sequence[Vector]) -> tuple[Array, Array] | None:

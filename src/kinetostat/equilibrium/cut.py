@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import ElasticLeg, masses_of_one_body
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
@@ -22,6 +22,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.motions import of_scalars
 
 TENSIONS = ("load.min_tension", "load.max_tension")
 """Leaf paths of what makes preloads a choice."""
@@ -72,7 +73,7 @@ class Cut:
 
 def cut(mechanism: Mechanism) -> Cut | None:
     """Cut the loops of a mechanism; None if its form does not allow it."""
-    chains = [leg for leg in mechanism.legs if leg.rod is None]
+    chains = [_without_spin(leg) for leg in mechanism.legs if leg.rod is None]
     legs = chains if len(chains) > 1 else []
     carrier = chains[0] if len(chains) == 1 else _free_motions(mechanism)
     if any(leg.sign.any() or leg.idle.any() for leg in chains) or any(leg.hinged.any() for leg in mechanism.legs):
@@ -110,6 +111,57 @@ def cut(mechanism: Mechanism) -> Cut | None:
     ):
         return None
     return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods), tuple(legs))
+
+
+def _without_spin(leg: ElasticLeg) -> ElasticLeg:
+    """The leg with a universal joint in place of a ball joint that lets a link spin, which moves nothing else.
+
+    Its axes are across the link, so that the link can be turned any way from where it is.
+    """
+    if leg.spin is None or np.count_nonzero(leg.idle.any(axis=(0, 1))) > 1:
+        return leg
+    first, span = leg.spin
+    left_out, chain = first + 2, leg.chain
+    turns = [chain.coordinate.index(number) for number in range(first, first + 3)]
+    motions = [k for k in range(len(chain.coordinate)) if k != turns[2]]
+    kept = [number for number in range(leg.size) if number != left_out]
+    twists = np.array(np.broadcast_to(chain.twists, (len(span), *chain.twists.shape[1:])))
+    balls = [twists[:, turn].copy() for turn in turns]
+    for turn, axis in zip(turns, _across(span), strict=False):
+        twists[:, turn] = total([axis[:, i, None] * ball for i, ball in enumerate(balls)])
+    carried = tuple(number - (number > turns[2]) for number in leg.masses.carried)
+    return replace(
+        leg,
+        chain=Chain(
+            twists[:, motions],
+            tuple(chain.coordinate[k] - (chain.coordinate[k] > left_out) for k in motions),
+            tuple(chain.given[k] for k in motions),
+            leg.size - 1,
+        ),
+        springs=tuple(leg.springs[number] for number in kept),
+        sign=leg.sign[kept],
+        idle=np.zeros((len(leg.idle), len(kept), len(kept))),
+        masses=replace(leg.masses, carried=carried),
+        ends=tuple(number - (number > turns[2]) for number in leg.ends),
+        spin=None,
+        **{name: getattr(leg, name)[:, kept] for name in ("stiffness", "preload", "rotors", "dampers")},
+    )
+
+
+def _across(span: Array) -> tuple[Array, Array]:
+    """Two unit vectors across a way and each other [n x 3], without a case in which they are not known.
+
+    Source: Duff et al. 2017, "Building an orthonormal basis, revisited", J. Computer Graphics Techniques 6(1).
+    """
+    count = None if span.dtype == object else len(span)
+    columns = span[0].tolist() if count is None else [*span.T]
+    size = sqrt(total([part * part for part in columns]))
+    x, y, z = (part * (1.0 / size) for part in columns)
+    sign = where(z < 0.0, -1.0, 1.0)
+    share = -(1.0 / (sign + z))
+    mixed = x * y * share
+    first = 1.0 + sign * (x * x * share), sign * mixed, -(sign * x)
+    return of_scalars(first, count), of_scalars((mixed, sign + y * y * share, -y), count)
 
 
 def _is_loose(leg: ElasticLeg, mechanism: Mechanism) -> bool:
