@@ -11,17 +11,16 @@ from browser import browser, needs_chromium
 
 from kinetostat import analyze, export, load
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.attribution import by_part
 from kinetostat.views.live_page import viewer
 from kinetostat.views.scene.anatomy import anatomy
+from printed_machines import MACHINES, machine_of, poses_of, worst_difference
 
 POSES = 1000
 AGREED = 1e-12
@@ -42,16 +41,11 @@ PLACES = """() => {
 }"""
 
 
-def printable():
-    machines = {name: load(name) for name in bundled()}
-    return [name for name, machine in machines.items() if machine.family.chains is None or closes_inside(machine)]
-
-
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
-    """The pages of bundled machines, written once: paths by name."""
+    """The pages of bundled machines, and of some with rigid and free springs, written once: paths by what they show."""
     folder = tmp_path_factory.mktemp("pages")
-    return {name: export(load(name), folder / f"{name}.html")[0] for name in printable()}
+    return {label: export(machine_of(label), folder / f"{label.replace(',', '')}.html")[0] for label in MACHINES}
 
 
 def test_a_page_is_small_and_asks_for_nothing(pages):
@@ -257,12 +251,12 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path, new
 @needs_chromium
 def test_machines_whose_legs_close_loops_rest_in_a_page(tmp_path, new_tab):
     names = [f"displacement_{component}" for component in ("rx", "ry", "rz", "x", "y", "z")]
-    for name in ("delta", "tripteron"):
+    for name in ("delta", "tripteron", "hexapod-rus"):
         machine = load(name, ["load.force=[5, -3, -40]"])
         page = export(machine, tmp_path / f"{name}.html")[0]
         assert page.stat().st_size < LARGEST_PAGE
         home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
-        rows = np.array([*home.values()]) + np.random.default_rng(4).uniform(-0.03, 0.03, (20, 3))
+        rows = np.array([*home.values()]) + np.random.default_rng(4).uniform(-0.03, 0.03, (20, len(home)))
         table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
         expected = np.stack([evaluate(machine, table, names).values[each] for each in names], axis=1)
         watched = new_tab()
@@ -289,20 +283,17 @@ def test_formulas_of_every_machine_are_those_of_the_engine(pages, new_tab):
         watched.tab.goto(path.as_uri())
         watched.tab.wait_for_function("document.documentElement.dataset.check")
         assert watched.tab.evaluate("document.documentElement.dataset.check") == "ok", name
-        machine = load(name)
-        home = {key: float(value) for key, value in values(machine).items() if key.startswith("pose.")}
-        length = float(machine.chains().length if machine.family.chains else machine.configure().length)
-        drawn = 0.3 * np.random.default_rng(1).uniform(-1.0, 1.0, (POSES, len(home)))
-        rows = np.array([*home.values()]) + drawn * [length if key[-1] in "xyz" else 1.0 for key in home]
+        machine = machine_of(name)
+        rows, points = poses_of(machine, POSES, 0.3, seed=1)
         found = watched.tab.evaluate(PROGRAMS, rows.tolist())
         codes = np.array([int(row[0]) for row in found])
         numbers = np.array([[float(number) for number in row[1:]] for row in found])
-        table = PointTable(dict(zip(home, np.ascontiguousarray(rows.T), strict=True)))
-        expected = evaluate(machine, table, ENTRIES, repeated=True)
+        expected = evaluate(machine, points, ENTRIES, repeated=True)
         assert np.array_equal(codes, expected.status), name
         ok = codes == Status.OK
         assert ok.sum() > 20, name
-        assert worst(numbers[ok], np.stack([expected.values[e] for e in ENTRIES], axis=1)[ok]) < AGREED, name
+        entries = np.stack([expected.values[e] for e in ENTRIES], axis=1)
+        assert worst_difference(numbers[ok], entries[ok]) < AGREED, name
         joins_what_the_scene_joins(machine, *watched.tab.evaluate(PLACES))
         assert not watched.complaints
         assert watched.hosts <= {""}
@@ -321,20 +312,6 @@ def joins_what_the_scene_joins(machine, drawing, points):
             for start, end in pairs:
                 assert points[end] - points[start] == pytest.approx(link.span.components(), abs=1e-9), link.name
                 assert length == pytest.approx(link.span.norm())
-
-
-def worst(found, expected):
-    """The largest difference of entries, as a share of the root of the diagonal entries in their row and column."""
-    result, pairs = 0.0, [(i, j) for i in range(6) for j in range(i, 6)]
-    for first in (0, 21):
-        diagonal = {i: np.abs(expected[:, first + pairs.index((i, i))]) for i in range(6)}
-        for k, (i, j) in enumerate(pairs, first):
-            finite = np.isfinite(expected[:, k])
-            assert np.array_equal(found[~finite, k], expected[~finite, k], equal_nan=True)
-            scale = np.sqrt(diagonal[i] * diagonal[j])[finite]
-            scale = np.where(np.isfinite(scale) & (scale > 0.0), scale, np.abs(expected[finite, k]).clip(1e-300))
-            result = max(result, float((np.abs(found[finite, k] - expected[finite, k]) / scale).max(initial=0.0)))
-    return result
 
 
 @needs_chromium
