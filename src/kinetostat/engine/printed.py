@@ -30,16 +30,14 @@ NOTATION: dict[str, str] = {
     "and": "{0} && {1}",
     "where": "{0} ? {1} : {2}",
     "steady": "{0}",
-    "abs": "{abs}({0})",
-    "sqrt": "{sqrt}({0})",
-    "atan2": "{atan2}({0}, {1})",
+    "abs": "fabs({0})",
+    "sqrt": "sqrt({0})",
+    "atan2": "atan2({0}, {1})",
 }
-"""Every operation of a graph, in the notation that C and JavaScript share but for the names of functions."""
+"""Every operation of a graph in the notation of C; packed programs count them in this order."""
 ATOM = re.compile(r"(\w+(\[\d+\])?|\d+(\.\d+)?(e[+-]?\d+)?)$")
 """A name, an element or a positive number."""
 CALL = re.compile(r"[\w.]+\(")
-CALLS = {"abs": "fabs", "sqrt": "sqrt", "atan2": "atan2"}
-"""Operations that are functions, whose operands need no brackets, and their names in C."""
 
 
 @dataclass(frozen=True)
@@ -122,10 +120,11 @@ def _accepted(results: Sequence[Operand]) -> tuple[Condition | None, list[Operan
 
 
 def _expression(node: Node, written: dict[int, str]) -> str:
+    form = NOTATION[node.operation]
     operands = [_operand(operand, written) for operand in node.operands]
-    if node.operation not in CALLS:
+    if not CALL.match(form):
         operands = [operand if _is_plain(operand) else f"({operand})" for operand in operands]
-    return NOTATION[node.operation].format(*operands, **CALLS)
+    return form.format(*operands)
 
 
 def _is_plain(text: str) -> bool:
