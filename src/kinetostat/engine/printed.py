@@ -74,7 +74,7 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
         ValueError: a result needs another input.
     """
     written = {given.number: name for given, name in zip(inputs, names, strict=True)}
-    condition, values = _accepted(results)
+    condition, values = _condition_of(results)
     decided = [code] if condition is None else [condition, code]
     before = needed_nodes(decided)
     used = [*before, *(node for node in needed_nodes([*values, *decided]) if node not in set(before))]
@@ -105,13 +105,14 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
     )
 
 
-def _accepted(results: Sequence[Operand]) -> tuple[Condition | None, list[Operand]]:
+def _condition_of(results: Sequence[Operand]) -> tuple[Condition | None, list[Operand]]:
     """The condition of which all results are NaN unless it holds, and their values where it does."""
-    values, conditions = [], set()
+    values: list[Operand] = []
+    conditions: set[Condition] = set()
     for result in results:
         if isinstance(result, Node) and result.operation == "where":
             condition, value, otherwise = result.operands
-            if isinstance(otherwise, float) and math.isnan(otherwise):
+            if isinstance(condition, Condition) and isinstance(otherwise, float) and math.isnan(otherwise):
                 conditions.add(condition)
                 values.append(value)
     if len(values) < len(results) or len(conditions) != 1:

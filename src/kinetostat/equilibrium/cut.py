@@ -15,7 +15,8 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import ElasticLeg, masses_of_one_body
+from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.masses import masses_of_one_body
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass

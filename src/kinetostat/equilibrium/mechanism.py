@@ -18,8 +18,9 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import ElasticLeg, GivenMotions, Masses, Units, Weight, elastic_leg
+from kinetostat.equilibrium.chains import ElasticLeg, GivenMotions, Units, elastic_leg
 from kinetostat.equilibrium.drives import with_drives
+from kinetostat.equilibrium.masses import Masses, Weight
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.leg import Spring, Turn

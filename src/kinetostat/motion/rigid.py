@@ -17,8 +17,9 @@ from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.solve import Row, right_inverse
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.chains import ElasticLeg, Masses
+from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.drives import rotor_turns
+from kinetostat.equilibrium.masses import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints

@@ -14,7 +14,8 @@ import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import ElasticLeg, Masses
+from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.masses import Masses
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.numerics.motions import Motions, cross, skew_of

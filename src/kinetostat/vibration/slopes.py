@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, total
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import Masses
+from kinetostat.equilibrium.masses import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.equilibrium.state import MachineState

@@ -177,9 +177,9 @@ function openMachine({ data, programs, result }) {
     const rows = parts.map((name, n) => [name, shares[6 * n + k] / whole]).filter(([, share]) => share > 5e-4).sort((a, b) => Math.round(1e9 * (b[1] - a[1])));
     const other = rows.slice(MOST_PARTS).reduce((sum, [, share]) => sum + share, 0);
     const shownRows = [...rows.slice(0, MOST_PARTS), ...(other ? [["others", other]] : [])];
-    const most = Math.max(...shownRows.map(([, share]) => share));
-    $("parts-table").innerHTML = shownRows.map(([name, share]) =>
-      `<tr><td>${escaped(name)}</td><td class="bar"><i style="width:${((100 * share) / most).toFixed(1)}%"></i></td><td class="n">${(100 * share).toFixed(1)} %</td></tr>`).join("");
+    const most = rows.length ? rows[0][1] : 0; // the others together may be more, and have no bar
+    $("parts-table").innerHTML = shownRows.map(([name, share], n) =>
+      `<tr><td>${escaped(name)}</td><td class="bar">${n < MOST_PARTS ? `<i style="width:${((100 * share) / most).toFixed(1)}%"></i>` : ""}</td><td class="n">${(100 * share).toFixed(1)} %</td></tr>`).join("");
     $("parts-none").hidden = shownRows.length > 0;
   }
   function buildParts() {
