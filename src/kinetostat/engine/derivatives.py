@@ -15,14 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.batch import (
-    FUNCTIONS_KEPT,
-    Function,
-    PopulationResults,
-    Progress,
-    by_free_springs,
-    silent,
-)
+from kinetostat.engine.batch import FUNCTIONS_KEPT, Function, PopulationResults, Progress, by_free_springs, silent
 from kinetostat.engine.form import Specimen, Weights, equations_of, form_of, objectives_of, plan_for
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,

@@ -17,15 +17,7 @@ from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import largest, with_rows
-from kinetostat.numerics.motions import (
-    Motions,
-    brackets_by,
-    cross,
-    exponential,
-    logarithm,
-    skew_of,
-    still,
-)
+from kinetostat.numerics.motions import Motions, brackets_by, cross, exponential, logarithm, skew_of, still
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
-from kinetostat.algebra.solve import (
-    Eliminated,
-    Row,
-    conjugate,
-    definite,
-    elimination,
-    right_inverse,
-    semidefinite_root,
-)
+from kinetostat.algebra.solve import Eliminated, Row, conjugate, definite, elimination, right_inverse, semidefinite_root
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import leg_terms, platform_load
 from kinetostat.equilibrium.chains import ElasticLeg

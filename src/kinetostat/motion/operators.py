@@ -16,15 +16,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE, values
-from kinetostat.motion.forces import (
-    DriveStatics,
-    ForceDemand,
-    demands,
-    drive_forces,
-    drive_statics,
-    inertia,
-    weight,
-)
+from kinetostat.motion.forces import DriveStatics, ForceDemand, demands, drive_forces, drive_statics, inertia, weight
 from kinetostat.motion.rates import (
     STILL,
     Coordinates,

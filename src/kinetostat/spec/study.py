@@ -12,13 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSche
 
 from kinetostat.spec.document import Document, override, toml_pairs
 from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
-from kinetostat.spec.requirements import (
-    TABLE,
-    Requirements,
-    read_requirements,
-    requirement_lines,
-    requirements_schema,
-)
+from kinetostat.spec.requirements import TABLE, Requirements, read_requirements, requirement_lines, requirements_schema
 
 MOST_POPULATION = 100_000
 MOST_GENERATIONS = 100_000

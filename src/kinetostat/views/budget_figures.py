@@ -10,12 +10,7 @@ from kinetostat.machine.machine import setting_of
 from kinetostat.studies.budget.budget import Budget
 from kinetostat.views.budget import ranked_by
 from kinetostat.views.budget_data import budget_dataset
-from kinetostat.views.figures import (
-    COLOURS,
-    contour_maps,
-    curves,
-    new_figure,
-)
+from kinetostat.views.figures import COLOURS, contour_maps, curves, new_figure
 from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 

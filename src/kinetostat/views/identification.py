@@ -21,12 +21,7 @@ from kinetostat.studies.identification.firmware import (
     reprap_text,
 )
 from kinetostat.studies.identification.fit import Tell
-from kinetostat.studies.identification.identification import (
-    USUALLY_FITTED,
-    Identification,
-    identify,
-    with_home,
-)
+from kinetostat.studies.identification.identification import USUALLY_FITTED, Identification, identify, with_home
 from kinetostat.studies.identification.next_poses import NextPoses, as_csv, unit_of
 from kinetostat.studies.identification.record import FitRecord, record_of
 from kinetostat.units import KINDS

@@ -114,18 +114,10 @@ def picture(
     transparent: bool = False,
     hidden: Collection[str] = HIDDEN_BY_DEFAULT,
 ) -> Picture:
-    """Draw a scene as a PNG.
-
-    Args:
-        scene: solids and labels to draw.
-        size: width and height, pixels.
-        view: "iso", "front", "side" or "top", or the direction from the scene to the camera, base axes.
-        theme: for white or for dark pages.
-        transparent: whether the background consists of shadow and grid alone.
-        hidden: layers of the scene to leave out.
+    """Draw a scene as a PNG, with the arguments of `machine_picture`.
 
     Raises:
-        InputError: an unknown view, theme or layer, a size out of range, or nothing left to draw.
+        InputError: as there, or nothing is left to draw.
     """
     _check_size(size)
     paper = PAPERS[choice(theme, PAPERS, "theme")]

@@ -19,13 +19,7 @@ from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, positive
 from kinetostat.studies.identification.fit import Fit, Tell, Wishes, best_fit
 from kinetostat.studies.identification.measurements import EULER, ROTATION, Measurements, Sigmas, read_measurements
-from kinetostat.studies.identification.next_poses import (
-    MOST_PROPOSED,
-    NextPoses,
-    first_poses,
-    next_poses,
-    unit_of,
-)
+from kinetostat.studies.identification.next_poses import MOST_PROPOSED, NextPoses, first_poses, next_poses, unit_of
 from kinetostat.studies.identification.observation import (
     FRAME_UNKNOWNS,
     TARGET_UNKNOWNS,

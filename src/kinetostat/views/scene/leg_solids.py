@@ -1,6 +1,6 @@
 """Legs as solids: joints by their kind, links by their cross-section, rails and springs.
 
-Where the parts are is decided in `anatomy`; how thick they are in `proportions`.
+Where the parts are, and how thick they are, is decided in `anatomy`.
 """
 
 import math
