@@ -176,6 +176,35 @@ def test_own_numbers_follow_a_machine_into_its_file_and_along_a_motion(tmp_path)
     assert speeds == pytest.approx([2.0 * np.pi / (0.005 if leg == 3 else LEAD) for leg in range(1, 7)])
 
 
+GANTRY = """
+schema = 1
+name   = "Gantry"
+family = "legs"
+platform.point = [0, 0, 0.2]
+pose  = { x = 0, z = 0.2 }
+tool  = { mass = "5 kg" }
+drives = { lead = "10 mm", rotor_inertia = "3e-5 kg*m**2" }
+servo = { position_gain = 60, velocity_gain = 0.1, integral_time = 0.02, "a column" = { position_gain = 30 } }
+[[legs]]
+name = "a"
+joints = [
+  { name = "rail", type = "prismatic", joins = ["base", "carriage"], point = [0, 0, 0], axis = [1, 0, 0], actuated = true, stiffness = "30 N/um" },
+  { name = "column", type = "prismatic", joins = ["carriage", "platform"], point = [0, 0, 0.1], axis = [0, 0, 1], actuated = true, stiffness = "20 N/um" },
+]
+"""  # noqa: E501
+
+
+@pytest.mark.filterwarnings("error")
+def test_two_drives_of_a_leg_have_tables_by_their_names_and_what_cannot_move_is_rigid(tmp_path):
+    answer = servo(build(GANTRY))
+    assert [loop.position_gain for loop in answer.loops.loops] == [60.0, 30.0]
+    least = dict(zip(answer.components, (stiffness for stiffness, _ in answer.least), strict=True))
+    assert [name for name, stiffness in least.items() if np.isinf(stiffness)] == ["rx", "ry", "rz", "y"]
+    save(answer, tmp_path / "servo.json")
+    assert json.loads((tmp_path / "servo.json").read_text())["drives"][1]["position_gain"] == 30.0
+    assert servo_figures(answer)["servo"]().axes
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [

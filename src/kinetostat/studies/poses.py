@@ -139,7 +139,10 @@ def _field(machine: Machine, name: object) -> Parameter:
     try:
         return find(machine.family, name)
     except InputError as error:
-        raise InputError(f"in the columns of the poses, {error}") from None
+        raise InputError(
+            f"in the columns of the poses, {error} An orientation may also stand in columns such as quaternion.w, "
+            "rotation.1.1 and tilt.angle, see docs/poses.md."
+        ) from None
 
 
 def column_values(column: GivenColumn, quantity: Quantity, where: Where) -> Array:

@@ -189,7 +189,11 @@ def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoo
     given = answer.frequencies
     slowest = slowest_decay(poles, (0.0, float(given[-1])))
     sizes = np.abs(closed.receptance(given))[:, parts, parts]
-    least = tuple((float(1.0 / row.max()), float(given[row.argmax()])) for row in sizes.T)
+    unmoved = [UNFELT * float(still[i, i]) for i in parts]
+    least = tuple(
+        (math.inf if row.max() <= small else float(1.0 / row.max()), float(given[row.argmax()]))
+        for row, small in zip(sizes.T, unmoved, strict=True)
+    )
     return replace(answer, least=least, slowest=slowest, message=_message(answer, slowest))
 
 

@@ -23,6 +23,15 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 RIGID = "rigid"
 
 
+SAME_SHARE = 1e-9
+"""Share by which two stiffnesses may differ by round-off."""
+
+
+def _share_at_rest(drive: dict[str, Any]) -> float:
+    """Stiffness of a drive at 0 Hz over that of its transmission."""
+    return float(drive["static"] / drive["transmission"])
+
+
 def _unit(component: str) -> str:
     return "N·m/rad" if len(component) == 2 else "N/m"
 
@@ -31,12 +40,16 @@ def _lines(answer: Servo) -> Lines:
     if answer.loops is None:
         return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
     lines = [("Pose", f"{pose_of(answer.machine)}."), ("Servo", answer.message)]
-    softest = min(_drives(answer), key=lambda drive: drive["static"] / drive["transmission"])
+    softest = min(_drives(answer), key=_share_at_rest)
     resists, transmission = (_stiffness(answer, softest[key], softest["unit"]) for key in ("static", "transmission"))
     limit = "is rigid" if math.isinf(softest["static"]) else f"holds {resists}"
-    alike = len(set(answer.loops.loops)) == 1
-    which = "Each drive" if alike else f"{softest['name']} loses most by its loop: it"
-    lines.append(("Drive", f"{which} {limit} at 0 Hz; its transmission has {transmission}."))
+    if len(set(answer.loops.loops)) == 1:
+        lines.append(("Drive", f"Each drive {limit} at 0 Hz; its transmission has {transmission}."))
+    elif _share_at_rest(softest) > 1.0 - SAME_SHARE:
+        lines.append(("Drives", "At 0 Hz each drive holds what its transmission does, or more."))
+    else:
+        text = f"{softest['name']} loses most by its loop: it {limit} at 0 Hz; its transmission has {transmission}."
+        lines.append(("Drives", text))
     if answer.assumed:
         lines.append(("Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."))
     return lines
@@ -51,7 +64,7 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
     rows = zip(answer.components, answer.standing, answer.static, answer.least, strict=True)
     for name, standing, static, (least, frequency) in rows:
         shown = [RIGID if math.isinf(value) else show(value, _unit(name)) for value in (standing, static, least)]
-        table.add_row(name, *shown, number(frequency, digits=3))
+        table.add_row(name, *shown, DASH if math.isinf(least) else number(frequency, digits=3))
     yield table
     yield _table_of_drives(answer)
 
@@ -100,8 +113,8 @@ def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
             "component": name,
             "motors_still": None if math.isinf(standing) else standing,
             "static": None if math.isinf(static) else static,
-            "least": least,
-            "least_at": frequency,
+            "least": None if math.isinf(least) else least,
+            "least_at": None if math.isinf(least) else frequency,
         }
         for name, standing, static, (least, frequency) in rows
     ]
@@ -135,7 +148,8 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     given = answer.frequencies
     scale = answer.machine.display.scale("N/m")
     ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
-    ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
+    free = [name for name, each in zip(answer.components, answer.standing, strict=True) if not math.isinf(each)]
+    ways = {name: way for name, way in ways.items() if name not in AXES or name in free}
     closed = answer.receptance(given.tolist())
     still = receptance(answer.loops.modes, answer.loops.damping, given)
     with new_figure(
@@ -160,7 +174,7 @@ STIFFNESS = tuple(
         ("component", "of rx ry rz x y z"),
         ("motors_still", "free stiffness with motors that stand still, N/m or N·m/rad"),
         ("static", "free stiffness at 0 Hz with loops closed, N/m or N·m/rad; none where rigid"),
-        ("least", "least dynamic stiffness, N/m or N·m/rad"),
+        ("least", "least dynamic stiffness, N/m or N·m/rad; none where rigid"),
         ("least_at", "frequency of the least, Hz"),
     )
 )
