@@ -14,6 +14,7 @@ from kinetostat.commands.common import (
     Help,
     Parser,
     direction,
+    drawings_of,
     give,
     load_machine,
     search_bar,
@@ -218,7 +219,7 @@ def _write_named_files(options: argparse.Namespace, description: "Description", 
     paths: list[Path] = options.output
     for path in paths:
         picture = path.suffix.lower() in FIGURE_SUFFIXES
-        save(next(iter(description.drawings(answer).values()))() if picture else answer, path)
+        save(next(iter(drawings_of(description, answer).values()))() if picture else answer, path)
     return paths
 
 
@@ -228,6 +229,7 @@ def write_folder(options: argparse.Namespace, description: "Description", answer
 
     written = write_files(description, answer, options.output)
     drawings = {
-        draw.file or f"{description.figure_prefix}{name}": draw for name, draw in description.drawings(answer).items()
+        draw.file or f"{description.figure_prefix}{name}": draw
+        for name, draw in drawings_of(description, answer).items()
     }
     return written + write_figures(options, drawings)

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from kinetostat.late import leave_out_property_lists
 from kinetostat.spec.installation import as_typed
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
+    from kinetostat.views.question import Description, Drawing
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
@@ -160,6 +162,13 @@ def _formats(text: str) -> tuple[str, ...]:
     if not set(formats) <= {"png", "svg", "pdf"}:
         raise argparse.ArgumentTypeError(f"{text} is not a list of formats; give some of png,svg,pdf")
     return formats
+
+
+def drawings_of(description: "Description", answer: object) -> "dict[str, Drawing]":
+    """Return the figures of an answer, in a process that writes them and ends."""
+    if description.figures:
+        leave_out_property_lists()
+    return description.drawings(answer)
 
 
 def write_figures(options: argparse.Namespace, drawings: "Mapping[str, Callable[[], Figure]]") -> list[Path]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     add_command,
+    drawings_of,
     give,
     judge_requirements,
     note_damage,
@@ -108,7 +109,7 @@ def _show(options: argparse.Namespace, result: "Result", keys: "Sequence[str]" =
         repaired = "nothing but its history" if log.cleaned else ""
         repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
         note_damage(options.output, repaired, log.unchecked, options.changed)
-        written = write_result(result, options.output) + write_figures(options, RESULT.drawings(result))
+        written = write_result(result, options.output) + write_figures(options, drawings_of(RESULT, result))
 
     def as_data() -> object:
         data = json_of(RESULT, result)

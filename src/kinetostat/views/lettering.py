@@ -5,14 +5,16 @@ from files do not become it.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, fontManager, get_font
 from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
-from matplotlib.ticker import FixedLocator
+from matplotlib.ticker import FixedLocator, LogFormatter, ScalarFormatter
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 
@@ -30,6 +32,9 @@ TICK_LABEL_SIZE = 7.5
 """Size of the labels beside an axis, points."""
 NUMBER_COMMAND = r"\mathdefault"
 """The command that Matplotlib writes around numbers on an axis, such as powers of ten."""
+
+NUMBERS = (ScalarFormatter, LogFormatter)
+"""Formatters that write nothing but numbers along an axis."""
 
 
 @cache
@@ -68,6 +73,15 @@ def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
     return float(max(widths, default=0.0)) / POINTS_PER_INCH
 
 
+def _texts(artist: Artist) -> Iterator[Text]:
+    """The texts within an artist, except for numbers along axes, which every font has."""
+    if isinstance(artist, Text):
+        yield artist
+    numbered = isinstance(artist, Axis) and isinstance(artist.get_major_formatter(), NUMBERS)
+    for part in (artist.label, artist.offsetText) if numbered else artist.get_children():
+        yield from _texts(part)
+
+
 def letter(figure: Figure) -> None:
     """Make all texts of a figure drawable: symbols of quantities are mathematics, names with dollar signs are not."""
     for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
@@ -75,8 +89,9 @@ def letter(figure: Figure) -> None:
             names = axis.get_major_formatter().format_ticks([*axis.get_majorticklocs()])  # also of ticks out of view
             if any(drawable(name) != name for name in names):
                 axis.set_ticklabels([drawable(name) for name in names])
+        if not isinstance(axis.get_major_formatter(), NUMBERS):
             axis.get_ticklabels()  # now they have texts, not only when drawn
-    for text in figure.findobj(Text):
+    for text in _texts(figure):
         written = text.get_text()
         if not is_mathematics(written):
             text.set_parse_math(False)

@@ -6,10 +6,9 @@ Nothing is computed here but rounding.
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -17,6 +16,7 @@ from rich.text import Text
 from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display, number
 from kinetostat.kinetostatics.quantities import plain_name
+from kinetostat.late import LateModule
 from kinetostat.machine.saving import as_file
 from kinetostat.studies.optimisation.assessment import DesignVerdict, Outcome, Robustness
 from kinetostat.studies.optimisation.log import ROWS
@@ -28,6 +28,11 @@ from kinetostat.studies.study_folder import HISTORY, QUESTION
 from kinetostat.views.answers import write_files
 from kinetostat.views.question import LOADS_LEFT_OUT, MESSAGE, Description, Field, Lines
 from kinetostat.views.tables import numeric_table
+
+if TYPE_CHECKING:
+    import xarray as xr
+else:
+    xr = LateModule("xarray")
 
 
 def print_study(console: Console, problem: Problem) -> None:
@@ -335,7 +340,7 @@ def _front(result: Result) -> list[dict[str, Any]] | None:
     ]
 
 
-def designs_dataset(result: Result) -> xr.Dataset:
+def designs_dataset(result: Result) -> "xr.Dataset":
     """Every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
     problem, log = result.problem, result.log
     outcome = log.outcome()

@@ -5,12 +5,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from kinetostat.display import ENGINEERING
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
@@ -21,7 +22,6 @@ from kinetostat.studies.optimisation.log import ROWS, Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
 from kinetostat.studies.optimisation.steps import Genetic, Gradient
-from kinetostat.studies.result_file import ROW_NUMBER, RowFile
 from kinetostat.studies.study_folder import (
     DATA,
     Record,
@@ -31,6 +31,11 @@ from kinetostat.studies.study_folder import (
     read_question,
     study_folder,
 )
+
+if TYPE_CHECKING:
+    from kinetostat.studies import result_file
+else:
+    result_file = LateModule("kinetostat.studies.result_file")
 
 STUDY_VERSION = 1
 
@@ -157,7 +162,7 @@ def search_into(
         _take_up(assess.problem, study, log)
         known = study.records()
         last = max(known, default=-1) + study.damaged
-        with RowFile(folder / ROWS, log.width) as file:
+        with result_file.RowFile(folder / ROWS, log.width) as file:
             while len(log.steps) < method.steps:
                 number, start = len(log.steps), log.count
                 record = known.get(number, {})
@@ -240,8 +245,9 @@ def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
         record: what was noted about the step.
     """
     log = Log(problem)
-    known = (folder / ROWS).stat().st_size // (log.width * ROW_NUMBER.itemsize)
-    rows = np.memmap(folder / ROWS, ROW_NUMBER, "r", shape=(known, log.width))[record["kept"]].astype(float)
+    number = result_file.ROW_NUMBER
+    known = (folder / ROWS).stat().st_size // (log.width * number.itemsize)
+    rows = np.memmap(folder / ROWS, number, "r", shape=(known, log.width))[record["kept"]].astype(float)
     log.add(rows, {**record, "kept": list(range(len(rows)))})
     return log
 

@@ -137,9 +137,14 @@ class Surveyor:
 
     def __call__(self, genes: Array) -> Local:
         """Evaluate one design, given by its genes [variables], with derivatives, at every machine made of it."""
-        problem = self.problem
+        return self.at(genes[None])[0]
+
+    def at(self, designs: Array) -> list[Local]:
+        """Evaluate designs as `__call__` does one, all of them together; given by genes [designs x variables]."""
+        problem, count = self.problem, len(designs)
         machines = len(next(iter(self._made.values()), (0.0,)))
-        columns = problem.space.columns(np.repeat(genes[None], machines, axis=0), self._made)
+        made = {path: np.tile(deviations, count) for path, deviations in self._made.items()}
+        columns = problem.space.columns(np.repeat(designs, machines, axis=0), made)
         population = Population(columns, problem.poses.columns)
         self._evaluations += -(-population.size // SMALL_SLAB)
         repeated = self._evaluations > COMPILE_FROM
@@ -149,7 +154,16 @@ class Surveyor:
             for name, by_leaf in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
                 parts = [sum(rate * by_leaf[self._by[leaf]] for leaf, rate in rates.items()) for rates in self._rates]
                 slopes[name] = np.array(parts)
-        return Local(problem, answers.values, answers.status == Status.OK, slopes)
+        reached = answers.status == Status.OK
+        return [
+            Local(
+                problem,
+                {name: values[rows] for name, values in answers.values.items()},
+                reached[rows],
+                {name: slope[:, rows] for name, slope in slopes.items()},
+            )
+            for rows in (slice(k * machines, (k + 1) * machines) for k in range(count))
+        ]
 
 
 @dataclass(frozen=True)
@@ -199,11 +213,10 @@ def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[
         return [], "No ridges are sought, because every variable is a choice or is at a bound."
     ground = _Ground(problem, survey, genes, free)
     at = genes[survey.free][free]
-    slope = ground.slope(at)
-    if np.abs(slope).max() > MOST_STATIONARY_SLOPE:
+    if np.abs(ground.rates(at)[0]).max() > MOST_STATIONARY_SLOPE:
         return [], "No ridges are sought, because the search has not converged; refine it with method = hybrid."
     at = ground.settle_across(at)
-    values, vectors = np.linalg.eigh(ground.curvature(at))
+    values, vectors = np.linalg.eigh(ground.rates(at)[1])
     flat = vectors[:, np.abs(values) < FLAT_CURVATURE]
     return [ridge for way in _aligned_basis(flat).T if (ridge := ground.ridge(at, way)) is not None], ""
 
@@ -231,41 +244,37 @@ class _Ground:
     genes: Array
     free: Array
 
-    def _local(self, at: Array) -> tuple[float, Array]:
-        whole = self.genes.copy()
-        whole[self.survey.free[self.free]] = at
-        here = self.survey(whole)
-        if not here.sound:
-            return np.nan, np.full(len(at), np.nan)
-        value, slope = here.term(self.problem.objectives[0].term, True)
-        return value, slope[self.free]
+    def _around(self, points: Array) -> tuple[Array, Array]:
+        """The objective, SI [points], and its derivatives by the genes, relative to it [points x free]."""
+        designs = np.tile(self.genes, (len(points), 1))
+        designs[:, self.survey.free[self.free]] = points
+        values, slopes = np.full(len(points), np.nan), np.full(points.shape, np.nan)
+        for k, here in enumerate(self.survey.at(designs)):
+            if here.sound:
+                values[k], slope = here.term(self.problem.objectives[0].term, True)
+                slopes[k] = slope[self.free] / (abs(values[k]) or 1.0)
+        return values, slopes
 
     def value(self, at: Array) -> float:
         """The objective, SI."""
-        return self._local(at)[0]
+        return float(self._around(at[None])[0][0])
 
-    def slope(self, at: Array) -> Array:
-        """Derivatives by the genes, relative to the objective."""
-        value, slope = self._local(at)
-        return slope / (abs(value) or 1.0)
-
-    def curvature(self, at: Array) -> Array:
-        """Second derivatives by the genes, relative to the objective."""
-        rows = []
-        for k in range(len(at)):
-            step = np.zeros(len(at))
-            step[k] = DIFFERENCE_STEP
-            rows.append((self.slope(at + step) - self.slope(at - step)) / (2.0 * DIFFERENCE_STEP))
-        matrix = np.array(rows)
-        return np.nan_to_num(0.5 * (matrix + matrix.T))
+    def rates(self, at: Array) -> tuple[Array, Array]:
+        """First and second derivatives by the genes, relative to the objective."""
+        steps = DIFFERENCE_STEP * np.eye(len(at))
+        slopes = self._around(np.concatenate([at[None], at + steps, at - steps]))[1]
+        ahead, behind = np.split(slopes[1:], 2)
+        matrix = (ahead - behind) / (2.0 * DIFFERENCE_STEP)
+        return slopes[0], np.nan_to_num(0.5 * (matrix + matrix.T))
 
     def settle_across(self, at: Array) -> Array:
         """Return to the best point across the ridge, by Newton's method in the directions that are not flat."""
         for _ in range(3):
-            values, vectors = np.linalg.eigh(self.curvature(at))
+            slope, curvature = self.rates(at)
+            values, vectors = np.linalg.eigh(curvature)
             steep = np.abs(values) >= FLAT_CURVATURE
             along = vectors[:, steep]
-            at = at - along @ ((along.T @ np.nan_to_num(self.slope(at))) / values[steep])
+            at = at - along @ ((along.T @ np.nan_to_num(slope)) / values[steep])
         return np.clip(at, 0.0, 1.0)
 
     def ridge(self, at: Array, way: Array) -> Ridge | None:

@@ -8,21 +8,27 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import prod
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.study import PosesTable, VariableTable
-from kinetostat.studies.grid import GridQuestion, grid_question
-from kinetostat.studies.workspace import unit_product, workspace
 from kinetostat.units import KINDS, RIGID, UnitError, parse
+
+if TYPE_CHECKING:
+    from kinetostat.studies import grid, workspace
+else:  # they label their answers, by a library that takes long to import; most studies have no grid of poses
+    grid = LateModule("kinetostat.studies.grid")
+    workspace = LateModule("kinetostat.studies.workspace")
 
 VALUE_DIGITS = 6
 """Digits of the value of a variable."""
@@ -320,14 +326,14 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
-    question = grid_question(machine, table.over or [], ["singularity_margin"])
+    question = grid.grid_question(machine, table.over or [], ["singularity_margin"])
     if question.grid.size > MOST_NODES:
         raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_NODES:,} are allowed.")
     columns = question.grid.columns(0, question.grid.size)
     size = "x".join(str(count) for count in question.grid.shape)
     if table.within is None:
         return PoseSet(columns, table.required, _box(question), f"a grid of {size} poses")
-    inside = workspace(machine, table.over or [], table.where).dataset["verdict"].values.ravel() == 0
+    inside = workspace.workspace(machine, table.over or [], table.where).dataset["verdict"].values.ravel() == 0
     if not inside.any():
         raise InputError("[poses]: no node of the grid lies in the workspace of the machine; widen over or where.")
     kept = {path: column[inside] for path, column in columns.items()}
@@ -335,8 +341,8 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     return PoseSet(kept, table.required, None, description)
 
 
-def _box(question: GridQuestion) -> tuple[float, str] | None:
+def _box(question: "grid.GridQuestion") -> tuple[float, str] | None:
     if not all(field.startswith("pose.") for field in question.fields):
         return None
     spans = [abs(float(axis.values[-1] - axis.values[0])) for axis in question.grid.axes]
-    return prod(spans), unit_product([str(question.labels[dim].attrs["units"]) for dim in question.dims])
+    return prod(spans), workspace.unit_product([str(question.labels[dim].attrs["units"]) for dim in question.dims])
