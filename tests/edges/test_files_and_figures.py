@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.text import Text
+from PIL import Image
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, build, load
@@ -18,7 +19,7 @@ from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.figures import _Surroundings, contour_maps, curves, save_figure
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.levels import levels_of
 from refusals import refused
@@ -129,6 +130,7 @@ def test_no_text_of_a_figure_is_clipped(section):
         *(draw() for draw in guideline_figures(guidelines(load("planar-3rpr"))).values()),
     ]
     for figure in figures:
+        figure.draw_without_rendering()  # which puts labels beside the numbers of their axes
         frame = figure.bbox.padded(0.5)
         for text in figure.findobj(Text):
             box = text.get_window_extent()
@@ -158,12 +160,45 @@ def test_every_axis_of_a_map_has_its_unit(section):
     figure = contour_maps(section, ["compliance_rx", "compliance_z", "singularity_margin"], "title")
     panels = [axes for axes in figure.axes if axes.get_xlabel()]
     assert [axes.get_xlabel() for axes in panels] == ["x (mm)"] * 3
-    assert [axes.get_ylabel() for axes in panels] == ["z (mm)"] * 3
+    assert [axes.get_ylabel() for axes in panels] == ["z (mm)", "", ""]
     titles = [axes.get_title() for axes in panels]
     assert "rad/(N·m)" in titles[0]
     assert "m/N" in titles[1]
     texts = [text.get_text() for text in figure.texts] + [figure._supxlabel.get_text()]
     assert any("out of reach: 5 of 20 poses" in text for text in texts)
+
+
+def test_panels_of_a_map_share_their_labels(section):
+    """Numbers and a label stand below the lowest panel of a column and beside the first of a row, nowhere else."""
+    names = ["compliance_rx", "compliance_z", "singularity_margin", "compliance_x", "compliance_y"]
+    figure = contour_maps(section, names, "title")
+    figure.draw_without_rendering()
+    panels = [axes for axes in figure.axes if axes.get_title()]
+    assert [bool(axes.get_xlabel()) for axes in panels] == [False, False, True, True, True]
+    assert [bool(axes.get_ylabel()) for axes in panels] == [True, False, False, True, False]
+    for axes in panels:
+        for axis, label in ((axes.xaxis, axes.get_xlabel()), (axes.yaxis, axes.get_ylabel())):
+            assert any(tick.label1.get_visible() for tick in axis.get_major_ticks()) is bool(label)
+
+
+def test_a_panel_is_measured_as_matplotlib_would():
+    """The layout remembers what stands around a panel; it is the layout that measuring each time gives."""
+    answer = sensitivity(load("tricept"), ["compliance_x"])
+    remembered = [axes.get_position().bounds for axes in sensitivity_figure(answer).axes]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_Surroundings, "box", lambda self, *given, **options: self._measure(*given, **options))
+        measured = [axes.get_position().bounds for axes in sensitivity_figure(answer).axes]
+    np.testing.assert_allclose(remembered, measured, atol=1e-9)
+
+
+def test_a_picture_of_a_figure_has_its_pixels_and_its_size(section, tmp_path):
+    """The PNG is what Pillow reads as the canvas has drawn it, at 200 dots per inch."""
+    figure = contour_maps(section, ["compliance_z"], "title")
+    save_figure(figure, tmp_path / "map.png")
+    with Image.open(tmp_path / "map.png") as picture:
+        assert picture.mode == "RGB"
+        assert picture.info["dpi"] == pytest.approx((200.0, 200.0), abs=0.01)
+        np.testing.assert_array_equal(np.asarray(picture), np.asarray(figure.canvas.buffer_rgba())[..., :3])
 
 
 def test_stiffness_curves_are_log_log_with_one_panel_per_unit():
