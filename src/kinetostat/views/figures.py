@@ -240,7 +240,7 @@ def fix_layout(figure: Figure) -> None:
 
 
 class _Surroundings:
-    """What stands around a panel, measured again only where other numbers come along its axes.
+    """The labels and numbers around a panel, measured again only where other numbers come along its axes.
 
     The layout asks for it three times, of which all but the first find the same labels around another place. Legends
     and texts need not move with the edges of their panel: where there are some, all is measured each time.
