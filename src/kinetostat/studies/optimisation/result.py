@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from kinetostat.arrays import Array, Integers
-from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import PointTable
+from kinetostat.engine.batch import evaluate_designs
+from kinetostat.engine.points import Population
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -190,20 +190,18 @@ def _explain(assess: Assessor, result: Result) -> Result:
 
 
 def _directions(problem: Problem, machine: Machine) -> list[Direction]:
+    """The greatest compliances over the poses that are reached, of the machine as it was and of another design."""
     there = problem.machine.family.component_names
     names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in there]
-    before, after = (_worst(problem, design, names) for design in (problem.machine, machine))
-    return [Direction(name, QUANTITIES[name].unit, before[name], after[name]) for name in names]
-
-
-def _worst(problem: Problem, machine: Machine, names: list[str]) -> dict[str, float]:
-    """The greatest compliance over the poses that are reached; NaN where none is."""
-    numbers = values(machine)
-    anywhere = next(path for path in numbers if path.startswith("pose."))
-    columns = dict(problem.poses.columns) or {anywhere: np.array([float(numbers[anywhere])])}
-    answers = evaluate(machine, PointTable(columns), names)
+    numbers = [values(design) for design in (problem.machine, machine)]
+    columns = {path: np.array([design[path] for design in numbers], dtype=float) for path in problem.space.paths}
+    answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), names)
     reached = answers.status == Status.OK
-    return {name: float(answers.values[name][reached].max()) if reached.any() else float("nan") for name in names}
+    worst = {name: answers.values[name].max(axis=1, where=reached, initial=-np.inf) for name in names}
+    return [
+        Direction(name, QUANTITIES[name].unit, *np.where(reached.any(axis=1), worst[name], np.nan).tolist())
+        for name in names
+    ]
 
 
 def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[VariableInfluence]:

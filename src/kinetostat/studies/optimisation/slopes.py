@@ -91,9 +91,9 @@ class Local:
         return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
 
 
-COMPILE_FROM = 30
-"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled: that takes as long as 20 to
-50 of them by NumPy, for small machines and for large ones."""
+COMPILE_FROM = 60
+"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled: that takes as long as some 60
+of them by NumPy. The ridges of a study take some 50 where there is one."""
 
 
 class Surveyor:
