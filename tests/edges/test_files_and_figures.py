@@ -78,7 +78,8 @@ def test_commands_write_data_and_figures(command, tmp_path, capsys):
     ranges = ["--vary", "x=-1 cm:1 cm:5"]
     if command == "map":
         ranges = ["--over", "x=-1 cm:1 cm:5", "--over", "theta5=-70 deg:-50 deg:4"]
-    assert main([command, MACHINE, *ranges, "-o", str(tmp_path / "out"), "--formats", "png,svg,PDF"]) == 0
+    words = [*ranges, "--quantity", "compliance_x", "--formats", "png,svg,PDF"]
+    assert main([command, MACHINE, *words, "-o", str(tmp_path / "out")]) == 0
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert written == {"kinetostat.sha256", *(f"{command}.{suffix}" for suffix in ("nc", "pdf", "png", "svg"))}
     assert (tmp_path / "out" / f"{command}.png").read_bytes().startswith(b"\x89PNG")
