@@ -119,10 +119,29 @@ def test_what_is_whole_passes(kind, undisturbed, capsys):
 
 
 @pytest.mark.parametrize("kind", FILES)
-@pytest.mark.parametrize("place", [0.1, 0.5, 0.95])
-def test_a_damaged_question_is_one_sentence(kind, place, undisturbed, tmp_path, capsys):
+@pytest.mark.parametrize("name", ["study.json", "study-copy.json"])
+@pytest.mark.parametrize("damage", [flipped, cut, lambda path, _: path.unlink()], ids=["flipped", "cut", "removed"])
+def test_a_damaged_question_costs_nothing(kind, name, damage, undisturbed, tmp_path, capsys, monkeypatch):
+    """It is there twice: nothing is computed again, and both files are as they were."""
     folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
-    flipped(folder / "study.json", place)
+    damage(folder / name, 0.5)
+    assert main(["check", str(folder)]) == NO_ANSWER
+    assert name in capsys.readouterr().err
+    monkeypatch.setattr(chunks, "in_this_process", None)
+    monkeypatch.setattr("kinetostat.studies.optimisation.search._take", None)
+    assert again(kind, folder) == DONE
+    assert name in capsys.readouterr().err
+    for other in ("study.json", "study-copy.json"):
+        assert (folder / other).read_bytes() == (undisturbed / kind / "study.json").read_bytes()
+    assert main(["check", str(folder)]) == DONE
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("place", [0.1, 0.5, 0.95])
+def test_a_question_damaged_twice_is_one_sentence(kind, place, undisturbed, tmp_path, capsys):
+    folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    for name in ("study.json", "study-copy.json"):
+        flipped(folder / name, place)
     for command in (lambda: again(kind, folder), lambda: main(["check", str(folder)])):
         assert command() == BAD_INPUT
         error = capsys.readouterr().err
@@ -133,6 +152,7 @@ def test_a_damaged_question_is_one_sentence(kind, place, undisturbed, tmp_path, 
 @pytest.mark.parametrize("kind", FILES)
 def test_a_folder_from_before_checksums_is_read_and_said(kind, undisturbed, tmp_path, capsys):
     folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    (folder / "study-copy.json").unlink()
     for name in ("study.json", "history.jsonl"):
         text = (folder / name).read_text()
         records = [json.loads(line) for line in ([text] if name == "study.json" else text.splitlines())]
@@ -182,9 +202,6 @@ def test_no_file_of_a_finished_folder_is_damaged_unseen(kind, damage, finished, 
         capsys.readouterr()
         code = main(["check", str(folder)])
         said = capsys.readouterr()
-        if name == "study.json":
-            assert damage != "removed" or name in said.err
-            continue
         if damage == "removed" and name == LIST:  # no other file knows of it
             assert (code, "cannot be seen" in said.out) == (DONE, True) if kind in FILES else code == BAD_INPUT
             continue

@@ -150,7 +150,7 @@ def test_after_kill_9_only_what_is_missing_is_computed(where, done, question, un
 
 
 def assert_same_study(folder, other):
-    for name in ("map.nc", "study.json", "history.jsonl"):
+    for name in ("map.nc", "study.json", "study-copy.json", "history.jsonl"):
         assert (folder / name).read_bytes() == (other / name).read_bytes(), name
     mine, others = ({path.name for path in place.iterdir()} - {LIST} for place in (folder, other))
     assert mine == others
@@ -252,18 +252,20 @@ def test_nothing_to_resume_is_said(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("lost", "message"),
-    [("map.nc", "was removed from its study"), ("study.json", "exists already")],
+    [(["map.nc"], "was removed from its study"), (["study.json", "study-copy.json"], "exists already")],
 )
 def test_a_folder_that_lost_a_file_is_refused(lost, message, question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
-    (folder / lost).unlink()
+    for name in lost:
+        (folder / name).unlink()
     with refused(message):
         answer_into(question, folder, "map")
 
 
 def test_a_study_that_cannot_be_read_is_refused(question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
-    (folder / "study.json").write_text("{")
+    for name in ("study.json", "study-copy.json"):
+        (folder / name).write_text("{")
     with refused(r"study\.json. is damaged and cannot be read"):
         answer_into(question, folder, "map")
 

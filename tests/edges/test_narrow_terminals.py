@@ -5,6 +5,10 @@ A command runs once; what it has printed is then printed again at each width.
 
 import contextlib
 import io
+import os
+import struct
+import subprocess
+import sys
 
 import pytest
 from rich.console import Console
@@ -161,6 +165,26 @@ def test_lists_studies_and_their_results_keep_every_name_and_digit(arguments, mo
 def test_names_to_type_are_whole_in_the_list(monkeypatch):
     text = at_width(printed(monkeypatch, "list"), 80)
     assert set(bundled()) <= set(text.split())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are of POSIX")
+def test_a_pipe_is_written_for_the_terminal_beside_it():
+    """`kinetostat analyze x | less` in a window of 60 columns: sentences end there, and tables are whole."""
+    import fcntl
+    import pty
+    import termios
+
+    outer, inner = pty.openpty()
+    fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
+    code = f"import sys; from kinetostat.cli import main; sys.exit(main(['analyze', {QUICK[1]!r}]))"
+    try:
+        done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=inner, text=True, check=True)
+    finally:
+        os.close(inner)
+        os.close(outer)
+    sentences = done.stdout.partition("Attribution")[0].splitlines()
+    assert 50 < max(map(len, sentences)) <= 60
+    assert "…" not in done.stdout
 
 
 HELP = [(), *((name,) for name in ("new", "schema", "check", "analyze", "sweep", "map", "workspace", "sensitivity"))]

@@ -58,7 +58,8 @@ def test_a_folder_gets_everything_a_designer_needs(tmp_path, capsys):
     figures = {f"{name}.{kind}" for name in ("comparison", "convergence", "tolerances") for kind in ("png",)}
     written_files = {path.name for path in folder.iterdir()}
     assert written_files == figures | {
-        "best.toml", "result.json", "designs.nc", "designs.bin", "study.json", "history.jsonl", "kinetostat.sha256",
+        "best.toml", "result.json", "designs.nc", "designs.bin", "study.json", "study-copy.json", "history.jsonl",
+        "kinetostat.sha256",
     }  # fmt: skip
     told = json.loads((folder / "result.json").read_text("utf-8"))
     better = analyze(load(folder / "best.toml"))

@@ -179,3 +179,11 @@ def test_a_field_has_the_same_names_everywhere(name, short, whole):
 def test_a_name_that_no_field_has_is_refused_as_it_was_written():
     with refused("wrong is not known"):
         load("hexapod", ["wrong=1"])
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tripteron", "cogiro"])
+def test_an_entry_of_a_common_vector_has_short_names_in_every_file(name):
+    whole = load(name, ["load.force.0=3 N", "tool.payload_centre.2=1 mm"])
+    for axis in ("0", "x"):
+        assert load(name, [f"force.{axis}=3 N", "payload_centre.z=1 mm"]) == whole
+        assert load(name).with_values({f"force.{axis}": "3 N", "payload_centre.z": "1 mm"}) == whole

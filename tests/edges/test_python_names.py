@@ -47,6 +47,7 @@ from kinetostat import (
 )
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
+from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.report import REPORT_PARTS
 from refusals import refused
 
@@ -130,9 +131,25 @@ def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
         build("family =")
 
 
-@pytest.mark.parametrize("force", [[0.0, 0.0, 1.0], (0.0, 0.0, 1.0), np.array([0.0, 0.0, 1.0])])
-def test_a_changed_machine_takes_arrays(force):
-    assert kinetostat.changed(kinetostat.load("hexapod"), {"load.force": force}).tables["load"].force == (0.0, 0.0, 1.0)
+@pytest.mark.parametrize("name", ["hexapod", "tripteron", "cogiro", "planar-3rpr"])
+def test_changed_and_with_values_are_one_function_that_takes_arrays_for_every_vector(name):
+    machine = load(name)
+    known = values(machine)
+    for field in (p for p in parameters(machine.family) if len(p.leaves) > 1 and p.path != "limits"):
+        present = [float(known[leaf]) for leaf in field.leaves]
+        for kind in (list, tuple, np.array):
+            assert machine.with_drafted_values({field.path: kind(present)}) == machine, field.path
+    for force in ([0.0, 0.0, 1.0], np.array([0.0, 0.0, 1.0])):
+        other = changed(machine, {"load.force": force})
+        assert other.tables["load"].force == (0.0, 0.0, 1.0)
+        assert other == machine.with_values(load_force=force) == changed(machine, force=force)
+
+
+def test_changed_and_with_values_refuse_numbers_that_contradict_each_other():
+    machine = load("hexapod")
+    for change in (machine.with_values, lambda numbers: changed(machine, numbers)):
+        with refused("shortest_leg"):
+            change({"limits.shortest_leg": 0.9})
 
 
 def test_a_changed_machine_takes_numbers_and_text_and_leaves_the_first_alone():

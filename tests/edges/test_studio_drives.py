@@ -4,6 +4,7 @@ import asyncio
 
 import numpy as np
 import pytest
+from nicegui import ui
 from studio_page import on_page
 
 from kinetostat.machine.loading import as_toml, load
@@ -77,3 +78,25 @@ def test_every_kind_of_curve_has_its_unit(tmp_path):
     assert units == {"Force": "N", "Speed": "mm/s", "Motor": "N·m", "Power": "W", "Tool": "µm"}
     torque = curves_of(answer, "Motor", times)[2][2][1]
     assert torque == pytest.approx(answer.curves.motor_torque[2][::10])
+
+
+def test_what_is_played_waits_for_the_browser_so_that_a_pause_is_one():
+    """Poses that the server sends before the browser has drawn the last one would still come after the pause."""
+
+    async def steps(page):
+        await page.upload("poses.csv", b"x [mm]\n0\n1\n2\n3\n", "path-upload")
+        view, place = page.one("machine"), page.one("path-place")
+        await page.send("machine", "drawn", view._sent)
+        await page.send("path-play", "click")
+        await page.glance()
+        assert place.value == 1
+        for _ in range(3):
+            await page.glance()
+        assert place.value == 1, "the browser has not drawn it"
+        await page.send("machine", "drawn", view._sent)
+        await page.glance()
+        assert place.value == 2
+        await page.send("path-play", "click")
+        assert not [e for e in page.user.client.elements.values() if isinstance(e, ui.timer) and e.active]
+
+    on_page(steps, "hexapod")

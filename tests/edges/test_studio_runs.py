@@ -13,7 +13,7 @@ from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.machine.parameters import values
 from kinetostat.machine.saving import as_file
-from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
+from kinetostat.studies.study_folder import COPY, HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
 from kinetostat.studio.design.progress import Follower, Progress, failure
@@ -121,7 +121,8 @@ def test_a_damaged_search_does_not_hide_the_others(kept, tmp_path, damage):
     if damage == "history":
         (folder / HISTORY).write_bytes(b'{"step": 1\n\xff}\n')
     elif damage == "question":
-        (folder / QUESTION).write_text('["neither", "machine", "nor", "study"]')
+        for name in (QUESTION, COPY):
+            (folder / name).write_text('["neither", "machine", "nor", "study"]')
     else:
         (folder / HISTORY).unlink()
         (folder / HISTORY).mkdir()
@@ -218,8 +219,9 @@ def test_a_search_that_is_deleted_is_gone(kept):
 
 def test_a_search_that_fails_says_why(kept):
     runs, run = kept
-    question = run.folder / "study.json"
-    question.write_text(question.read_text("utf-8").replace('"compliance_sum"', '"nonsense"'), "utf-8")
+    for name in (QUESTION, COPY):
+        question = run.folder / name
+        question.write_text(question.read_text("utf-8").replace('"compliance_sum"', '"nonsense"'), "utf-8")
     (run.folder / "result.json").unlink()
     runs.go_on(run.number)
     runs.wait(run.number)

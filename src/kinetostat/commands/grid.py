@@ -114,10 +114,10 @@ def _answer_into_folder(
     """Compute a large grid into the folder, or go on with it, and say what was repaired and written there."""
     from kinetostat.studies.storage import differing
     from kinetostat.studies.stored_grid import answer_into
-    from kinetostat.studies.study_folder import HISTORY, QUESTION
+    from kinetostat.studies.study_folder import COPY, HISTORY, QUESTION
 
     changed = differing(options.output)
     stored = answer_into(question, options.output, word, progress, compute, options.resume)
     note_damage(options.output, stored.repaired, stored.unchecked, changed)
-    list_written(options.output, [*(options.output / name for name in (QUESTION, HISTORY)), stored.path])
+    list_written(options.output, [*(options.output / name for name in (QUESTION, COPY, HISTORY)), stored.path])
     return stored

@@ -6,7 +6,7 @@ A file for people, which keeps comments and order, is written by `saving`.
 import copy
 import difflib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -109,7 +109,8 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     rest, others, required = take_requirements(document, _in_full(document, settings), origin)
     rest, others, tolerated = take_tolerances(rest, others, origin)
     build_kind = _build_written if rest.get("family") == NAME else _build_family
-    return replace(build_kind(rest, origin, others), requirements=required, tolerances=tolerated)
+    machine = build_kind(rest, origin, others)
+    return replace(machine, requirements=required, tolerances=tolerated, whole_check=checked_as_file)
 
 
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
@@ -126,7 +127,7 @@ def _whole_path(document: Document, name: str) -> str:
     if form_of(name) and not name.startswith("pose"):
         return f"{POSE}{name}"
     if kind == NAME:
-        return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else name
+        return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else _common_path(document, name)
     family = family_named(kind) if isinstance(kind, str) else None
     if family is None or head in {*KEYS, *document, *(table.partition(".")[0] for table in family.every_table)}:
         return name
@@ -134,6 +135,23 @@ def _whole_path(document: Document, name: str) -> str:
         return find(family, name).path
     except InputError:
         return name
+
+
+def _common_path(document: Document, name: str) -> str:
+    """Return the path of a field of a common table that is named by its end, "force.0", if nothing else is so named."""
+    head = name.partition(".")[0]
+    tables = [table for table, fields in COMMON.items() if head in quantities(fields)]
+    elsewhere = {*KEYS, *document, *_keys_within([document.get("legs"), document.get("sections")])}
+    return f"{tables[0]}.{name}" if len(tables) == 1 and head not in elsewhere else name
+
+
+def _keys_within(data: object) -> Iterator[str]:
+    """List the keys of all tables in a part of a document."""
+    if isinstance(data, dict):
+        yield from data
+    inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    for entry in inner:
+        yield from _keys_within(entry)
 
 
 KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
@@ -313,22 +331,27 @@ def _quantity_lines(fields: type, table: Any, readable: bool) -> Iterator[str]:
 
 
 @checked
-def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
-    """The machine with some fields, or entries of fields, at other values, checked as a file would be.
-
-    Of the same family, so that what has been compiled for it is used again.
+def changed(machine: Machine, values: Mapping[str, Given] | None = None, **fields: Given) -> Machine:
+    """The machine with other numbers: `machine.with_values` as a function.
 
     Args:
         machine: which stays as it is.
-        values: the values by name of the field, in SI or as text with a unit; for a field with several entries one for
-            all, or a list or array of one for each; infinity is "rigid".
+        values: as `Machine.with_values` takes them.
+        fields: the same as keywords.
 
     Raises:
-        InputError: an unknown field, no quantity, a value out of bounds, a list of the wrong length, or numbers that
-            contradict each other.
+        InputError: as for `Machine.with_values`.
     """
-    new = machine.with_values(values)
-    return read_again(new) if any(related(machine, name) for name in values) else new
+    return machine.with_values(values, **fields)
+
+
+def checked_as_file(machine: Machine, names: Iterable[str]) -> Machine:
+    """The machine, of which fields of these names have changed, checked as a file would be.
+
+    Raises:
+        InputError: numbers contradict each other.
+    """
+    return read_again(machine) if any(related(machine, name) for name in names) else machine
 
 
 def related(machine: Machine, path: str) -> bool:

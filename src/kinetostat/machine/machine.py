@@ -5,7 +5,7 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 Points and axes are in the base frame.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -269,6 +269,8 @@ class Machine(Immutable):
             them.
         loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
             machine at rest under its loads.
+        whole_check: compares numbers that have changed, by name, with all others (`loading.checked_as_file`); None of
+            a machine that was not read.
     """
 
     name: str
@@ -279,6 +281,7 @@ class Machine(Immutable):
     requirements: Mapping[str, Requirement] = field(default_factory=dict)
     tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
     loaded: bool = False
+    whole_check: Callable[["Machine", Iterable[str]], "Machine"] | None = field(default=None, compare=False, repr=False)
 
     sections = renamed_property("tables")
     own_sections = renamed_property("family_tables")
@@ -305,19 +308,33 @@ class Machine(Immutable):
 
     @checked
     def with_values(self, values: Mapping[str, Given] | None = None, **fields: Given) -> "Machine":
-        """The machine with other numbers, each checked by itself: machine.with_values(x="5 mm", base_radius=0.26).
+        """The machine with other numbers, checked as a file would be: machine.with_values(x="5 mm", base_radius=0.26).
+
+        It is of the same family, so that what has been compiled for it is used again.
 
         Args:
             values: the values by name of the field: SI, text with a unit, or for a field with several entries an array
-                or list of one for each. `quaternion`, `rotation` and `tilt` stand for roll, pitch and yaw, as in a
-                file's [pose].
+                or list of one for each; infinity is "rigid". `quaternion`, `rotation` and `tilt` stand for roll, pitch
+                and yaw, as in a file's [pose].
             fields: the same as keywords; dots in names are written as underscores.
 
         Raises:
-            InputError: an unknown field, a value of another kind or out of bounds, or an array of the wrong length.
+            InputError: an unknown field, a value of another kind or out of bounds, an array of the wrong length, or
+                numbers that contradict each other.
         """
-        coordinates = quantities(self.family.tables["pose"])
-        given = numbers_for(coordinates, {**(values or {}), **fields}, single_angles)
+        given = {**(values or {}), **fields}
+        machine = self.with_drafted_values(given)
+        return machine if self.whole_check is None else self.whole_check(machine, given)
+
+    def with_drafted_values(self, values: Mapping[str, Given]) -> "Machine":
+        """The machine with other numbers as `with_values` takes them, of which each is only checked by itself.
+
+        While a slider is dragged, numbers may contradict each other.
+
+        Raises:
+            InputError: as for `with_values`, but for contradictions.
+        """
+        given = numbers_for(quantities(self.family.tables["pose"]), values, single_angles)
         machine = with_values(self, read_numbers(self.family, given))
         check_contrast(machine, self.name)
         check_inertia(machine.tables, self.name)

@@ -103,6 +103,7 @@ WORDS = {
     "more": "a whole number from 0",
     "tool_receptance": "the path of a CSV file",
     "elevations": 'a range of angles, e.g. "0 deg:90 deg:7"',
+    "fields": 'a number, a text with its unit, or an array, e.g. x="5 mm"',
     "tell": "a function of the steps done, of all steps, and of words on them",
 }
 """Words for an argument, by its name, which means the same in every function."""

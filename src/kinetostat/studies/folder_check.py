@@ -12,6 +12,7 @@ from kinetostat.studies.study_folder import (
     DATA,
     HISTORY,
     Record,
+    damaged_questions,
     has_checksums,
     holds_study,
     in_use,
@@ -113,11 +114,13 @@ def check_folder(folder: Path) -> FolderCheck:
         folder: of a grid or a search, in which another process may be at work, or with a list of files.
 
     Raises:
-        InputError: its question cannot be read.
+        InputError: its question and the copy of it cannot be read.
     """
-    changed = (LIST,) if is_damaged(folder) else tuple(differing(folder))
+    steps = _steps(folder) if holds_study(folder) else None
+    changed = [LIST] if is_damaged(folder) else differing(folder)
+    changed += [name for name in (damaged_questions(folder) if steps else ()) if name not in changed]
     sums = read_list(folder)
-    return FolderCheck(_steps(folder) if holds_study(folder) else None, None if sums is None else len(sums), changed)
+    return FolderCheck(steps, None if sums is None else len(sums), tuple(changed))
 
 
 def _steps(folder: Path) -> StepsCheck:

@@ -1,8 +1,9 @@
 """The folder of a long study: its question, which chunks of its answer are done, and who is at work. Computes nothing.
 
-`study.json` holds the question, `history.jsonl` one line for each chunk that is done, in the order of time. The lock on
-the history belongs to the process and ends with it, however it ends. The question and every line carry a checksum, and
-a line also that of the numbers it is about: what is damaged is known, and computed again.
+`study.json` holds the question, `study-copy.json` the same once more, because all the rest is lost without it, and
+`history.jsonl` one line for each chunk that is done, in the order of time. The lock on the history belongs to the
+process and ends with it, however it ends. The question and every line carry a checksum, and a line also that of the
+numbers it is about: what is damaged is known, and computed again.
 """
 
 import json
@@ -17,7 +18,7 @@ from typing import Any, BinaryIO
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import KEPT_SENTENCE, LIST, settle, write_text, writing
 
-QUESTION, HISTORY = "study.json", "history.jsonl"
+QUESTION, COPY, HISTORY = "study.json", "study-copy.json", "history.jsonl"
 
 ATTEMPTS, PAUSE = 20, 0.01
 """Attempts to take a lock before it counts as taken, and seconds between: to ask takes it for some microseconds."""
@@ -38,7 +39,7 @@ Record = dict[str, Any]
 
 def holds_study(folder: Path) -> bool:
     """Whether a folder is that of a long study."""
-    return (folder / QUESTION).exists()
+    return any((folder / name).exists() for name in (QUESTION, COPY))
 
 
 def in_use(folder: Path) -> bool:
@@ -71,19 +72,29 @@ def read_history(folder: Path, start: int = 0) -> tuple[list[Record], int]:
 
 
 def read_question(folder: Path) -> Record:
-    """Return the question that a folder answers.
+    """Return the question that a folder answers, from its copy where it is damaged itself.
 
     Raises:
-        InputError: it cannot be read, or is damaged.
+        InputError: neither can be read, or both are damaged.
     """
-    path = folder / QUESTION
-    try:
-        question = _checked_record(path.read_bytes(), {})
-    except OSError as error:
-        raise InputError(f'"{path}" cannot be read: {error.strerror}; choose another folder.') from None
-    if question is None:
-        raise InputError(f'"{path}" is damaged and cannot be read; choose another folder, or remove this one.')
-    return question
+    path, trouble = folder / QUESTION, "is damaged and cannot be read; choose another folder, or remove this one"
+    for name in (QUESTION, COPY):
+        try:
+            question = _checked_record((folder / name).read_bytes(), {})
+        except OSError as error:
+            if name == QUESTION:
+                trouble = f"cannot be read: {error.strerror}; choose another folder"
+        else:
+            if question is not None:
+                return question
+    raise InputError(f'"{path}" {trouble}.')
+
+
+def damaged_questions(folder: Path) -> list[str]:
+    """Return the names of the files of a question that are damaged or lost; a folder of an earlier version has one."""
+    texts = {name: (folder / name).read_bytes() for name in (QUESTION, COPY) if (folder / name).exists()}
+    damaged = [name for name, text in texts.items() if _checked_record(text, {}) is None]
+    return damaged if QUESTION in texts else [QUESTION, *damaged]
 
 
 def has_checksums(question: Record) -> bool:
@@ -161,6 +172,8 @@ class StudyFolder:
                 f'"{self.path}" holds another study (different: {", ".join(different)}); choose another folder with '
                 "-o, or remove that one."
             )
+        if has_checksums(stored) and (damaged_questions(self.path) or not (self.path / COPY).exists()):
+            self.state(stored)
         return stored
 
     def begin(self, question: Record) -> None:
@@ -170,9 +183,10 @@ class StudyFolder:
         self.state(question)
 
     def state(self, question: Record) -> None:
-        """Write the question of this folder."""
+        """Write the question of this folder, and its copy."""
         text = json.dumps(_with_checksum({**question, CHECKED: "CRC-32"}), ensure_ascii=False, indent=1)
-        write_text(self.path / QUESTION, f"{text}\n")
+        for name in (QUESTION, COPY):
+            write_text(self.path / name, f"{text}\n")
 
     def records(self) -> dict[int, Record]:
         """Return the notes about the chunks that are done, by their number; a line cut short or damaged is dropped."""

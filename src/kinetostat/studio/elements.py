@@ -11,6 +11,7 @@ import nicegui.elements.echart
 import nicegui.elements.scene  # noqa: F401  (both register what NiceGUI brings with it: ECharts and three.js)
 from nicegui import ui
 from nicegui.element import Element
+from nicegui.events import GenericEventArguments
 
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.views.scene.browser import RENDERER
@@ -35,13 +36,29 @@ class Labelled(Element):
 class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES):
     """Scenes of solids, with light, shadows and a camera.
 
-    Methods `show`, `overlay`, `look`, and `swing` and `sway` for a shape that swings; the event `swinging` says
-    whether it moves.
+    Methods `overlay`, `look`, and `swing` and `sway` for a shape that swings; the event `swinging` says whether it
+    moves, and `drawn` which scene the browser has drawn last.
     """
 
     def __init__(self, label: str) -> None:
         super().__init__(label)
         self._props.update(hidden=[], looks=looks_data())
+        self._sent = 0
+        self._drawn: int | None = None
+        self.on("drawn", self._note_drawn)
+
+    def show(self, scene: dict[str, Any]) -> None:
+        """Show a scene."""
+        self._sent += 1
+        self.run_method("show", {**scene, "number": self._sent})
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the browser has still to draw the last scene; what is played then waits, so that a pause is one."""
+        return self._drawn is not None and self._drawn < self._sent
+
+    def _note_drawn(self, event: GenericEventArguments) -> None:
+        self._drawn = int(event.args)
 
     def hide(self, layers: list[str]) -> None:
         """Show all layers but these."""

@@ -168,8 +168,8 @@ class MapPanel:
                 "ends": (ends * scale.factor).tolist(),
                 "unit": scale.unit,
                 "alike": x == y and x.unit in LENGTHS,
-                "x": {**_axis(request.across, x), "label": x.label(across.label)},
-                "y": {**_axis(request.up, y), "label": y.label(up.label)},
+                "x": {**_axis(request.across, x), "label": x.label(full_label(across.parameter))},
+                "y": {**_axis(request.up, y), "label": y.label(full_label(up.parameter))},
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
@@ -211,14 +211,15 @@ class MapPanel:
         if not text:
             return None
         control, scale = self._scale(path)
+        what = f"the range of {full_label(control.parameter)}"
         first, to, last = text.partition(" to ")
         if not to:
-            raise InputError(f'the range of {control.label} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
+            raise InputError(f'{what} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
         high = read_typed(control.parameter, last, scale.unit)
         unit = last.strip().lstrip("+-.0123456789eE \u2212").strip() or scale.unit
         low = read_typed(control.parameter, first, unit)
         if not low < high:
-            raise InputError(f"the range of {control.label} is {shorten(text)}; its first end must be the lower one.")
+            raise InputError(f"{what} is {shorten(text)}; its first end must be the lower one.")
         return low, high
 
     def _choose(self) -> None:

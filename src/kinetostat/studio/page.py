@@ -78,7 +78,7 @@ class StudioPage:
                 self.scene = ScenePanel(self._load, self._exaggerate, lambda: self.session.machine.name)
                 self.handles = Handles(self.session, self.scene.view, self.changed)
                 with self.scene.tools:
-                    self.playback = Playback(self.session, self.changed, lambda: self._pictures.busy)
+                    self.playback = Playback(self.session, self.changed, self._is_drawing)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
                     self.map = MapPanel(self.session, self.changed)
@@ -111,7 +111,7 @@ class StudioPage:
         self.panels: dict[str, Panel] = {}
         made = [panel() for panel in PANELS]
         for panel in made:
-            panel.changed, panel.view = self.changed, self.scene.view
+            panel.changed, panel.view, panel.is_busy = self.changed, self.scene.view, self._is_drawing
         with ui.tabs(on_change=self._other_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
             for panel in made:
                 ui.tab(panel.name).mark(f"tab-{panel.name}")
@@ -133,6 +133,10 @@ class StudioPage:
         self.text.refresh()
         self.questions.changed()
         self._offer_history()
+
+    def _is_drawing(self) -> bool:
+        """Whether the last change is still being drawn, by the server or in the browser."""
+        return self._pictures.busy or self.scene.view.is_behind
 
     def _show_machine(self) -> None:
         """Show another machine: every control, list and picture is made again."""

@@ -62,7 +62,7 @@ class ParametersPanel:
                     self._group(group, list(members), len(chosen))
 
     def _group(self, group: str, members: list[Control], total: int) -> None:
-        if total <= OPEN or len(members) == total:
+        if len(members) == total:  # one group needs no heading
             self._make(members)
             return
         with (

@@ -38,7 +38,7 @@ from kinetostat.views.questions import QUESTIONS
 
 ASKING = Turns(2, "The question before is still being answered; stop it, then ask again.")
 """Questions of all tabs that are answered at a time."""
-NOTHING_ASKED = "Choose a question on the left and ask it; its answer is about the machine as it is then."
+NOTHING_ASKED = "Choose a question and ask it; its answer is about the machine as it is then."
 CHANGED = "The machine has been changed since; ask again for its new answer."
 STOPPED = "The question was stopped."
 MOST_FILES = 8

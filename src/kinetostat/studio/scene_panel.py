@@ -36,7 +36,7 @@ LAYERS = {
 """Layers of the picture that can be hidden, and their names on the page."""
 GHOST = "Keep the present machine as a ghost behind later changes; click again to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
-UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set under Load on the left"
+UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set in the panel Load"
 COMPUTING = "The next pose is being computed ..."
 LOOKING = "The legs cannot close at this pose on the branch of the home pose; the nearest pose is being looked for ..."
 KEPT = "The picture and the figures still show the last good pose."
@@ -123,7 +123,7 @@ class ScenePanel:
         self._pictured = picture.scene is not None
         if picture.scene is not None:
             self._shown = picture.scene
-            self.view.run_method("show", picture.scene)
+            self.view.show(picture.scene)
 
     def explain(self, report: Report, automatic: bool) -> None:
         """Show the overlays and figures of a pose; without an answer, show the reason and keep the last figures.

@@ -183,7 +183,7 @@ class Session:
         self._change(where)
 
     def _change(self, numbers: Mapping[str, float]) -> None:
-        new = self.machine.with_values(numbers)
+        new = self.machine.with_drafted_values(numbers)
         paths = tuple(numbers)
         if self._dragged != paths:
             self._note()

@@ -52,15 +52,23 @@ def label(parameter: Parameter) -> str:
 
 
 def table_of(parameter: Parameter) -> str:
-    """Return the table of the machine file in which a parameter stands, e.g. "pose" or "leg 1 upper"."""
+    """Return the table of the machine file in which a parameter stands, e.g. "pose"; of a joint "leg 1, upper"."""
     within = 2 if parameter.path.split(".")[-1].isdecimal() else 1
-    return parameter.path.rsplit(".", within)[0].replace(".", " ")
+    table = parameter.path.rsplit(".", within)[0]
+    legs, *place = table.split(".")
+    if legs != "legs" or not place:
+        return table.replace(".", " ")
+    first = place[0] if place[0].startswith("leg") else f"leg {place[0]}"
+    return ", ".join([first, *place[1:]])
 
 
 def full_label(parameter: Parameter) -> str:
-    """Return the name of a parameter with its table unless that is the pose: "x", "geometry: base radius"."""
+    """Return the name of a parameter with its table: "stiffness: actuator", "leg 1, upper: point x", "load: force x".
+
+    The pose and the geometry, where most numbers stand, are left out: "x", "base radius".
+    """
     where = table_of(parameter)
-    return label(parameter) if where == "pose" else f"{where}: {label(parameter)}"
+    return label(parameter) if where in ("pose", "geometry") else f"{where}: {label(parameter)}"
 
 
 def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:

@@ -24,7 +24,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.slopes import ridge_sentences
 from kinetostat.studies.storage import list_files
-from kinetostat.studies.study_folder import HISTORY, QUESTION
+from kinetostat.studies.study_folder import COPY, HISTORY, QUESTION
 from kinetostat.views.answers import write_files
 from kinetostat.views.question import LOADS_LEFT_OUT, MESSAGE, Description, Field, Lines
 from kinetostat.views.tables import numeric_table
@@ -421,5 +421,5 @@ RESULT = Description(
 def write_result(result: Result, folder: Path) -> list[Path]:
     """Write the files of a result without figures, and list them with those of the search; return their paths."""
     written = write_files(RESULT, result, folder)
-    list_files(folder, [*written, *(folder / name for name in (QUESTION, HISTORY, ROWS))])
+    list_files(folder, [*written, *(folder / name for name in (QUESTION, COPY, HISTORY, ROWS))])
     return written

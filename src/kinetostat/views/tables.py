@@ -6,6 +6,7 @@ description: machine and state, sentences, requirements, tables. Reports and pag
 """
 
 import math
+import os
 import re
 import sys
 import textwrap
@@ -209,7 +210,7 @@ def readable_value(value: float, quantity: Quantity, display: Display = ENGINEER
 
 
 class Piped(Console):
-    """Console for pipes and files: texts wrap at `PIPED` characters, tables of numbers take the width they need."""
+    """Console for pipes and files: texts wrap at `piped_width()`, tables of numbers take the width they need."""
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print as `Console` does, but cut no number and no name."""
@@ -217,9 +218,10 @@ class Piped(Console):
             item for item in objects if isinstance(item, Table) and all(column.no_wrap for column in item.columns)
         ]
         unbound = self.options.update(width=UNBOUND)
-        self.width = max([PIPED, *(self.measure(table, options=unbound).maximum for table in tables)])
+        page = self.width
+        self.width = max([page, *(self.measure(table, options=unbound).maximum for table in tables)])
         super().print(*objects, **options)
-        self.width = PIPED
+        self.width = page
 
 
 def terminal() -> Console:
@@ -228,7 +230,17 @@ def terminal() -> Console:
     Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
     """
     plain: dict[str, Any] = {"markup": False, "emoji": False}
-    return Console(**plain) if sys.stdout.isatty() else Piped(width=PIPED, **plain)
+    return Console(**plain) if sys.stdout.isatty() else Piped(width=piped_width(), **plain)
+
+
+def piped_width() -> int:
+    """Columns of the terminal at which a pipe or a file is written, as `less` shows it there; `PIPED` without one."""
+    for stream in (sys.stderr, sys.stdin):
+        try:
+            return os.get_terminal_size(stream.fileno()).columns or PIPED
+        except (AttributeError, OSError, ValueError):  # closed, replaced, or no terminal
+            continue
+    return PIPED
 
 
 def print_written(console: Console, paths: Iterable[Path]) -> None:

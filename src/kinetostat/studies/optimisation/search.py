@@ -103,6 +103,11 @@ def method_of(assess: Assessor) -> Method:
     return Genetic(assess)
 
 
+def steps_of(problem: Problem) -> int:
+    """Return the number of steps that the search of a problem takes; nothing is computed for it."""
+    return method_of(Assessor(problem)).steps
+
+
 @checked
 def optimize(
     problem: Problem,

@@ -76,6 +76,7 @@ class DesignTab:
         """Note whether the tab is in front: only then the page follows its searches."""
         self.runs.timer.active = on
         if on:
+            self._workshop.runs.prepare()
             self.favourites.fill()
             self.runs.refresh()
 

@@ -16,7 +16,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import machine_of_design
-from kinetostat.studies.optimisation.search import kept_log, stored_problem
+from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_problem
 from kinetostat.studies.study_folder import Record, read_history
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
@@ -32,7 +32,7 @@ class Progress:
         run: the search as it is listed now.
         problem: that it solves.
         steps: that are done.
-        total: steps of the whole search; 0 if not known yet.
+        total: steps of the whole search.
         designs: that have been evaluated.
         best, mean: objective after each step, None where no design was feasible; empty for several objectives.
         objectives: of the Pareto front (for one objective, of the best design), sorted by the first
@@ -85,6 +85,7 @@ class Follower:
         """
         self.number, self._folder = run.number, run.folder
         self.problem = stored_problem(run.folder)
+        self._total = steps_of(self.problem)
         self._records: list[Record] = []
         self._last: Record = {}
         self._place = 0
@@ -96,7 +97,7 @@ class Follower:
         self._last = new[-1] if new else self._last
         result = None if run.stage.active else _result(self._folder)
         if not self._records:
-            return Progress(run, self.problem, result=result)
+            return Progress(run, self.problem, total=self._total, result=result)
         log = kept_log(self.problem, self._folder, self._last)
         several = len(self.problem.objectives) > 1
         front = front_of(log) if several else best_feasible(log)
@@ -104,7 +105,7 @@ class Follower:
             run,
             self.problem,
             len(self._records),
-            int(self._last.get("of", 0)),
+            self._total,
             sum(record["designs"] for record in self._records),
             [] if several else [record["best"] for record in self._records],
             [] if several else [record["mean"] for record in self._records],

@@ -30,7 +30,7 @@ from kinetostat.studio.elements import (
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.wording import paragraph
 
-NOTHING = "No search has been started yet. Choose variables and objectives on the left, then start one."
+NOTHING = "No search has been started yet. Choose variables and objectives of the study, then start it."
 DAMAGED = 'Search {} cannot be shown, because its folder "{}" is damaged: {}. The other searches are not affected.'
 INTERVAL = 0.5
 """Seconds between two looks at a search."""
@@ -145,7 +145,7 @@ class RunPanel:
             self.bar.set_value(0.0)
             self.text.set_content(paragraph(searches.problem or NOTHING))
             return
-        self.bar.set_value(progress.steps / progress.total if progress.total else 0.0)
+        self.bar.set_value(progress.steps / progress.total)
         self.line.set_text(_line(progress))
         self._draw(progress)
         self.text.set_content(paragraph(searches.problem, "lead") if searches.problem else result_text(progress))
@@ -171,7 +171,7 @@ class RunPanel:
     def _draw(self, progress: Progress) -> None:
         if len(progress.problem.objectives) > 1:
             self.front.show(progress, self._place)
-        elif progress.steps > 1:
+        elif progress.steps:
             self.curve.run_method("show", convergence(progress))
 
     def _choose(self) -> None:
@@ -231,10 +231,12 @@ def convergence(progress: Progress) -> dict[str, object]:
 
 
 def _line(progress: Progress) -> str:
-    total = f" of {progress.total}" if progress.total else ""
-    searched = progress.run.stage is Stage.RUNNING and progress.steps == progress.total
-    work = f"{Stage.RUNNING}, explaining the best design" if searched else progress.run.stage
-    line = f"{work}: {progress.steps}{total} steps, {progress.designs:,} designs"
+    work = str(progress.run.stage)
+    if progress.run.stage is Stage.RUNNING and not progress.steps:
+        work = f"{work}, preparing its program"
+    elif progress.run.stage is Stage.RUNNING and progress.steps == progress.total:
+        work = f"{work}, explaining the best design"
+    line = f"{work}: {progress.steps} of {progress.total} steps, {progress.designs:,} designs"
     best = progress.best[-1] if progress.best else None
     return line if best is None else f"{line}, best {progress.exact(progress.problem.objectives[0], best)}"
 

@@ -1,12 +1,11 @@
 """Searches, each in its own process and folder: start, stop, go on, list, delete; and what that process does.
 
-The process is `python -m kinetostat.studio.design.runs FOLDER`. It ends after its present step when its standard input
-is closed, which also happens when the server that started it dies: no search runs on unnoticed.
+The process is `worker`. It ends after its present step when its standard input is closed, which also happens when the
+server that started it dies: no search runs on unnoticed.
 """
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -19,7 +18,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
-from kinetostat.studies.study_folder import QUESTION, in_use, read_history
+from kinetostat.studies.study_folder import holds_study, in_use, read_history, read_question
 from kinetostat.studio.design.state_folder import RUNS, numbered_entries, slug
 from kinetostat.studio.processes import make_modest
 from kinetostat.views.optimisation import write_result
@@ -28,7 +27,7 @@ MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""
 MOST_RUNS = 60
 """Searches that are kept."""
-WORKER = "kinetostat.studio.design.runs"
+WORKER = "kinetostat.studio.design.worker"
 RESULT = "result.json"
 FAILURE = "failed.txt"
 """File in the folder of a search that could not go on, with the reason."""
@@ -78,9 +77,15 @@ class Runs:
         """Searches below `state`; nothing is written before the first one."""
         self._folder = state / RUNS
         self._processes: dict[Path, subprocess.Popen[bytes]] = {}
+        self._spare: subprocess.Popen[bytes] | None = None
         self._names: dict[Path, str] = {}
         self._tabs: dict[Path, Hashable] = {}
         self._lock = threading.Lock()
+
+    def prepare(self) -> None:
+        """Let a process start that the next search takes, so that its first steps need not wait for the start."""
+        if self._spare is None or self._spare.poll() is not None:
+            self._spare = _started_worker()
 
     def every(self) -> list[Run]:
         """All searches, the latest first.
@@ -110,7 +115,7 @@ class Runs:
     def _entry(self, number: int, path: Path) -> Run | None:
         """Return what the list shows of a folder, which may be damaged; None if no search has begun in it."""
         try:
-            return Run(number, path, self._name(path), self._stage(path)) if (path / QUESTION).exists() else None
+            return Run(number, path, self._name(path), self._stage(path)) if holds_study(path) else None
         except UNREADABLE:
             return Run(number, path, path.name, Stage.DAMAGED)
 
@@ -179,7 +184,8 @@ class Runs:
 
     def close(self) -> None:
         """Let all searches of this server end after their present step."""
-        for process in self._processes.values():
+        spare = [] if self._spare is None else [self._spare]
+        for process in [*self._processes.values(), *spare]:
             if process.stdin is not None:
                 process.stdin.close()
 
@@ -207,11 +213,12 @@ class Runs:
         ended = self._processes.pop(folder, None)
         if ended is not None and ended.stdin is not None:
             ended.stdin.close()
-        words = [sys.executable, "-m", WORKER, str(folder)]
-        self._processes[folder] = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        make_modest(self._processes[folder].pid)
+        spare, self._spare = self._spare, None
+        process = spare if spare is not None and spare.poll() is None else _started_worker()
+        self._processes[folder] = process
+        if process.stdin is not None:
+            process.stdin.write(f"{json.dumps(str(folder))}\n".encode())
+            process.stdin.flush()
 
     def _stage(self, folder: Path) -> Stage:
         process = self._processes.get(folder)
@@ -226,9 +233,8 @@ class Runs:
     def _name(self, folder: Path) -> str:
         if folder not in self._names:
             try:
-                question = json.loads((folder / QUESTION).read_text("utf-8"))
-                self._names[folder] = str(question["optimisation"]["name"])
-            except (OSError, ValueError, KeyError, TypeError):
+                self._names[folder] = str(read_question(folder)["optimisation"]["name"])
+            except (InputError, KeyError, TypeError):
                 return folder.name
         return self._names[folder]
 
@@ -239,13 +245,23 @@ def _complete(folder: Path) -> bool:
     return bool(steps) and len(steps) >= steps[-1].get("of", len(steps)) and (folder / RESULT).exists()
 
 
-def work(folder: Path) -> None:
-    """Search on from the records in the folder and write the result so far: what the process of a search does.
+def _started_worker() -> subprocess.Popen[bytes]:
+    """Start a process that waits for the folder of a search."""
+    words = [sys.executable, "-m", WORKER]
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    make_modest(process.pid)
+    return process
 
-    Args:
-        folder: of a search that has been begun.
+
+def work() -> None:
+    """Search on from the records in a folder and write the result so far: what the process of a search does.
+
+    The folder is the first line of the standard input, once a search needs the process; none may ever come.
     """
-    stopped = threading.Event()
+    line = sys.stdin.buffer.readline()
+    if not line:
+        return
+    folder, stopped = Path(json.loads(line)), threading.Event()
     threading.Thread(target=_listen, args=(stopped,), daemon=True).start()
     try:
         write_result(optimize(stored_problem(folder), folder, stop=stopped.is_set), folder)
@@ -261,8 +277,3 @@ def _listen(stopped: threading.Event) -> None:
     """Wait until standard input is closed, then ask the search to stop after its step."""
     sys.stdin.buffer.read()
     stopped.set()
-
-
-if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server, which closes our input
-    work(Path(sys.argv[1]))

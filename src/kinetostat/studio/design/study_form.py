@@ -162,7 +162,7 @@ class StudyForm:
         paths = [str(path) for path in table.get("paths") or [table["path"]]]
         parameter = find(self._machine.family, paths[0])
         control = known.get(parameter.path)
-        title = (brief(control) if control else paths[0]) + (" and others" if paths[1:] else "")
+        title = (full_label(control.parameter) if control else paths[0]) + (" and others" if paths[1:] else "")
         with ui.element("div").classes("form-row"):
             ui.label(title).classes("form-name").tooltip(", ".join(paths))
             if "choices" in table:
@@ -195,8 +195,8 @@ class StudyForm:
     def _more_variables(self, known: dict[str, Control]) -> None:
         """Offer the other numbers of the machine; loads and limits are not part of a design."""
         taken = {str(table.get("path")) for table in self.draft.variables}
-        free = [control for path, control in known.items() if control.slides and path not in taken]
-        offered = {control.path: brief(control) for control in free if control.panel != "Load" and not control.joined}
+        free = [c for path, c in known.items() if c.slides and path not in taken and c.panel != "Load"]
+        offered = {control.path: full_label(control.parameter) for control in free if not control.joined}
         if offered:
             add = choice(offered, "add a variable", self._add_variable, "study-add-variable", searchable=True)
             add.classes("form-more")
@@ -273,11 +273,6 @@ class StudyForm:
 
     def _count(self, key: str, event: Change) -> None:
         self.draft.optimizer[key] = _number(str(event.value))
-
-
-def brief(control: Control) -> str:
-    """Return the name of a variable; the table is left out if it is the geometry, where most variables are."""
-    return full_label(control.parameter).removeprefix("geometry: ")
 
 
 def _number(text: str) -> int | float | str:

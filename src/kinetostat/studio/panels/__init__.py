@@ -22,11 +22,13 @@ class Panel(ABC):
         name: text of the tab.
         changed: of the page, to be called where the panel has given the session's machine other numbers.
         view: the picture of the machine, for panels that draw in it.
+        is_busy: of the page, whether the last change is still being drawn, for panels that play something.
     """
 
     name = ""
     changed: Callable[[], None]
     view: MachineView
+    is_busy: Callable[[], bool]
 
     @abstractmethod
     def build(self) -> None:

@@ -45,8 +45,7 @@ class DrivesPanel(Panel):
         self._answer: DriveLoads | None = None
         self._asked: Machine | None = None
         self._text = ""
-        self._waits = False  # for the picture of the last frame
-        self._player = Player(PERIOD, lambda: self._waits)
+        self._player = Player(PERIOD, self.is_busy)
         self._lane = Lane(drives_along, self._deliver)
         with ui.row().classes("panel-tools"):
             self.upload = upload_field(self._open, refuse, "drives-upload", ".csv")
@@ -69,7 +68,7 @@ class DrivesPanel(Panel):
         return report.answered
 
     def show(self, _report: Report, session: Session) -> None:
-        self._session, self._waits = session, False
+        self._session = session
         if self._asked is None or _apart_from_pose(self._asked) != _apart_from_pose(session.machine):
             self._ask()
 
@@ -149,7 +148,6 @@ class DrivesPanel(Panel):
             self._player.pause()
             refuse(str(error))
         else:
-            self._waits = True
             self.changed()
 
 

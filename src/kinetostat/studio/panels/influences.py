@@ -115,6 +115,8 @@ class SensitivityPanel(Panel):
 
     def _ask(self) -> None:
         if self._session is not None and self.quantity.value:
+            if not self.bars.content:
+                self.bars.set_content(paragraph("Being computed; the first time takes some seconds."))
             self._lane.ask(RankingRequest(self._session.machine, str(self.quantity.value)))
 
     def _draw(self, _request: RankingRequest, answer: Sensitivity | str) -> None:
@@ -192,7 +194,7 @@ class LinkPanel(Panel):
                 {"name": name.split("_")[1], "values": [None if value is None else value * y.factor for value in line]}
                 for name, line in answer.values.items()
             ],
-            "label": {"x": x.label(control.label), "y": y.label(matrix)},
+            "label": {"x": x.label(full_label(control.parameter)), "y": y.label(matrix)},
             "unit": y.unit,
             "here": present if 0.0 < present < math.inf else None,
             "log": True,

@@ -183,7 +183,7 @@ def load_text(analysis: Analysis) -> str:
     """Deflection and spring loads as tables; without a load, how to set one."""
     load, display = analysis.load, analysis.machine.display
     if load is None:
-        return paragraph("The tool carries no load. Set a force or a moment under Load on the left.")
+        return paragraph("The tool carries no load. Set a force or a moment in the panel Load.")
     tool = [
         [name, *_load_cells(wrench, motion, name.startswith("r"), display)]
         for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)

@@ -35,7 +35,7 @@ MASS = "tool.mass"
 NO_MASS = "Nothing says what this machine weighs, and so its natural frequencies are not known."
 GIVE = (
     "Give the mass of platform and tool here, and the modes follow at once. Inertia, links, drives and damping are in "
-    "the panel Mass on the left."
+    "the panel Mass."
 )
 COUPLED = 1e-9
 """Share of the direct responses below which a response between two components is round-off."""

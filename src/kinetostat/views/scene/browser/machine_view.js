@@ -32,7 +32,7 @@ export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
   props: { label: String, hidden: Array, looks: Object },
-  emits: ["pull", "settle", "swinging"],
+  emits: ["pull", "settle", "swinging", "drawn"],
   mounted() {
     const canvas = this.$el.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware(), alpha: false });
@@ -186,6 +186,7 @@ export default {
       this.world.add(this.grid);
     },
     show(scene) {
+      this.number = scene.number;
       this.put("machine", scene.solids, scene.labels);
       if (scene.handles) this.handles.put(scene.handles);
       const first = this.size !== scene.size && (!this.size || Math.abs(this.size / scene.size - 1) > 0.6);
@@ -484,6 +485,7 @@ export default {
     },
     frame(sharpness) {
       this.wanted = false;
+      const number = this.number;
       const started = performance.now();
       this.sharpness(sharpness);
       this.render();
@@ -493,6 +495,7 @@ export default {
       const look = () => {
         if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return setTimeout(look, 10);
         gl.deleteSync(fence);
+        if (number !== this.told) this.$emit("drawn", (this.told = number));
         const took = performance.now() - started;
         if (sharpness < this.finest || took > SLOW) this.slow = took > SLOW * 0.5;
         setTimeout(() => this.rest(sharpness), this.slow ? took / 2 : 0); // leave the page time for itself
