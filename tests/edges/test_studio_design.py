@@ -10,7 +10,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.spec.document import parse
-from kinetostat.spec.study import read_study
+from kinetostat.spec.study import read_study, study_toml
 from kinetostat.studies.bundled import bundled_studies
 from kinetostat.studio.design.state_folder import Favourites
 from studies import SMALL
@@ -155,6 +155,41 @@ def test_bundled_studies_fill_the_form(name):
         study = read_study(parse((await download).text, name), name)
         kept = read_study(parse(bundled_studies()[name], name), name)
         assert study.model_copy(update={"changes": {}}) == kept.model_copy(update={"changes": {}})
+
+    on_page(steps)
+
+
+def test_constraints_and_poses_are_written_and_kept_as_in_a_file():
+    """What the form writes is what a file says; what a file says is shown, and can be changed or taken out."""
+
+    async def saved(page):
+        download = asyncio.ensure_future(page.user.download.next())
+        await page.send("study-save", "click")
+        return read_study(parse((await download).text, "the form"), "the form")
+
+    async def steps(page):
+        await small_study(page)
+        await page.send("study-add-constraint", "click")
+        await page.choose("constraint 0 quantity", "compliance_z")
+        await page.choose("constraint 0 side", "at_most")
+        await page.choose("constraint 0 bound", "0.5 um/N")
+        await page.choose("study-poses", "x=-1 cm:1 cm:3, z=67 cm:69 cm:2")
+        study = await saved(page)
+        assert [c.model_dump(exclude_none=True, exclude_defaults=True) for c in study.constraints] == [
+            {"quantity": "compliance_z", "at_most": "0.5 um/N"}
+        ]
+        assert study.poses.over == ["x=-1 cm:1 cm:3", "z=67 cm:69 cm:2"]
+        await page.upload("sent.toml", study_toml(study).encode(), "study-upload")
+        assert page.one("constraint 0 side").value == "at_most"
+        assert page.one("constraint 0 bound").value == "0.5 um/N"
+        assert page.one("study-poses").value == "x=-1 cm:1 cm:3, z=67 cm:69 cm:2"
+        await page.choose("constraint 0 bound", "0.5 s")
+        await page.send("study-start", "click")
+        assert "constraints.0.at_most" in page.one("study-problem").text
+        await page.send("constraint 0 remove", "click")
+        await page.choose("study-poses", "")
+        study = await saved(page)
+        assert (study.constraints, study.poses.over) == ([], None)
 
     on_page(steps)
 

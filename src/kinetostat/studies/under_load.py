@@ -5,7 +5,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -73,12 +73,13 @@ class LoadedState(Immutable):
             whether it keeps to its limits, those of the loads of its actuators at rest among them.
         message: what is special about the state of rest, or why there is none.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
-        displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose.
-        linear: the displacement to first order, C w with all weights; None where C is not finite.
+        displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose [n]; empty
+            where it comes to no rest.
+        linear: the displacement to first order, C w with all weights [n]; None where C is not finite.
         springs: all springs that deform.
         slack_legs: names of the legs in which a spring is slack.
         elastic, tangent: stiffness of the springs alone at rest, and stiffness against further loads, to which also
-            the loads add by turning; infinite where rigid parts hold a component, None where they hold all.
+            the loads add by turning [n x n]; infinite where rigid parts hold a component, None where they hold all.
         compliance: inverse of the tangent stiffness.
         factor: factor by which the loads may grow in proportion until the springs are unstable; infinite if no growth
             makes them so, None where springs alone hold nothing. Without a state of rest, the share of the loads up to
@@ -95,15 +96,15 @@ class LoadedState(Immutable):
     rest: Rest
     message: str
     components: tuple[str, ...]
-    displacement: tuple[float, ...] = ()
-    linear: tuple[float, ...] | None = None
+    displacement: Array = field(default_factory=lambda: np.zeros(0))
+    linear: Array | None = None
     springs: tuple[SpringState, ...] = ()
     slack_legs: tuple[str, ...] = ()
-    elastic: list[list[float]] | None = None
-    tangent: list[list[float]] | None = None
-    compliance: list[list[float]] | None = None
+    elastic: Array | None = None
+    tangent: Array | None = None
+    compliance: Array | None = None
     factor: float | None = None
-    mode: tuple[float, ...] = ()
+    mode: Array = field(default_factory=lambda: np.zeros(0))
     mode_legs: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
     residual: float = 0.0
@@ -118,7 +119,12 @@ class LoadedState(Immutable):
     @property
     def loaded(self) -> bool:
         """Whether anything loads the machine: its tool moves, or a spring carries something."""
-        return any(self.displacement) or any(spring.load for spring in self.springs)
+        return bool(self.displacement.any()) or any(spring.load for spring in self.springs)
+
+    @property
+    def has_rest(self) -> bool:
+        """Whether it comes to rest at all, stable or not."""
+        return len(self.displacement) > 0
 
     @property
     def limit_use(self) -> float | None:
@@ -220,7 +226,7 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
         solution = at_rest(with_share(mechanism, share, preload=1.0), last)
         springs, there = _springs(solution.balance), solution.balance.state
         known, last = (1.0, there) if solution.settled[0] else (math.nan, last)
-        displacements.append([known * c for c in _in_si(mechanism, there.platform.amounts()[0], parts)])
+        displacements.append(known * _in_si(mechanism, there.platform.amounts()[0], parts))
         loads.append([known * spring.load for spring in springs])
     return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in springs), np.array(loads))
 
@@ -249,9 +255,9 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
         slack_legs=slack,
         elastic=_clean_stiffness(springs_alone),
         tangent=_clean_stiffness(inverse(compliances[None])[0]),
-        compliance=clean_matrix(compliances.tolist()),
+        compliance=np.array(clean_matrix(compliances.tolist())),
         factor=None if math.isnan(stability.factor) else stability.factor,
-        mode=tuple((stability.mode * units)[parts].tolist()),
+        mode=(stability.mode * units)[parts],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
         residual=float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
@@ -289,7 +295,7 @@ def _springs(equations: Balance) -> list[SpringState]:
     return states
 
 
-def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple[float, ...] | None:
+def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array | None:
     """The displacement to first order: one step of Newton's method from the free state."""
     rows = np.array(response.compliance.rows(), dtype=float)
     if int(response.status) not in (Status.OK, Status.JOINT_LIMIT) or not np.isfinite(rows).all():
@@ -300,14 +306,14 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple
     return _in_si(mechanism, mechanism.ways @ step[:size], parts)
 
 
-def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float, ...]:
+def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> Array:
     """Components of a displacement in rad and m; round-off is set to zero."""
     moved = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
     cleaned = clean_screw(Twist(Vector(*moved[:3]), Vector(*moved[3:])), 1.0).components()
-    return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
+    return np.array(cleaned)[parts] * mechanism.twist_units[0, parts]
 
 
-def _clean_stiffness(stiffness: Array) -> list[list[float]] | None:
+def _clean_stiffness(stiffness: Array) -> Array | None:
     """A stiffness without round-off; None if no component has a finite stiffness.
 
     The entries of a direction in which springs hold nothing are round-off beside those of the others of its kind.
@@ -319,7 +325,7 @@ def _clean_stiffness(stiffness: Array) -> list[list[float]] | None:
     turning = np.arange(len(stiffness)) < (SIZE // 2 if len(stiffness) == SIZE else 1)
     largest = np.sqrt([diagonal[finite & (turning == kind)].max(initial=0.0) for kind in turning])
     negligible = np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest)
-    return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
+    return np.array(clean_matrix(np.where(negligible, 0.0, stiffness).tolist()))
 
 
 def _without_rest(state: MachineState) -> LoadedState:
@@ -330,9 +336,7 @@ def _without_rest(state: MachineState) -> LoadedState:
         return LoadedState(state, Rest.NO_REST, message, names)
     mode = (limit.stability.mode * state.mechanism.twist_units[0])[parts]
     legs = moving_legs(limit.balance, limit.stability) if mode.any() else []
-    return LoadedState(
-        state, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
-    )
+    return LoadedState(state, Rest.NO_REST, message, names, factor=limit.share, mode=mode, mode_legs=tuple(legs))
 
 
 def about_rest(state: MachineState, stability: Stability, slack: Sequence[str]) -> str:

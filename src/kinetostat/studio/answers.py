@@ -137,7 +137,7 @@ class Report:
     def answered(self) -> bool:
         """Whether there is something to show: the machine at rest if it is shown under its loads, else its K and C."""
         if self.loaded is not None or self.refused:
-            return self.loaded is not None and bool(self.loaded.displacement)
+            return self.loaded is not None and self.loaded.has_rest
         return self.analysis.status is Status.OK
 
 

@@ -94,7 +94,7 @@ def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
 
 def _loaded_lines(state: "LoadedState") -> Lines:
     yield "Pose", f"{pose_of(state.machine)}. {state.message}"
-    if state.displacement:
+    if state.has_rest:
         yield from loaded.loaded_lines(state)
     cables = state.machine.tables["cables"]
     if cables.linear_density or cables.pulley_radius:
@@ -102,7 +102,7 @@ def _loaded_lines(state: "LoadedState") -> Lines:
 
 
 def _loaded_parts(state: "LoadedState", full: bool) -> Iterator[Table | str]:
-    if not state.displacement:
+    if not state.has_rest:
         return
     display = state.machine.display
     yield loaded.displacement_table(state, display)
@@ -247,7 +247,7 @@ LOADED = Description(
     tables=lambda state, full: _filled_parts(_loaded_parts(state, full)),
     figures="views.loaded_figures.loaded_figures",
     state=lambda state: f"under load: {state.rest.word}",
-    answered=lambda state: bool(state.displacement),
+    answered=lambda state: state.has_rest,
     kept=lambda state: (
         state.rest is not solving.Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements)
     ),

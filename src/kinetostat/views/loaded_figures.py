@@ -53,7 +53,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Fi
         (6.6, 0.7 + 1.8 * (2 + len(kinds))),
         title.format(machine.name),
         setting_of(machine, []),
-        "thin lines: to first order" if state.linear else "",
+        "thin lines: to first order" if state.linear is not None else "",
     ) as figure:
         panels = list(figure.subplots(2 + len(kinds), 1, sharex=True, squeeze=False).flat)
         for panel, (rows, what, unit) in zip(panels, groups, strict=False):
@@ -188,7 +188,7 @@ def _first_order(panel: Axes, share: Array, values: Sequence[float], scale: Scal
 
 def loaded_figures(state: LoadedState) -> dict[str, Drawing]:
     """Return the curve over the growing load, and the shape; a machine without rest has neither."""
-    if not state.displacement:
+    if not state.has_rest:
         return {}
     growing = "Displacement and loads while the loads grow, beside the linear answer."
     shape = "The machine at rest under its loads over the machine without them."

@@ -4,6 +4,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.under_load import LoadedState, SpringState
@@ -127,10 +129,10 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
         return None
     display, names = state.machine.display, state.components
     columns = {
-        "1/C under load": [reciprocal(state.compliance[i][i]) for i in range(len(names))],
+        "1/C under load": [reciprocal(entry) for entry in np.diag(state.compliance).tolist()],
         "1/C free state": list(free),
-        "K under load": [state.tangent[i][i] for i in range(len(names))],
-        "of springs": [] if state.elastic is None else [state.elastic[i][i] for i in range(len(names))],
+        "K under load": np.diag(state.tangent).tolist(),
+        "of springs": [] if state.elastic is None else np.diag(state.elastic).tolist(),
         "K free state": list(stiff),
     }
     columns = {head: values for head, values in columns.items() if values}

@@ -43,7 +43,7 @@ class Draft:
     Attributes:
         name: of the study.
         machine: that it is about; None for the machine of the session.
-        variables, objectives, optimizer: tables as in a study file, changed in place by the form.
+        variables, objectives, constraints, poses, optimizer: tables as in a study file, changed in place by the form.
         rest: tables of a study file that the form does not show.
     """
 
@@ -51,6 +51,8 @@ class Draft:
     machine: Machine | None = None
     variables: list[dict[str, Any]] = field(default_factory=list)
     objectives: list[dict[str, Any]] = field(default_factory=lambda: [{"quantity": "compliance_sum"}])
+    constraints: list[dict[str, Any]] = field(default_factory=list)
+    poses: dict[str, Any] = field(default_factory=dict)
     optimizer: dict[str, Any] = field(
         default_factory=lambda: {
             "population": SEARCH.population, "generations": SEARCH.generations, "seed": SEARCH.seed,
@@ -72,6 +74,8 @@ class Draft:
             "machine": machine,
             "variables": self.variables,
             "objectives": [_without_none(table) for table in self.objectives],
+            "constraints": [_without_none(table) for table in self.constraints],
+            "poses": self.poses,
             "optimizer": _without_none(self.optimizer),
             **self.rest,
         }
@@ -100,11 +104,8 @@ class Draft:
 
     def unseen(self) -> list[str]:
         """Short descriptions of what the study has but the form does not show."""
-        poses = self.rest.get("poses", {})
-        parts = [f"poses over {', '.join(poses['over'])}"] if "over" in poses else []
-        parts += [_count_in_words(len(poses["list"]), "pose")] if "list" in poses else []
-        count = len(self.rest.get("constraints", []))
-        parts += [_count_in_words(count, "constraint")] if count else []
+        parts = [_count_in_words(len(self.poses["list"]), "pose")] if "list" in self.poses else []
+        parts += ["poses in the workspace"] if "within" in self.poses else []
         tolerances = sum("tolerance" in table for table in self.variables)
         return parts + ([_count_in_words(tolerances, "tolerance")] if tolerances else [])
 
@@ -116,13 +117,15 @@ def _count_in_words(count: int, noun: str) -> str:
 def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
     """Return a draft of a study that has been read; `machine` None stands for the machine of the session."""
     tables = study.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
-    known = ("schema", "name", "machine", "set", "variables", "objectives", "optimizer")
+    known = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
     search = {key: getattr(study.optimizer, key) for key in ("population", "generations", "seed")}
     return Draft(
         study.name,
         machine,
         tables["variables"],
         tables["objectives"],
+        tables.get("constraints", []),
+        tables.get("poses", {}),
         {**search, **tables.get("optimizer", {})},
         {key: value for key, value in tables.items() if key not in known},
     )

@@ -1,7 +1,7 @@
-"""Searches, each in its own process and folder: start, stop, go on, list, delete; and what that process does.
+"""Searches, each in its own process and folder: start, stop, go on, list, delete.
 
-The process is `worker`. It ends after its present step when its standard input is closed, which also happens when the
-server that started it dies: no search runs on unnoticed.
+What the process does stands in `worker`. It ends after its present step when its standard input is closed, which also
+happens when the server that started it dies: no search runs on unnoticed.
 """
 
 import json
@@ -16,12 +16,11 @@ from pathlib import Path
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
-from kinetostat.studies.storage import write_text
+from kinetostat.studies.optimisation.search import begin_search
 from kinetostat.studies.study_folder import holds_study, in_use, read_history, read_question
 from kinetostat.studio.design.state_folder import RUNS, numbered_entries, slug
+from kinetostat.studio.design.worker import FAILURE
 from kinetostat.studio.processes import make_modest
-from kinetostat.views.optimisation import write_result
 
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""
@@ -29,9 +28,6 @@ MOST_RUNS = 60
 """Searches that are kept."""
 WORKER = "kinetostat.studio.design.worker"
 RESULT = "result.json"
-FAILURE = "failed.txt"
-"""File in the folder of a search that could not go on, with the reason."""
-
 
 UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError)
 """Exceptions that reading a damaged folder of a search may raise."""
@@ -251,29 +247,3 @@ def _started_worker() -> subprocess.Popen[bytes]:
     process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     make_modest(process.pid)
     return process
-
-
-def work() -> None:
-    """Search on from the records in a folder and write the result so far: what the process of a search does.
-
-    The folder is the first line of the standard input, once a search needs the process; none may ever come.
-    """
-    line = sys.stdin.buffer.readline()
-    if not line:
-        return
-    folder, stopped = Path(json.loads(line)), threading.Event()
-    threading.Thread(target=_listen, args=(stopped,), daemon=True).start()
-    try:
-        write_result(optimize(stored_problem(folder), folder, stop=stopped.is_set), folder)
-    except InputError as error:
-        if not in_use(folder):  # otherwise another process is at work here, and the search is not a failure
-            write_text(folder / FAILURE, str(error))
-    except Exception as error:
-        write_text(folder / FAILURE, f"The search ended with an error of the program: {error!r}")
-        raise
-
-
-def _listen(stopped: threading.Event) -> None:
-    """Wait until standard input is closed, then ask the search to stop after its step."""
-    sys.stdin.buffer.read()
-    stopped.set()

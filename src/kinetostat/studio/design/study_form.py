@@ -36,11 +36,14 @@ Change: TypeAlias = events.ValueChangeEventArguments[Any]
 NEW, SENT = "new", "sent"
 METHODS = {1: ["genetic", "gradient", "hybrid"], 2: ["nsga2"]}
 """Methods of search by the number of objectives, the usual one first."""
+BOUNDS = {"at_least": "at least", "at_most": "at most"}
+POSES = "x=-2 cm:2 cm:5, y=-2 cm:2 cm:5"
+ABOUT_POSES = "from, to and number of each coordinate; empty for the pose of the machine alone; the worst pose counts"
 GOALS = {"minimize": "minimise", "maximize": "maximise"}
 
 
 class StudyForm:
-    """Variables with bounds, objectives, and the search; other tables of a study are carried along and named."""
+    """Variables, objectives, constraints, poses and the search; other tables of a study are carried along and named."""
 
     def __init__(self, session: Session, start: Callable[[Draft], None]) -> None:
         """Build the form, with a new study for the machine of the session.
@@ -141,6 +144,12 @@ class StudyForm:
                 self._objective(place, table)
             if len(self.draft.objectives) < MOST_OBJECTIVES:
                 self._add("add an objective", "study-add-objective", self._add_objective)
+            ui.html("<h3>Constraints</h3>", sanitize=False)
+            for place, table in enumerate(self.draft.constraints):
+                self._constraint(place, table)
+            self._add("add a constraint", "study-add-constraint", self._add_constraint)
+            ui.html("<h3>Poses</h3>", sanitize=False)
+            self._poses()
             ui.html("<h3>Search</h3>", sanitize=False)
             self._search()
             if unseen := self.draft.unseen():
@@ -220,17 +229,67 @@ class StudyForm:
             goal.props('dense options-dense outlined aria-label="goal"').classes("field").mark(
                 f"objective {place} goal"
             )
-            what = ui.select(terms, value=name, with_input=True, on_change=partial(self._aim, table, "quantity"))
-            what.props('dense options-dense outlined aria-label="objective"').classes("field grow")
-            what.mark(f"objective {place} quantity")
+            self._quantity(table, terms, "objective", place)
             if len(self.draft.objectives) > 1:
                 self._remove(partial(self._drop, self.draft.objectives, place), "Remove", f"objective {place} remove")
-        if needs_direction(name):
+        self._direction(table, "objective", place)
+
+    def _quantity(self, table: dict[str, Any], terms: list[str], what: str, place: int) -> None:
+        box = ui.select(
+            terms, value=str(table["quantity"]), with_input=True, on_change=partial(self._aim, table, "quantity")
+        )
+        box.props(f'dense options-dense outlined aria-label="{what}"').classes("field grow")
+        box.mark(f"{what} {place} quantity")
+
+    def _direction(self, table: dict[str, Any], what: str, place: int) -> None:
+        if needs_direction(str(table["quantity"])):
             with ui.element("div").classes("form-row"):
                 ui.label("direction x, y, z").classes("form-name")
                 direction = ", ".join(f"{entry:g}" for entry in table.get("direction") or ())
                 box = ui.input(value=direction, on_change=partial(self._direct, table)).classes("form-text wide")
-                box.props('dense borderless aria-label="direction"').mark(f"objective {place} direction")
+                box.props('dense borderless aria-label="direction"').mark(f"{what} {place} direction")
+
+    def _constraint(self, place: int, table: dict[str, Any]) -> None:
+        """A quantity and its bound, which is typed with its unit, as in a file."""
+        with ui.element("div").classes("form-aim"):
+            self._quantity(table, known_terms(self._machine), "constraint", place)
+            drop = partial(self._drop, self.draft.constraints, place)
+            self._remove(drop, "Remove", f"constraint {place} remove")
+        self._direction(table, "constraint", place)
+        with ui.element("div").classes("form-aim"):
+            key = next(key for key in BOUNDS if key in table)
+            side = ui.select(BOUNDS, value=key, on_change=partial(self._turn, table))
+            side.props('dense options-dense outlined aria-label="side"').classes("field")
+            side.mark(f"constraint {place} side")
+            box = ui.input(value=str(table[key]), on_change=partial(self._limit, table))
+            box.props('dense borderless aria-label="bound"').classes("form-text wide").mark(f"constraint {place} bound")
+
+    @staticmethod
+    def _turn(table: dict[str, Any], event: Change) -> None:
+        """Make an upper bound of a lower one, or the other way."""
+        former = next(key for key in BOUNDS if key in table)
+        table[str(event.value)] = table.pop(former)
+
+    @staticmethod
+    def _limit(table: dict[str, Any], event: Change) -> None:
+        table[next(key for key in BOUNDS if key in table)] = _number(str(event.value))
+
+    def _add_constraint(self) -> None:
+        self.draft.constraints.append({"quantity": "singularity_margin", "at_least": 0.1})
+        self._fill()
+
+    def _poses(self) -> None:
+        """The grid of poses at which designs are judged; empty for the pose of the machine alone."""
+        box = ui.input("ranges", value=", ".join(self.draft.poses.get("over", [])), placeholder=POSES)
+        box.props("dense outlined stack-label").classes("field").mark("study-poses").tooltip(ABOUT_POSES)
+        box.on_value_change(self._range)
+
+    def _range(self, event: Change) -> None:
+        ranges = [part.strip() for part in str(event.value).split(",") if part.strip()]
+        self.draft.poses.pop("over", None)
+        if ranges:
+            self.draft.poses.pop("list", None)
+            self.draft.poses["over"] = ranges
 
     def _aim(self, table: dict[str, Any], key: str, event: Change) -> None:
         if not event.value:

@@ -202,7 +202,7 @@ def load_text(analysis: Analysis) -> str:
 def loaded_text(state: LoadedState) -> str:
     """The state of rest: its verdict, a bar for each leg, displacement, springs, and how stiff it is now."""
     display, units = state.machine.display, ["rad" if name.startswith("r") else "m" for name in state.components]
-    linear: Sequence[float | None] = state.linear or [None] * len(units)
+    linear = [None] * len(units) if state.linear is None else state.linear.tolist()
     moved = [
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)

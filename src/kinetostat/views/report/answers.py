@@ -130,13 +130,13 @@ def loaded_section(state: LoadedState, answers: Answers) -> Section:
 
 def verdict_of(state: LoadedState) -> Paragraph:
     """Say whether the machine is at rest, what is special about that, and how far its loads may grow."""
-    stability = f" {stability_of(state)}" if state.displacement else ""
+    stability = f" {stability_of(state)}" if state.has_rest else ""
     return Paragraph(typeset(f"{state.message}{stability}"), f"Under load, {state.rest.word}:")
 
 
 def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield verdict_of(state)
-    if not state.displacement:
+    if not state.has_rest:
         return
     display = state.machine.display
     displacements = displacement_table(state, display)

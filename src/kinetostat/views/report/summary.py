@@ -39,7 +39,7 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     """Write the summary, with the requirements and a picture of the machine."""
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
     state = answers.of("under_load")
-    loaded = state is not None and bool(state.displacement)
+    loaded = state is not None and state.has_rest
     free = [(label, text) for label, text in first_lines(answers.analysis) if not loaded or label in LINES_OF_THE_POSE]
     at_rest = [(label, text) for label, text in loaded_lines(state) if label != "Stability"] if loaded else []
     lines = [*free[:1], *at_rest, *free[1:]]

@@ -180,7 +180,7 @@ def loaded_overlays(
         sizes: of the machine.
         factor: of exaggeration; None to choose a round one.
     """
-    if not state.displacement:
+    if not state.has_rest:
         return [], None
     response = state.state.free
     moved = motions_of(state, response)
