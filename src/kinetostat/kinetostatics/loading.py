@@ -99,7 +99,7 @@ def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
 
 
 def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
-    """The wrench in every joint: that of its leg (links have no weight here), referred to the joint's own point.
+    """The wrench in every joint: that of its leg (without the weight of links), referred to the joint's own point.
 
     A joint that an actuator or a flexure holds passes on the whole wrench: along its freedom the load of that spring,
     and across it the load of its bearings or its guide.
