@@ -15,7 +15,7 @@ pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not insta
 
 from kinetostat.studio.controls import PANELS, STEPS
 from kinetostat.studio.session import Memory, Session
-from kinetostat.studio.wording import shown_value
+from kinetostat.studio.wording import full_label, shown_value
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -177,3 +177,14 @@ def test_the_last_position_of_a_stiffness_is_rigid(session):
     session.slide("stiffness.passive_links", STEPS)
     assert math.isinf(session.value("stiffness.passive_links.0"))
     assert session.controls["stiffness.passive_links"].position_of(math.inf) == STEPS
+
+
+@pytest.mark.parametrize("name", ["tripteron", "hexapod-hardware", "cogiro", "hexapod"])
+def test_every_number_says_of_which_leg_and_joint_it_is(name):
+    offered = Session(Memory(load(name), name)).controls
+    names = [full_label(control.parameter) for control in offered.values()]
+    assert len(set(names)) == len(names)
+    for path, control in offered.items():
+        if path.startswith("legs."):
+            leg, joint = path.split(".")[1:3]
+            assert f"{leg}, {joint}" in control.group
