@@ -4,7 +4,7 @@ A controller commands carriages by the drawn machine. The probe finds the comman
 touches the bed.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,10 @@ PROBED += [(0.045 * np.cos(a), 0.045 * np.sin(a)) for a in turns(3, 0.0)]
 """Ten places on the bed, m."""
 
 
+ENDSTOPS = np.array([0.24, 0.24, 0.24])
+"""Heights of the nozzle at which the controller believes its carriages to be at their endstops, m."""
+
+
 @dataclass
 class Truth:
     """Errors of a printer, m and rad: by tower, or of all."""
@@ -33,6 +37,18 @@ class Truth:
     lean_out: np.ndarray = field(default_factory=lambda: np.zeros(3))
     lean_aside: np.ndarray = field(default_factory=lambda: np.zeros(3))
     gain: float = 0.0
+
+
+def firmware_truth(truth):
+    """The numbers of `FirmwareNumbers`, from the true printer, mm and deg."""
+    radius, rod = RADIUS - PLATFORM, ROD
+    rises = np.sqrt(rod**2 - radius**2) - np.sqrt((rod + truth.rod) ** 2 - (radius + truth.radius) ** 2)
+    return {
+        "radius": [1e3 * (radius + truth.radius)],
+        "rods": [1e3 * (rod + truth.rod)] * 3,
+        "angles": np.degrees(truth.angles).tolist(),
+        "raised": (1e3 * (truth.zeros + rises)).tolist(),
+    }
 
 
 def commanded(point):
@@ -68,6 +84,26 @@ def probed_heights(truth):
             z -= reached(commanded(np.array([x, y, z])), truth, [x, y, 0.0])[2]
         result.append(z)
     return np.array(result)
+
+
+def endstops(truth):
+    """True heights of the carriages at their endstops, m."""
+    return ENDSTOPS + np.sqrt(ROD**2 - (RADIUS - PLATFORM) ** 2) + HEIGHT + truth.zeros
+
+
+def sent_height(truth, numbers, believed, true, place):
+    """Height of the true nozzle that a controller sends to a place of the bed, m.
+
+    Args:
+        numbers: of the controller: its delta radius, lengths of rods, and angles of towers, m and rad.
+        believed, true: heights of the carriages at their endstops, m.
+        place: x and y, m.
+    """
+    radius, rods, angles = numbers
+    towers = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    wanted = np.sqrt(rods**2 - ((towers - place) ** 2).sum(axis=1))
+    carriages = true + wanted - believed
+    return reached(carriages, replace(truth, zeros=np.zeros(3)), [*place, 0.0])[2]
 
 
 def write_probes(path, heights):

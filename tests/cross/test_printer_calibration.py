@@ -16,12 +16,20 @@ from kinetostat.studies.identification.firmware import firmware_numbers, klipper
 from kinetostat.studies.identification.fit import Wishes, best_fit
 from kinetostat.studies.identification.identification import PREFERENCE, _sizes_by_name, identification_of
 from kinetostat.studies.identification.measurements import Sigmas, read_measurements
-from synthetic_printer import ANGLES, HEIGHT, PLATFORM, PROBED, ROD, Truth, probed_heights, reached, write_probes
+from synthetic_printer import (
+    ANGLES,
+    ENDSTOPS,
+    PROBED,
+    Truth,
+    endstops,
+    firmware_truth,
+    probed_heights,
+    sent_height,
+    write_probes,
+)
 
 NOISE = 20e-6
 TIES = {"radius": "geometry.tower_radius.*", "rod": "geometry.rod_length.*"}
-ENDSTOPS = np.array([0.24, 0.24, 0.24])
-"""Heights of the nozzle at which the controller believes its carriages to be at their endstops, m."""
 FITTED = ("zeros", "geometry.tower_angles.0", "geometry.tower_angles.1")
 PRIORS = {
     "zeros": "0.3 mm", "geometry.tower_angles.*": "4 mrad", "radius": "0.3 mm", "rod": "0.3 mm",
@@ -48,18 +56,6 @@ def numbers_of(truth):
         result |= {f"geometry.{name}.{i}": value for i, value in enumerate(getattr(truth, name))}
     result |= {f"geometry.tower_angles.{i}": value for i, value in enumerate(truth.angles)}
     return result | {"radius": truth.radius, "rod": truth.rod, "scale": truth.gain}
-
-
-def firmware_truth(truth):
-    """The numbers of `FirmwareNumbers`, from the true printer, mm and deg."""
-    radius, rod = 0.1456 - PLATFORM, ROD
-    rises = np.sqrt(rod**2 - radius**2) - np.sqrt((rod + truth.rod) ** 2 - (radius + truth.radius) ** 2)
-    return {
-        "radius": [1e3 * (radius + truth.radius)],
-        "rods": [1e3 * (rod + truth.rod)] * 3,
-        "angles": np.degrees(truth.angles).tolist(),
-        "raised": (1e3 * (truth.zeros + rises)).tolist(),
-    }
 
 
 @pytest.fixture(scope="module")
@@ -154,18 +150,9 @@ def test_a_printer_without_noise_gives_its_numbers_and_firmware_that_prints_flat
     numbers = firmware_numbers(answer)
     for name, true in firmware_truth(truth).items():
         assert np.atleast_1d(getattr(numbers, name)) == pytest.approx(true, abs=2e-3), name
-    nominal = np.sqrt(ROD**2 - (0.1456 - PLATFORM) ** 2)
-    triggers = ENDSTOPS + nominal + HEIGHT + truth.zeros  # true heights of the carriages at their endstops
+    triggers = endstops(truth)
     radius, rods, angles = numbers.radius / 1e3, np.array(numbers.rods) / 1e3, ANGLES + np.radians(numbers.angles)
     own = np.sqrt(rods**2 - radius**2)
-
-    def height(x, y, believed_at_home, true_at_home):
-        """Height of the true nozzle that is sent to the bed at a place."""
-        towers = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        wanted = np.sqrt(rods**2 - ((towers - [x, y]) ** 2).sum(axis=1))
-        carriages = true_at_home + wanted - believed_at_home - HEIGHT
-        return reached(carriages + HEIGHT, replace(truth, zeros=np.zeros(3)), [x, y, 0.0])[2]
-
     marlin, marlin_height = numbers.marlin_endstops
     reprap, reprap_height = numbers.reprap_endstops
     homes = {
@@ -174,7 +161,7 @@ def test_a_printer_without_noise_gives_its_numbers_and_firmware_that_prints_flat
         "reprapfirmware": (ENDSTOPS + reprap_height / 1e3 + own + np.array(reprap) / 1e3, triggers),
     }
     for firmware, (believed, true) in homes.items():
-        heights = [height(x, y, believed, true) for x, y in PROBED]
+        heights = [sent_height(truth, (radius, rods, angles), believed, true, place) for place in PROBED]
         assert np.abs(heights).max() < 1e-6, firmware
     assert max(marlin) == 0.0
     assert sum(reprap) == pytest.approx(0.0, abs=1e-12)

@@ -102,7 +102,7 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     unit = bars[0][1].unit
     heights = np.array([_numbers(bar) for _, bar, _ in bars])
     dots = np.array([_numbers(dot) if dot else [math.nan] * count for _, _, dot in bars])
-    scale = display.scale(unit)
+    scale = display.fitting(unit, [*heights.flat, *dots.flat])
     heights, dots = heights * scale.factor, dots * scale.factor
     width = 0.8 / count
     positive = heights[np.isfinite(heights) & (heights > 0.0)]

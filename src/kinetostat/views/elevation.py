@@ -212,7 +212,8 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
     panels = [panel for panel in panels if any(np.isfinite(values).any() for _, _, values in panel[2])]
     rows = -(-len(panels) // 2)
     heights = display.scale("rad")
-    with new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), setting_of(answer.machine)) as figure:
+    notes = setting_of(answer.machine), "dotted lines: loads reverse" if answer.reversals else ""
+    with new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), *notes) as figure:
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
         for panel, (what, unit, curves) in zip(axes, panels, strict=False):
             small = what.startswith(("displacement", "rotation", "error", "correction"))
@@ -240,7 +241,7 @@ def _finish(panel: Axes, answer: Elevation, label: str, factor: float, reverses:
         for each in answer.reversals:
             panel.axvline(each.elevation * factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
     if any(line.get_label() and not str(line.get_label()).startswith("_") for line in panel.get_lines()):
-        panel.legend(ncols=2, fontsize=6.5)
+        panel.legend(ncols=2, fontsize=6.5, frameon=True, framealpha=0.85, edgecolor="none")
 
 
 ELEVATION = Description(

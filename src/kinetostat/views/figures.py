@@ -23,6 +23,7 @@ from matplotlib.transforms import Bbox
 
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import entry_name, names_entries
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
@@ -280,10 +281,22 @@ def note_setting(figure: Figure, *lines: str) -> None:
     figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
 
 
+def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> str:
+    """How many poses have no result, and why; empty where all have one.
+
+    Args:
+        counts: of poses by their status.
+        poses: number of all.
+        shown: how the figure shows them, in brackets.
+    """
+    words = {status.word.replace("_", " "): count for status, count in counts.items()}
+    why = ", ".join(words if len(words) == 1 else (f"{word}: {count:,}" for word, count in words.items()))
+    return f"no result{shown} at {sum(words.values()):,} of {poses:,} poses ({why})" if words else ""
+
+
 def setting_lines(dataset: xr.Dataset) -> tuple[str, str, str]:
     """Frame and pose of a grid, loads that do not count, and how many of its poses have no result."""
-    counts = [f"{status.word.replace('_', ' ')}: {count:,}" for status, count in failures(dataset).items()]
-    missing = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses" if counts else ""
+    missing = missing_line(failures(dataset), dataset["status"].size)
     where = "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text)
     return where, dataset.attrs.get(LOADS_LEFT_OUT, ""), missing
 

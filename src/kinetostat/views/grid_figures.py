@@ -26,6 +26,7 @@ from kinetostat.views.figures import (
     curves,
     fill_regions,
     look_of,
+    missing_line,
     new_figure,
     region_colours,
     set_axis_scales,
@@ -154,6 +155,6 @@ def _shade(panel: Axes, numbers: Integers) -> None:
 
 
 def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
-    counts = [f"{status.word.replace('_', ' ')}: {len(numbers):,}" for status, numbers in answers.failures.items()]
-    missing = f"no result (grey) at {', '.join(counts)} of {answers.poses.count:,} poses" if counts else ""
+    counts = {status: len(numbers) for status, numbers in answers.failures.items()}
+    missing = missing_line(counts, answers.poses.count, " (grey)")
     return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing

@@ -90,8 +90,9 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
         panel.fill_between(speeds, widths, 2.0 * top, color=COLOURS[1], alpha=0.18, linewidth=0.0)
         panel.plot(speeds, widths, color=COLOURS[1])
         panel.axhline(answer.least * scale.factor, color=COLOURS[0], linewidth=0.8, linestyle="--")
-        panel.text(0.99, answer.least * scale.factor, "stable at every speed below", color=COLOURS[0], fontsize="small",
-                   ha="right", va="top", transform=panel.get_yaxis_transform())  # fmt: skip
+        panel.annotate("stable at every speed below", (0.99, answer.least * scale.factor), (0, -3), color=COLOURS[0],
+                       fontsize="small", ha="right", va="top", xycoords=panel.get_yaxis_transform(),
+                       textcoords="offset points")  # fmt: skip
         panel.text(0.02, 0.95, "chatters", color=COLOURS[1], transform=panel.transAxes, va="top")
         panel.set_xlim(float(speeds[0]), float(speeds[-1]))
         panel.set_ylim(0.0, top)
