@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.text import Text
 
-from kinetostat.display import Display
+from kinetostat.display import Display, Scale, number
 from kinetostat.studies.comparison import Comparison, SoftDirection
 from kinetostat.studies.design_numbers import Better, DesignRow
 from kinetostat.studies.requirements import Verdict
@@ -128,17 +128,18 @@ def _row_table(
         if row.group != group:
             table.add_section()
             group = row.group
-        unit = "" if row.unit == "1" else f" {display.scale(row.unit).unit}"
+        scale = display.fitting(row.unit, [value for value in row.values if value is not None])
         name = f"{row.group} {row.name}" if by_group else row.name
-        table.add_row(f"{name}{unit}", *(_cell(row, i, display) for i in range(len(letters))))
+        cells = (_cell(row, i, scale, display.digits) for i in range(len(letters)))
+        table.add_row(f"{name} {scale.head}".rstrip(), *cells)
     return table
 
 
-def _cell(row: DesignRow, i: int, display: Display) -> Text:
+def _cell(row: DesignRow, i: int, scale: Scale, digits: int) -> Text:
     """Return a value and its change against the first design; green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
-    value, percent = display.number(row.values[i], row.unit, endless), row.percents[i]
-    shown = Text(value, "bold" if i in row.best else "")
+    value, percent = row.values[i], row.percents[i]
+    shown = Text(number(value and value * scale.factor, endless, digits), "bold" if i in row.best else "")
     if i == 0 or percent is None:
         return Text.assemble(shown, "" if i == 0 else " " * 9)
     better = (percent < 0.0) == (row.better is Better.LESS)

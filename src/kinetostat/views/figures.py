@@ -282,7 +282,7 @@ def note_setting(figure: Figure, *lines: str) -> None:
 
 
 def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> str:
-    """How many poses have no result, and why; empty where all have one.
+    """Say how many poses have no result, and why; empty where all have one.
 
     Args:
         counts: of poses by their status.

@@ -129,15 +129,15 @@ def loaded_section(state: LoadedState, answers: Answers) -> Section:
 
 
 def verdict_of(state: LoadedState) -> Paragraph:
-    """Say whether the machine is at rest, what is special about that, and how far its loads may grow."""
-    stability = f" {stability_of(state)}" if state.has_rest else ""
-    return Paragraph(typeset(f"{state.message}{stability}"), f"Under load, {state.rest.word}:")
+    """Say whether the machine is at rest, and what is special about that."""
+    return Paragraph(typeset(state.message), f"Under load, {state.rest.word}:")
 
 
 def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield verdict_of(state)
     if not state.has_rest:
         return
+    yield Paragraph(typeset(stability_of(state)), "Stability:")
     display = state.machine.display
     displacements = displacement_table(state, display)
     yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")

@@ -41,7 +41,7 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     state = answers.of("under_load")
     loaded = state is not None and state.has_rest
     free = [(label, text) for label, text in first_lines(answers.analysis) if not loaded or label in LINES_OF_THE_POSE]
-    at_rest = [(label, text) for label, text in loaded_lines(state) if label != "Stability"] if loaded else []
+    at_rest = [*loaded_lines(state)] if loaded else []
     lines = [*free[:1], *at_rest, *free[1:]]
     answer: list[Block] = [Paragraph(typeset(text), f"{label}:") for label, text in lines]
     answer[1:1] = [verdict_of(state)] if state else []
