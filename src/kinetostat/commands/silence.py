@@ -103,7 +103,7 @@ def spoken_silence(words: str) -> Iterator[SilenceWatch | None]:
     output, terminal = sys.stdout, sys.stderr
     watch = SilenceWatch(terminal, words)
     heard = HeardStream(output, watch.end), HeardStream(terminal, watch.hear)
-    sys.stdout, sys.stderr = heard  # type: ignore[assignment]
+    sys.stdout, sys.stderr = heard
     try:
         yield watch
     finally:
