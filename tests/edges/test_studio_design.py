@@ -140,6 +140,7 @@ def test_stopped_reloaded_resumed_and_deleted(tmp_path):
         await page.send("run-delete", "click")
         await page.send("confirm-yes", "click")
         assert page.one("run-choice").options == {}
+        assert not page.one("run-load").enabled, "there is no best design yet"
 
     on_page(steps, state=tmp_path)
 
@@ -209,6 +210,7 @@ def test_variables_and_objectives_can_be_taken_out():
         await page.send("study-start", "click")
         assert "optimizer.seed" in page.one("study-problem").text
         assert page.one("run-choice").options == {}
+        assert not page.one("run-load").enabled, "there is no best design yet"
 
     on_page(steps)
 
