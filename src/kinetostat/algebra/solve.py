@@ -20,13 +20,14 @@ Row = list[Scalar]
 class _Triangular:
     """Q^T V = R for given vectors V: `vectors` holds R by columns.
 
-    Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot. Q is the
-    product of the `reflections`. `least` is the smallest pivot, 0 where the vectors are dependent.
+    Vector `order[k]` ends in row `pivots[k]`, whose entry has the reciprocal `shrink[k]`; `free` are the rows without a
+    pivot. Q is the product of the `reflections`. `least` is the smallest pivot, 0 where the vectors are dependent.
     """
 
     vectors: list[Row]
     order: list[int]
     pivots: list[int]
+    shrink: Row
     free: list[int]
     least: Scalar
     reflections: list["_Reflection"]
@@ -49,12 +50,11 @@ class _Triangular:
         size = range(len(self.order))
         steps: list[Row] = [[] for _ in size]
         for k in size:
-            here, pivot = self.order[k], self.pivots[k]
-            shrink = reciprocal(self.vectors[here][pivot])
+            here = self.order[k]
             above = [(self.vectors[here][self.pivots[i]], steps[i]) for i in range(k)]
             for j in size:
                 known = total([factor * step[j] for factor, step in above])
-                steps[k].append(weighted(shrink, (1.0 if j == here else 0.0) - known))
+                steps[k].append(weighted(self.shrink[k], (1.0 if j == here else 0.0) - known))
         return steps
 
 
@@ -164,6 +164,7 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     waiting, free = list(range(len(vectors))), list(range(len(vectors[0])))
     order: list[int] = []
     pivots: list[int] = []
+    shrink: Row = []
     least: Scalar = math.inf
     reflections: list[_Reflection] = []
     while waiting:
@@ -175,20 +176,27 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
             reflections.append(_reflection(reduced[here], filled))
             for other in waiting:
                 reflections[-1].apply(reduced[other])
+            shrink.append(reflections[-1].shrink)
+        else:
+            shrink.append(reciprocal(reduced[here][filled[0]]))
         order.append(here)
         pivots.append(filled[0])
         free.remove(filled[0])
         least = smaller(least, abs(reduced[here][filled[0]]))
-    return _Triangular(reduced, order, pivots, free, least, reflections)
+    return _Triangular(reduced, order, pivots, shrink, free, least, reflections)
 
 
 @dataclass(frozen=True)
 class _Reflection:
-    """A reflection of some rows: what it subtracts is the product with `normal`, times `weight`, of the normal."""
+    """A reflection of some rows: what it subtracts is the product with `normal`, times `weight`, of the normal.
+
+    `shrink` is the reciprocal of the pivot that it leaves.
+    """
 
     rows: list[int]
     normal: Row
     weight: Scalar
+    shrink: Scalar
 
     def apply(self, other: Row) -> None:
         """Reflect a vector in place."""
@@ -206,7 +214,8 @@ def _reflection(column: Row, rows: list[int]) -> _Reflection:
     for i in rows:
         column[i] = 0.0
     column[rows[0]] = pivot
-    return _Reflection(rows, normal, reciprocal(pivot * -normal[0]))
+    weight = reciprocal(pivot * -normal[0])
+    return _Reflection(rows, normal, weight, weight * -normal[0])  # one division for both
 
 
 def _identity(size: int) -> list[Row]:

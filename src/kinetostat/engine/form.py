@@ -13,7 +13,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, where
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.engine.trace import Body, Graph, Operand, Traced
+from kinetostat.engine.trace import ORDINARY_SIZE, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.equilibrium.state import MachineState
@@ -35,9 +35,6 @@ from kinetostat.motion.rigid import MotionPlan, mechanism_over_scalars, plan_of
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
 from kinetostat.vibration.slopes import vibrating
-
-ORDINARY_PARAMETER = (1e-25, 1e25)
-"""Bounds of ordinary parameters: what a handful of them make is neither zero nor infinite by a wide margin."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,7 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
         if place == len(numbers):
             numbers.append(value if alone else abs(value))
         uses.append((path, place, value < 0.0 and not alone))
-    ordinary = tuple(ORDINARY_PARAMETER[0] < number < ORDINARY_PARAMETER[1] for number in numbers)
+    ordinary = tuple(ORDINARY_SIZE[0] < number < ORDINARY_SIZE[1] for number in numbers)
     turning = tuple(path for path in varying if path in angles)
     return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
 
@@ -151,7 +148,7 @@ class TracedMachine:
 def traced_machine(kind: Specimen, form: Form) -> TracedMachine:
     """Make a machine of this kind with the inputs of a form, in a new graph."""
     graph = Graph()
-    fixed = tuple(graph.input(True, ORDINARY_PARAMETER if ordinary else None) for ordinary in form.inputs)
+    fixed = tuple(graph.input(True, ORDINARY_SIZE if ordinary else None) for ordinary in form.inputs)
     columns = {path: graph.input() for path in form.varying}
     used = {path: -fixed[place] if negative else fixed[place] for path, place, negative in form.uses}
     machine = with_values(kind.machine, {**dict(form.constant), **used, **columns})

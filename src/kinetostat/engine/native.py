@@ -2,12 +2,13 @@
 
 Values that depend on fixed inputs alone are computed before the loop. No optimisation passes are run: the graph has no
 repetitions, and on the 4-dof machine (1300 operations) passes gained nothing over the code generator alone, which takes
-50 ms. Operations stay in the order of tracing: compared with an order by depth, a tenth fewer values wait in memory.
+50 ms. Operations that free registers come first: compared with the order of tracing, fewer values wait in memory.
 """
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -98,7 +99,7 @@ def source(body: Body, lanes: int) -> str:
         before += _pointer("column", k)
         inside.append(f"%at.column{k} = getelementptr double, ptr %column{k}, i64 %i")
         inside.append(f"%v{given.number} = load {numbers}, ptr %at.column{k}, align 8")
-    used = needed_nodes([*body.results, body.code])
+    used = freeing_first(needed_nodes([*body.results, body.code]))
     for node in used:
         if node.fixed and node.operation != "input":
             before.append(line(node, [name_of(operand, 1) for operand in node.operands], 1))
@@ -114,6 +115,50 @@ def source(body: Body, lanes: int) -> str:
     inside.append(f"store <{lanes} x i8> %code, ptr %at.code, align 1")
     texts = {"before": "\n  ".join(before), "inside": "\n  ".join(inside)}
     return FUNCTION.format(declarations=declarations(lanes), name=NAME, lanes=lanes, **texts)
+
+
+def freeing_first(nodes: Sequence[Node]) -> list[Node]:
+    """Order nodes so that few values wait for their use: of those that can be next, what uses up most values.
+
+    Among equals the order of tracing decides. Values that are computed before the loop count for nothing.
+
+    Args:
+        nodes: all that are needed, operands before what uses them.
+    """
+    inside = [node for node in nodes if not node.fixed and node.operation != "input"]
+    operands = {node: {o for o in node.operands if isinstance(o, Node) and not o.fixed} for node in inside}
+    users: dict[Node, list[Node]] = {node: [] for node in nodes}
+    for node in inside:
+        for operand in operands[node]:
+            users[operand].append(node)
+    uses = {node: len(users[node]) for node in nodes}
+    missing = {node: sum(o.operation != "input" for o in operands[node]) for node in inside}
+    done: set[Node] = set()
+    waiting = [(-_used_up(operands[node], uses), node.number, node) for node in inside if not missing[node]]
+    heapify(waiting)
+    order = [node for node in nodes if node.fixed or node.operation == "input"]
+    while waiting:
+        _, _, node = heappop(waiting)
+        if node in done:  # it has come to use up more since it was entered, and was entered again
+            continue
+        done.add(node)
+        order.append(node)
+        for user in users[node]:
+            missing[user] -= 1
+            if not missing[user]:
+                heappush(waiting, (-_used_up(operands[user], uses), user.number, user))
+        for operand in operands[node]:
+            uses[operand] -= 1
+            if uses[operand] == 1:
+                last = next(user for user in users[operand] if user not in done)
+                if not missing[last]:
+                    heappush(waiting, (-_used_up(operands[last], uses), last.number, last))
+    return order
+
+
+def _used_up(operands: Collection[Node], uses: Mapping[Node, int]) -> int:
+    """Count the operands that have no further use."""
+    return sum(uses[operand] == 1 for operand in operands)
 
 
 def _vector(operand: Operand, lanes: int) -> str:

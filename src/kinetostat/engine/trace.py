@@ -20,6 +20,10 @@ ORDINARY = (1e-280, 1e280)
 """Bounds beyond which nothing is known: rounding and a few more operations lead from them to no end of float64."""
 
 
+ORDINARY_SIZE = (1e-25, 1e25)
+"""Bounds of ordinary numbers: what a handful of them make is neither zero nor infinite by a wide margin."""
+
+
 class Node:
     """One value of a graph: an operation and its operands. Two equal values of one graph are the same object.
 
@@ -29,9 +33,10 @@ class Node:
         number: position in the graph; operands have smaller ones.
         fixed: whether it depends on inputs alone that are the same at all points.
         bounds: between which positive numbers it is known to lie; None if it may be anything.
+        finite: whether a formula has said that it is finite, whatever its arithmetic shows.
     """
 
-    __slots__ = ("bounds", "fixed", "graph", "number", "operands", "operation")
+    __slots__ = ("bounds", "finite", "fixed", "graph", "number", "operands", "operation")
 
     def __init__(
         self, graph: "Graph", operation: str, operands: tuple[Operand, ...], fixed: bool, bounds: Bounds | None
@@ -42,6 +47,7 @@ class Node:
         self.number = len(graph.nodes)
         self.fixed = fixed
         self.bounds = bounds
+        self.finite = False
         graph.nodes.append(self)
 
     def __array_namespace__(self) -> "Namespace":
@@ -126,6 +132,23 @@ class Namespace:
     def steady(a: Traced) -> Traced:
         """The number itself, which derivatives take for a constant."""
         return a.graph.number("steady", a)
+
+    @staticmethod
+    def finite(a: Traced) -> Traced:
+        """The number itself, which comparisons take for finite."""
+        a.finite = True
+        return a
+
+    @staticmethod
+    def ordinary(a: Traced) -> Traced:
+        """The number itself, which is taken for positive, and far from both ends of float64."""
+        a.bounds = a.bounds or ORDINARY_SIZE
+        return a
+
+    @staticmethod
+    def bounded(a: Traced) -> bool:
+        """Tell whether its bounds are known."""
+        return a.bounds is not None
 
     @staticmethod
     def atan2(y: Operand, x: Operand) -> Traced:
@@ -370,6 +393,8 @@ def _div(a: Any, b: Any) -> Any:
 
 def _compare(operation: str, a: Any, b: Any) -> Condition | bool:
     a, b = _operand(a), _operand(b)
+    if isinstance(a, Node) and a.finite and b == math.inf:
+        return True
     if isinstance(a, Node) and a.bounds and isinstance(b, float) and (b <= 0.0 or b == math.inf):
         return b > 0.0
     if isinstance(b, Node) and b.bounds and isinstance(a, float) and (a <= 0.0 or a == math.inf):

@@ -8,7 +8,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from kinetostat.algebra.scalar import Scalar, is_one, reciprocal, smaller, sqrt, total, weighted, where
+from kinetostat.algebra.scalar import (
+    Scalar,
+    finite,
+    is_bounded,
+    is_one,
+    reciprocal,
+    smaller,
+    sqrt,
+    total,
+    weighted,
+    where,
+)
 from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
@@ -107,6 +118,7 @@ class Modes:
         loads: load in each spring of the leg per unit of each of them.
         compliance: d with G = L diag(d) L^T.
         shares: rows of L, unit lower triangular, below the diagonal.
+        inverses: 1/d, and 0 where d is 0.
         doubt: 1 where nobody can say whether the leg deflects under one of them at all, else 0.
     """
 
@@ -114,7 +126,16 @@ class Modes:
     loads: tuple[tuple[Scalar, ...], ...]
     compliance: tuple[Scalar, ...]
     shares: tuple[tuple[Scalar, ...], ...]
+    inverses: tuple[Scalar, ...] = ()
     doubt: Scalar = 0.0
+
+    @property
+    def actions(self) -> list[Action]:
+        """Each wrench with the stiffness against it, infinite where the leg does not deflect."""
+        stiffness = [
+            where(d > 0.0, inverse, INFINITE) for d, inverse in zip(self.compliance, self.inverses, strict=True)
+        ]
+        return list(zip(self.wrenches, stiffness, strict=True))
 
     def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
         """Return the amounts of the modes in a load given by amounts of the leg's wrenches: L^T times these."""
@@ -132,12 +153,15 @@ def modes_of(leg: LegScrews) -> Modes:
     springs = len(leg.loads)
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
     modes = conjugate(columns, leg.compliance, leg.load_squares)
-    combined = modes.columns
+    combined, pivots = modes.columns, modes.pivots
+    if all(map(is_bounded, leg.compliance)):
+        pivots = [finite(pivot) for pivot in pivots]
     return Modes(
         tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),
         tuple(tuple(column[e] for column in combined) for e in range(springs)),
-        tuple(modes.pivots),
+        tuple(pivots),
         tuple(tuple(row) for row in modes.shares),
+        tuple(modes.inverses),
         modes.doubt,
     )
 
@@ -147,8 +171,7 @@ def leg_modes(leg: LegScrews) -> list[Action]:
 
     Source: theory (8), eq. 32.
     """
-    modes = modes_of(leg)
-    return [(wrench, reciprocal(d)) for wrench, d in zip(modes.wrenches, modes.compliance, strict=True)]
+    return modes_of(leg).actions
 
 
 @dataclass(frozen=True)
@@ -182,14 +205,13 @@ def leg_resistance(leg: LegScrews) -> Resistance:
         alone = [(leg.wrenches[0], stiffness[0])]
         return Resistance(alone, alone)
     modes = modes_of(leg)
-    resisting = [reciprocal(where(d > 0.0, d, INFINITE)) for d in modes.compliance]
     in_modes = [
-        (combine(modes.wrenches, [f * k for f, k in zip(row, resisting, strict=True)]), s)
+        (combine(modes.wrenches, [f * k for f, k in zip(row, modes.inverses, strict=True)]), s)
         for row, s in zip(modes.loads, leg.compliance, strict=True)
     ]
-    pairs = list(zip(modes.wrenches, modes.compliance, strict=True))
     if len(leg.loads) != len(leg.wrenches):
-        return Resistance(in_modes, [(wrench, reciprocal(d)) for wrench, d in pairs])
+        return Resistance(in_modes, modes.actions)
+    pairs = zip(modes.wrenches, modes.compliance, strict=True)
     rigid = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
     # As many springs as wrenches: where their loads are independent, b_e is exact even for rigid and free springs. A
     # dependent set, or one with a load that is round-off, falls back on the modes, pose by pose, by a choice instead

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, ordinary, reciprocal, sin, where
 from kinetostat.algebra.vector import (
     AXES,
     IDENTITY,
@@ -58,7 +58,7 @@ class Rigidity:
 def link_axes(start: Vector, end: Vector, up: Vector) -> tuple[Rotation, Scalar]:
     """The link's axes in the base frame and its length (m): x from start to end, z nearest to `up`, y = z x x."""
     span = end - start
-    length = span.norm()
+    length = ordinary(span.norm())  # as `written.checking` makes sure
     along = span * reciprocal(length)
     side = up.cross(along)
     side = side * reciprocal(side.norm())

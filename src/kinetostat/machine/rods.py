@@ -43,8 +43,9 @@ class Rod:
 
     @cached_property
     def inverse_square(self) -> Scalar:
-        """1 / length², m⁻², without a square root."""
-        return reciprocal(self.span.dot(self.span))
+        """1 / length², m⁻²: by 1 / length, which the direction of the leg needs as well."""
+        shrink = reciprocal(self.length)
+        return shrink * shrink
 
 
 def rods(legs: Sequence[Leg], planar: bool = False) -> list[Rod]:
