@@ -105,17 +105,17 @@ class TriadRotation(Rotation):
         object.__setattr__(self, "_after", tuple(after))
 
     @cached_property
-    def x(self) -> Vector:  # type: ignore[override]
+    def x(self) -> Vector:
         """Image of the x axis."""
         return self.apply(X_AXIS)
 
     @cached_property
-    def y(self) -> Vector:  # type: ignore[override]
+    def y(self) -> Vector:
         """Image of the y axis."""
         return self.apply(Y_AXIS)
 
     @cached_property
-    def z(self) -> Vector:  # type: ignore[override]
+    def z(self) -> Vector:
         """Image of the z axis."""
         return self.apply(Z_AXIS)
 

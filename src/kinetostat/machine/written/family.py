@@ -61,10 +61,11 @@ def at_home(machine: Machine, varying: Iterable[str]) -> Machine:
 
 
 def _family_at_home(family: Family, home: Chains) -> Family:
-    maker, arguments = family.recipe or (None, ())
+    if family.recipe is None:
+        return family
+    maker, arguments = family.recipe
     if maker is not family_of:  # a family that another function makes of one
-        made = [_family_at_home(each, home) if isinstance(each, Family) else each for each in arguments]
-        return maker(*made) if maker else family
+        return maker(*(_family_at_home(each, home) if isinstance(each, Family) else each for each in arguments))
     (plan,) = arguments
     legs = tuple(
         replace(leg, inverse=leg.inverse.at_home(steps)) if isinstance(leg.inverse, BallLeg) else leg
@@ -114,7 +115,7 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
             amount, mover = next(coordinates), step.element.mover
             known = amount.placement if isinstance(amount, Turn) else None
             if known is not None:
-                placed, motion = _at(placed, point=known.point, axis=known.axis), known.motion
+                placed, motion = _at(placed, known.point, known.axis), known.motion
                 chain.append(placed)
                 continue
             placed, moved = placed.moved(amount)
@@ -124,7 +125,7 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 motion, home = moved @ motion, ZERO
             else:
                 if mover.point is home:
-                    placed = _at(placed, point=centre)
+                    placed = _at(placed, centre)
                 home, centre = mover.point, placed.mover.point
                 turn = motion.rotation @ step.element.moved(amount)[1].rotation
                 motion = Displacement(turn, centre - turn.apply(home))
@@ -132,11 +133,11 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
     return chain, motion
 
 
-def _at(element: Joint | Spring, **place: Vector) -> Joint | Spring:
+def _at(element: Joint | Spring, point: Vector, axis: Vector | None = None) -> Joint | Spring:
     """A revolute, or a spring on one, with its point and its axis as they are known otherwise."""
     if isinstance(element, Spring):
-        return replace(element, joint=replace(element.joint, **place))
-    return replace(element, **place)
+        return replace(element, joint=replace(element.joint, point=point, axis=axis or element.joint.axis))
+    return replace(element, point=point, axis=axis or element.axis)
 
 
 def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
