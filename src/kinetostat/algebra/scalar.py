@@ -68,7 +68,7 @@ def arctan2(y: Scalar, x: Scalar) -> Scalar:
 
 def steady(a: Scalar) -> Scalar:
     """The number itself, which derivatives of traced formulas take for a constant."""
-    constant = _own_function(a, "steady")
+    constant = _function_of_trace(a, "steady")
     return constant(a) if constant else a
 
 
@@ -76,23 +76,23 @@ def is_bounded(a: Scalar) -> bool:
     """Whether `a` is finite by form: a float that is, or a traced value whose bounds are known."""
     if isinstance(a, float):
         return math.isfinite(a)
-    bounded = _own_function(a, "bounded")
+    bounded = _function_of_trace(a, "bounded")
     return bounded(a) if bounded else False
 
 
 def finite(a: Scalar) -> Scalar:
     """The number itself, which traced comparisons with infinity take for finite, as the caller knows it to be."""
-    known = _own_function(a, "finite")
+    known = _function_of_trace(a, "finite")
     return known(a) if known else a
 
 
 def ordinary(a: Scalar) -> Scalar:
     """The number itself, which traced code takes for positive, and far from 0 and infinity, as the caller knows."""
-    known = _own_function(a, "ordinary")
+    known = _function_of_trace(a, "ordinary")
     return known(a) if known else a
 
 
-def _own_function(a: Scalar, name: str) -> Any:
+def _function_of_trace(a: Scalar, name: str) -> Any:
     """A function of traced values alone; None for other scalars."""
     traced = getattr(a, "__array_namespace__", None)
     return getattr(traced(), name, None) if traced else None
