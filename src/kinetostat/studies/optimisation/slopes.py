@@ -92,8 +92,8 @@ class Local:
 
 
 COMPILE_FROM = 60
-"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled: that takes as long as some 60
-of them by NumPy. The ridges of a study take some 50 where there is one."""
+"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled. For the paper's machine that
+takes as long as 62 of them by NumPy, for others it took as long as 20 to 50; a ridge takes some 50."""
 
 
 class Surveyor:
