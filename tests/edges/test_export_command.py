@@ -1,6 +1,7 @@
 """`kinetostat export` and `kinetostat new --from`, as a new user types them."""
 
 import configparser
+import shlex
 import struct
 from xml.etree import ElementTree
 
@@ -174,6 +175,15 @@ def test_a_tool_that_is_raised_by_the_map_is_at_its_height(tmp_path):
         raised = with_values(machine, {"pose.x": 0.1, "pose.y": y, "pose.z": -0.75 + 1e-3 * heights[row, 2]})
         assert under_load(raised).displacement[5] == pytest.approx(-1e-3 * heights[row, 2], abs=1e-9)
     assert heights.min() > 0.05, "mm, upwards"
+
+
+def test_ranges_with_holes_are_refused_with_some_without(tmp_path, capsys):
+    loads = HEIGHTS[:4]
+    assert main(["export", "hexapod", *loads, "--to", "klipper", "-o", str(tmp_path / "bed.cfg")]) == BAD_INPUT
+    message = " ".join(capsys.readouterr().err.split())
+    ranges = shlex.split(message.partition("for instance ")[2].removesuffix("."))
+    assert ranges[::2] == ["--over", "--over"]
+    assert main(["export", "hexapod", *loads, "--to", "klipper", "-o", str(tmp_path / "bed.cfg"), *ranges]) == DONE
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def write_klipper(analysis: Analysis, path: Path, over: Sequence[str] | None = N
     if not np.isfinite(chart.heights).all():
         raise InputError(
             f"at {int((~np.isfinite(chart.heights)).sum())} of {chart.heights.size} points the machine is not at rest, "
-            "and Klipper takes no mesh with holes; choose narrower ranges with --over."
+            f"and Klipper takes no mesh with holes; choose narrower ranges with --over{_narrower(chart)}."
         )
     lines = [", ".join(f"{MILLIMETRES * height:.6f}" for height in row) for row in chart.heights]
     ends = {f"{side}_{name}": f"{MILLIMETRES * value:.6g}" for name, axis in (("x", chart.x), ("y", chart.y))
@@ -127,6 +127,17 @@ def write_reprapfirmware(analysis: Analysis, path: Path, over: Sequence[str] | N
     ]
     write_text(path, "\n".join([*lines, ""]))
     return [path]
+
+
+def _narrower(chart: HeightMap) -> str:
+    """The widest ranges inside of a map, as many points narrower on all sides, in which it has no hole; as options."""
+    for margin in range(1, (min(chart.heights.shape) - 1) // 2):
+        inside = slice(margin, -margin)
+        if np.isfinite(chart.heights[inside, inside]).all():
+            ends = {name: MILLIMETRES * axis[inside][[0, -1]] for name, axis in (("x", chart.x), ("y", chart.y))}
+            given = [f'--over "{name}={low:.4g} mm:{high:.4g} mm:{POINTS}"' for name, (low, high) in ends.items()]
+            return f", for instance {' '.join(given)}"
+    return ""
 
 
 def height_map(analysis: Analysis, over: Sequence[str]) -> HeightMap:
