@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display, number
 from kinetostat.kinematics.mobility import SortOfPose
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
@@ -147,7 +148,7 @@ def matrix_table(
     title: str,
     kind: str,
     names: Sequence[str],
-    rows: Sequence[Sequence[float]],
+    rows: Sequence[Sequence[float]] | Array,
     display: Display = ENGINEERING,
     endless: str = "∞",
 ) -> FittedTable:

@@ -193,8 +193,8 @@ def _png_of(figure: Figure) -> bytes:
     made with knows the sizes of all texts.
     """
     canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
     height, width = pixels.shape[:2]
     lines = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each begins with the number of its filter
     lines[:, 1:] = pixels.reshape(height, 3 * width)
@@ -231,7 +231,7 @@ def fix_layout(figure: Figure) -> None:
     letter(figure)
     if layout := figure.get_layout_engine():
         for panel in figure.axes:
-            panel.get_tightbbox = _Surroundings(panel).box  # type: ignore[method-assign]
+            panel.get_tightbbox = _Surroundings(panel).box  # type: ignore[method-assign, assignment]
         layout.execute(figure)
         for panel in figure.axes:
             del panel.get_tightbbox
@@ -248,7 +248,8 @@ class _Surroundings:
     """
 
     def __init__(self, panel: Axes) -> None:
-        self._panel, self._measure = panel, panel.get_tightbbox
+        self._panel = panel
+        self._measure: Any = panel.get_tightbbox
         self._moves = bool(panel.get_legend() or panel.texts or panel.artists or panel.child_axes)
         self._numbers: tuple[bytes, ...] = ()
         self._beyond = np.zeros((2, 2))
@@ -258,7 +259,7 @@ class _Surroundings:
         panel = self._panel
         if self._moves or not panel.get_visible():
             return self._measure(renderer, **options)
-        locator = panel.get_axes_locator()
+        locator: Any = panel.get_axes_locator()  # None where the figure has not placed the panel itself
         panel.apply_aspect(locator(panel, renderer) if locator else None)
         numbers = tuple(np.asarray(axis.get_majorticklocs()).tobytes() for axis in (panel.xaxis, panel.yaxis))
         if numbers != self._numbers:

@@ -5,7 +5,7 @@ from files do not become it.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 
 from matplotlib.artist import Artist
@@ -77,8 +77,11 @@ def _texts(artist: Artist) -> Iterator[Text]:
     """The texts within an artist, except for numbers along axes, which every font has."""
     if isinstance(artist, Text):
         yield artist
-    numbered = isinstance(artist, Axis) and isinstance(artist.get_major_formatter(), NUMBERS)
-    for part in (artist.label, artist.offsetText) if numbered else artist.get_children():
+    if isinstance(artist, Axis) and isinstance(artist.get_major_formatter(), NUMBERS):
+        parts: Sequence[Artist] = (artist.label, artist.offsetText)
+    else:
+        parts = artist.get_children()
+    for part in parts:
         yield from _texts(part)
 
 

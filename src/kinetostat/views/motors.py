@@ -88,9 +88,9 @@ def _diagram(panel: Axes, answer: MotorChoice, fit: MotorFit) -> None:
             panel.plot(speed * PER_MINUTE, np.abs(curves.motor_torque[k]) * scale.factor, color=colour, linewidth=0.8)
             mean = float(root_mean_square(fit.loads.motion.times, speed)) * PER_MINUTE
             panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=4)
-            peak = int(np.argmax(np.abs(curves.motor_torque[k])))
-            torque = abs(float(curves.motor_torque[k, peak])) * scale.factor
-            panel.plot(speed[peak] * PER_MINUTE, torque, "+", color=colour, markersize=7)
+            hardest = int(np.argmax(np.abs(curves.motor_torque[k])))
+            torque = abs(float(curves.motor_torque[k, hardest])) * scale.factor
+            panel.plot(speed[hardest] * PER_MINUTE, torque, "+", color=colour, markersize=7)
     panel.set(xlabel="speed (1/min)", ylabel=scale.label("torque"))
     panel.set_title(f"{fit.name}: {'fits' if fit.fits else 'does not fit'}", loc="left", parse_math=False)
     panel.set_xlim(left=0.0)
