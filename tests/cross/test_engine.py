@@ -76,8 +76,13 @@ def whole(machine: Machine, plan: MotionPlan | None) -> Response:
 
 def by_floats(machine: Machine, columns: Columns) -> Found:
     poses = zip(*(column.tolist() for column in columns.values()), strict=True)
-    plan = plan_for(machine, NAMES)
-    responses = [whole(with_values(machine, dict(zip(columns, pose, strict=True))), plan) for pose in poses]
+    responses, plans, stiff = [], {}, set(stiffness_paths(machine))
+    for pose in poses:
+        given = dict(zip(columns, pose, strict=True))
+        free = tuple(path for path in given if path in stiff and given[path] == 0.0)
+        if free not in plans:
+            plans[free] = plan_for(with_values(machine, {path: given[path] for path in given if path in stiff}), NAMES)
+        responses.append(whole(with_values(machine, given), plans[free]))
     status = np.array([r.status for r in responses], dtype=np.int8)
     return Found(np.array([read(r) for r in responses]).T, status, np.array([lost(r) for r in responses]))
 
@@ -85,7 +90,7 @@ def by_floats(machine: Machine, columns: Columns) -> Found:
 def by_arrays(machine: Machine, columns: Columns) -> Found:
     count = len(next(iter(columns.values())))
     with np.errstate(all="ignore"):
-        response = whole(with_values(machine, columns), plan_for(machine, NAMES))
+        response = whole(with_values(machine, columns), plan_for(machine, NAMES, columns))
         status = np.broadcast_to(response.status, count).astype(np.int8)
         found = [np.broadcast_to(q.value(response), count) for q in UNLOADED]
     return Found(np.where(status == Status.OK, found, np.nan), status, lost(respond(machine)))

@@ -224,7 +224,8 @@ class _Routes:
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._modes, self._joints = modes, machine.chains().size if machine.family.chains else 0
         names = [name for objective in weights for name, _ in objective]
-        self._loaded, self._plan = bool(rest_numbers(machine, names, limited=False)), plan_for(machine, names)
+        self._loaded = bool(rest_numbers(machine, names, limited=False))
+        self._plan = plan_for(machine, names, [*varying, *self._differentiated])
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""

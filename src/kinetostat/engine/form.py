@@ -224,26 +224,30 @@ def objectives_of(
     return formula_of(given, columns, results, result_of(response.status), paths, coordinates)
 
 
-def plan_for(machine: Machine, names: Iterable[str]) -> MotionPlan | None:
+def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()) -> MotionPlan | None:
     """Decide at the pose of a machine which motions its programs count with; None where quantities need none.
 
     Args:
         machine: with numbers.
         names: of quantities.
+        varying: leaf paths of the parameters that vary: a spring whose stiffness does is no free joint by form, even if
+            the file says 0.
 
     Raises:
         InputError: quantities need them, and the machine has no place at its pose.
     """
     if not needs_motion(names):
         return None
-    state = MachineState(machine)
+    stiff = {leaf for parameter in parameters(machine.family) if parameter.quantity.stiff for leaf in parameter.leaves}
+    free = [path for path in varying if path in stiff and values(machine)[path] == 0.0]
+    state = MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(
             f"motions of {machine.name} are not known, because it has no place at the pose of its file: "
             f"{state.refusal} Change [pose]."
         )
     with np.errstate(all="ignore"):
-        return plan_of(mechanism_over_scalars(machine, state.configuration, state.joints))
+        return plan_of(mechanism_over_scalars(state.machine, state.configuration, state.joints))
 
 
 def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:

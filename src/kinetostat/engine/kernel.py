@@ -184,7 +184,7 @@ def program_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
     arguments: tuple[Any, ...] = (objectives, None, closed)
-    plan = plan_for(machine, quantities)
+    plan = plan_for(machine, quantities, varying)
     if plan is not None:
         arguments = (*arguments, 0, True, plan)
     kind = Specimen(at_home(machine, varying) if closed else machine)

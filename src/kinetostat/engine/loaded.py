@@ -196,7 +196,7 @@ def _response_with_states(
             (free == Status.OK) | (free == Status.SINGULAR) & (cable_status == Status.NO_REST), cable_status, free
         )
         response = replace(response, cables=numbers, status=status)
-    plan = plan_for(machine, quantities)
+    plan = plan_for(machine, quantities, columns)
     response = response_in_motion(state.machine, response, state.joints, plan, quantities)
     if at_rest := rest_numbers(machine, quantities):
         further = {"frequency": frequencies} if "frequency" in at_rest else None
@@ -233,7 +233,7 @@ class RestFill:
         objectives = tuple(((name, 1.0),) for name in quantities)
         self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
         self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
-        arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities), legs)
+        arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities, paths), legs)
         self._step = program_of(Recipe(objectives_of, kind, self._form, arguments))
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:

@@ -153,7 +153,7 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
         yield _program(functions, "placement_at", Body(body.fixed, body.columns, [*driven.results, *sloped], body.code))
     if functions.quantities:
         wanted = [((name, 1.0),) for name in functions.quantities]
-        plan = plan_for(functions.machine, functions.quantities)
+        plan = plan_for(functions.machine, functions.quantities, functions.inputs)
         yield _program(functions, "quantities_at", objectives_of(kind, form, wanted, closed=closed, plan=plan).body)
         formula = objectives_of(kind, form, wanted, functions.inputs, closed, plan=plan)
         inputs = formula.inputs[: len(functions.inputs)]

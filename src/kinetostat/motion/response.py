@@ -36,7 +36,8 @@ def response_in_motion(
     if plan is None or not needs_motion(names):
         return response
     here = at_pose(machine, response.configuration, joints, plan)
-    loads = loads_by_acceleration(here) if needs_masses(names) else None
+    held = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))  # fewer drives than motions hold nothing
+    loads = loads_by_acceleration(here) if needs_masses(names) and held else None
     return replace(response, acceleration_loads=loads, held_by_joints=held_by_joints(here, response))
 
 
