@@ -23,9 +23,10 @@ from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import QUANTITIES, needs_motion, rest_numbers
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, needs_motion, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
+from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
@@ -230,16 +231,18 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     Args:
         machine: with numbers.
         names: of quantities.
-        varying: leaf paths of the parameters that vary: a spring whose stiffness does is no free joint by form, even if
+        varying: leaf paths of the parameters that vary. A spring whose stiffness does is no free joint by form, even if
             the file says 0.
 
     Raises:
-        InputError: quantities need them, and the machine has no place at its pose.
+        InputError: quantities need them, and the machine has no place at the pose of its file.
     """
-    if not needs_motion(names):
+    damping, changing, names = machine.tables["damping"], {*varying}, [*names]
+    rubs = any(path in changing or getattr(damping, path.partition(".")[2]) for path in FRICTION_OF_JOINTS)
+    if not needs_motion(names) or not (needs_masses(names) or rubs):
         return None
     stiff = {leaf for parameter in parameters(machine.family) if parameter.quantity.stiff for leaf in parameter.leaves}
-    free = [path for path in varying if path in stiff and values(machine)[path] == 0.0]
+    free = [path for path in changing if path in stiff and values(machine)[path] == 0.0]
     state = MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(

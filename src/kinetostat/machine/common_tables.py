@@ -232,6 +232,8 @@ def table_of_one_drive(path: str, fields: Sequence[str]) -> type:
     return made_table("OwnNumbers", {field: Field(known[field]) for field in fields})
 
 
+FRICTION_OF_JOINTS = ("damping.hinge_friction", "damping.slide_friction")
+"""Paths of the Coulomb friction of passive joints."""
 VIBRATION_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
 """Beginnings of the paths of fields on which only vibrations depend."""
 ROUND_OFF_OF_TENSOR = 1e-4

@@ -30,11 +30,13 @@ def response_in_motion(
         machine: at its pose, with numbers of any kind.
         response: of it.
         joints: coordinates that close its legs, if it is written leg by leg.
-        plan: which motions there are; the response stays as it is without one.
+        plan: which motions there are; None if no joint has friction and no quantity needs masses.
         names: of the quantities.
     """
-    if plan is None or not needs_motion(names):
+    if not needs_motion(names):
         return response
+    if plan is None:
+        return replace(response, held_by_joints=[0.0] * SIZE)
     here = at_pose(machine, response.configuration, joints, plan)
     held = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))  # fewer drives than motions hold nothing
     loads = loads_by_acceleration(here) if needs_masses(names) and held else None

@@ -17,6 +17,7 @@ from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinetostatics.drive_limits import drive_limits
 from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
+from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
 from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
@@ -197,7 +198,6 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
 
 LOST_MOTION = ("backlash", "angular_backlash", "rotor_friction", "guide_friction", "bearing_friction")
 """Fields of [drives] by which drives lose motion."""
-FRICTION_OF_JOINTS = ("damping.hinge_friction", "damping.slide_friction")
 
 
 def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence[Parameter]) -> None:
