@@ -6,7 +6,7 @@ What drives can do within them is in `feasible`. Over scalars.
 import math
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, where
 from kinetostat.frozen import dataclass
 from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.leg import Spring
@@ -79,8 +79,8 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
         lost = lost + softness(machine, spring) * (2.0 * rubs)
     if is_zero(drive.rotor_friction) or not (_is_closed(servo) and is_zero(servo.integral_time)):
         return lost
-    turns = drive.lead * (0.5 / math.pi) if slides else reciprocal(drive.ratio)
-    return lost + 2.0 * drive.rotor_friction * turns * reciprocal(servo.velocity_gain * servo.position_gain)
+    stiff = servo.velocity_gain * servo.position_gain
+    return lost + 2.0 * drive.rotor_friction * _travel_per_radian(drive, slides) * _inverse(stiff)
 
 
 def play(machine: Machine, spring: Spring) -> Scalar:
@@ -103,11 +103,21 @@ def softness(machine: Machine, spring: Spring) -> Scalar:
     transmission = reciprocal(spring.stiffness)
     if not _is_closed(servo):
         return transmission
-    soft = transmission * (1.0 - servo.position_at_load)
-    per_turn = drive.lead * (0.5 / math.pi) if spring.joint.point is None else reciprocal(drive.ratio)
-    if not is_zero(servo.integral_time) or is_zero(per_turn):
-        return soft
-    return soft + per_turn * per_turn * reciprocal(servo.velocity_gain * servo.position_gain)
+    soft, stiff = transmission * (1.0 - servo.position_at_load), servo.velocity_gain * servo.position_gain
+    travel = _travel_per_radian(drive, spring.joint.point is None)
+    if is_zero(servo.integral_time) and not is_zero(travel):
+        soft = soft + travel * travel * _inverse(stiff)
+    return where(stiff > 0.0, soft, transmission)
+
+
+def _travel_per_radian(drive: Any, slides: bool) -> Scalar:
+    """Travel of the joint per radian of its rotor, m/rad or 1; 0 without lead or ratio, as of a drive without a rotor."""
+    return drive.lead * (0.5 / math.pi) if slides else _inverse(drive.ratio)
+
+
+def _inverse(a: Scalar) -> Scalar:
+    """1 / a, and 0 where a is 0: of a gain that closes no loop, or of a ratio that a file does not give."""
+    return where(a > 0.0, reciprocal(where(a > 0.0, a, 1.0)), 0.0)
 
 
 def _is_closed(servo: Any) -> bool:
