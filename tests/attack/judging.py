@@ -104,7 +104,7 @@ def unclear(message: str) -> str | None:
 def _judge_loaded(machine: Machine) -> None:
     """Look for a state of rest that is not one."""
     state = under_load(machine)
-    if state.displacement and not all(map(math.isfinite, state.displacement)):
+    if state.has_rest and not all(map(math.isfinite, state.displacement)):
         raise AssertionError(f"at rest at {state.displacement}")
 
 

@@ -156,7 +156,7 @@ def test_commanded_coordinates_bring_the_loaded_tool_to_its_pose():
     assert answer.left[0] < 1e-12
     ideal = forward(machine, dict(zip(answer.actuators, answer.coordinates[0].tolist(), strict=True))).present
     state = under_load(machine.with_values(ideal.pose))
-    turned = Rotation.from_rotvec(state.displacement[:3]) * Rotation.from_matrix(ideal.rotation)
+    turned = Rotation.from_rotvec(np.array(state.displacement[:3])) * Rotation.from_matrix(ideal.rotation)
     assert np.add(ideal.position, state.displacement[3:]) == pytest.approx([0.0, 0.0, 0.135], abs=1e-12)
     assert turned.magnitude() < 1e-11
 

@@ -30,9 +30,13 @@ PATIENCE = 6000
 """Tenths of a second in which a page appears, half of what pytest gives a whole test."""
 
 
+TIMERS = ("RunPanel.refresh", "Player._step")
+"""What timers of a page call, until it is closed or paused."""
+
+
 def _of_the_studio(task: str) -> bool:
     """Whether a task ends by itself once what was asked for is done; a timer never does."""
-    return ("studio" in task or "upload_field" in task) and "RunPanel.refresh" not in task
+    return ("studio" in task or "upload_field" in task) and not any(timer in task for timer in TIMERS)
 
 
 class Page:

@@ -166,7 +166,7 @@ def test_every_axis_of_a_map_has_its_unit(section):
     assert "rad/(N·m)" in titles[0]
     assert "m/N" in titles[1]
     texts = [text.get_text() for text in figure.texts] + [figure._supxlabel.get_text()]
-    assert any("out of reach: 5 of 20 poses" in text for text in texts)
+    assert any("no result at 5 of 20 poses (out of reach)" in text for text in texts)
 
 
 def test_panels_of_a_map_share_their_labels(section):

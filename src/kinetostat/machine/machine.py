@@ -269,8 +269,8 @@ class Machine(Immutable):
             them.
         loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
             machine at rest under its loads.
-        whole_check: compares numbers that have changed, by name, with all others (`loading.checked_as_file`); None of
-            a machine that was not read.
+        whole_check: compares numbers that have changed, by name, with all others, as reading a file does; None of a
+            machine that was not read.
     """
 
     name: str
