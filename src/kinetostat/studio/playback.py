@@ -56,6 +56,7 @@ class Player:
     def pause(self) -> None:
         """Stop the slider where it is."""
         if self._timer is not None:
+            self._timer.deactivate()  # a cancelled timer is there until its next turn
             self._timer.cancel()
         self._timer = None
         self.button.props("icon=play_arrow")
