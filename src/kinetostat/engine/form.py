@@ -231,7 +231,7 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     Args:
         machine: with numbers.
         names: of quantities.
-        varying: leaf paths of the parameters that vary. A spring whose stiffness does is no free joint by form, even if
+        varying: leaf paths of the parameters that vary. A spring whose stiffness does counts as a spring by form, even if
             the file says 0.
 
     Raises:

@@ -111,7 +111,7 @@ def softness(machine: Machine, spring: Spring) -> Scalar:
 
 
 def _travel_per_radian(drive: Any, slides: bool) -> Scalar:
-    """Travel of the joint per radian of its rotor, m/rad or 1; 0 without lead or ratio, as of a drive without a rotor."""
+    """Travel of the joint per radian of its rotor, m/rad or 1; 0 without lead or ratio, as without a rotor."""
     return drive.lead * (0.5 / math.pi) if slides else _inverse(drive.ratio)
 
 

@@ -38,8 +38,9 @@ def response_in_motion(
     if plan is None:
         return replace(response, held_by_joints=[0.0] * SIZE)
     here = at_pose(machine, response.configuration, joints, plan)
-    held = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))  # fewer drives than motions hold nothing
-    loads = loads_by_acceleration(here) if needs_masses(names) and held else None
+    # Fewer drives than motions hold nothing.
+    are_enough = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))
+    loads = loads_by_acceleration(here) if needs_masses(names) and are_enough else None
     return replace(response, acceleration_loads=loads, held_by_joints=held_by_joints(here, response))
 
 
