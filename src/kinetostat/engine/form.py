@@ -231,8 +231,8 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     Args:
         machine: with numbers.
         names: of quantities.
-        varying: leaf paths of the parameters that vary. A spring whose stiffness does counts as a spring by form, even if
-            the file says 0.
+        varying: leaf paths of the parameters that vary. A spring whose stiffness does counts as a spring by form,
+            even if the file says 0.
 
     Raises:
         InputError: quantities need them, and the machine has no place at the pose of its file.
