@@ -231,7 +231,7 @@ def _same_rest(case: Case, other: Machine, transport: Array, what: str) -> str |
     again = state_of(other)
     if again is None or again.rest is not case.loaded.rest:
         return f"{what}: under load {again and again.rest.word} instead of {case.loaded.rest.word}"
-    if not case.loaded.displacement or len(case.loaded.displacement) < 6:
+    if len(case.loaded.displacement) < 6:
         return None
     ours, theirs = transport @ case.loaded.displacement, np.array(again.displacement)
     scale = max(float(np.linalg.norm(ours)), 1e-9)
