@@ -40,7 +40,7 @@ _HOMES = {
     "workspace": "kinetostat.studies.workspace",
     "sensitivity": "kinetostat.studies.sensitivity",
     "guidelines": "kinetostat.studies.guidelines",
-    "budget": "kinetostat.studies.budget.budget",
+    "budget": "kinetostat.studies.budget",
     "identify": "kinetostat.studies.identification.identification",
     "compare": "kinetostat.studies.comparison",
     "load_problem": "kinetostat.studies.optimisation.problem",
@@ -59,21 +59,6 @@ _HOMES = {
     "Status": "kinetostat.kinematics.status",
     "InputError": "kinetostat.spec.errors",
 }
-_SHOWN = {
-    "Machine": "kinetostat.machine.machine",
-    "Command": "kinetostat.studies.commanding",
-    "CorrectionTable": "kinetostat.studies.corrections",
-    "Carrying": "kinetostat.studies.carrying",
-    "MotorChoice": "kinetostat.studies.motors",
-    "Servo": "kinetostat.studies.servo",
-    "Elevation": "kinetostat.studies.elevation",
-    "Lobes": "kinetostat.studies.lobes",
-    "Capability": "kinetostat.studies.capability",
-    "Budget": "kinetostat.studies.budget.budget",
-    "Result": "kinetostat.studies.optimisation.result",
-}
-"""Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
-
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "capability", "carrying_legs",
     "changed", "command", "compare", "compile", "correction_table", "drives", "dynamics", "elevation", "evaluate",
@@ -101,8 +86,9 @@ def load_ipython_extension(shell: object) -> None:
     """Let IPython show machines, answers and figures as tables and pictures; in a notebook, importing does it."""
     formatters = shell.display_formatter.formatters
     described = import_module("kinetostat.views.questions").ANSWERS
-    classes = [(module, name) for name, module in _SHOWN.items()]
-    for module, name in [*classes, *(f"kinetostat.{place}".rsplit(".", 1) for place in described)]:
+    for place in ("machine.machine.Machine", *described):
+        # IPython gets names only, so that nothing is imported.
+        module, _, name = f"kinetostat.{place}".rpartition(".")
         formatters["text/html"].for_type_by_name(module, name, lambda answer: _notebook().html_of(answer))
     formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", lambda figure: _notebook().png_of(figure))
 

@@ -14,7 +14,7 @@ from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError
 from kinetostat.studies.analysis import analyze as analyze
 from kinetostat.studies.assembly import forward as forward
-from kinetostat.studies.budget.budget import budget as budget
+from kinetostat.studies.budget import budget as budget
 from kinetostat.studies.capability import capability as capability
 from kinetostat.studies.carrying import carrying_legs as carrying_legs
 from kinetostat.studies.commanding import command as command

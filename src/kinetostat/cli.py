@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from kinetostat.commands.asking import add_other_questions, add_question
+from kinetostat.commands.asking import add_other_questions
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
@@ -34,6 +34,7 @@ from kinetostat.commands.silence import SilenceWatch, spoken_silence
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import as_typed
+from kinetostat.views.questions import QUESTION_GROUPS
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
@@ -45,14 +46,11 @@ LOOKING = "computing; if the pose is out of reach, the nearest one is looked for
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "machine files": ("list", "new", "schema", "check"),
-    "at a pose": ("analyze", "forward", "sensitivity", "guidelines", "tensions", "capability"),
-    "at many poses": ("path", "sweep", "map", "workspace"),
-    "under load and in motion": ("command", "elevation", "modes", "servo", "lobes", "drives", "motors"),
-    "as built": ("budget", "identify", "validate"),
-    "design": ("compare", "optimize", "pareto"),
+    **{group: tuple(words) for group, words in QUESTION_GROUPS.items()},
+    "comparison and design": ("validate", "compare", "optimize", "pareto"),
     "documents and other programs": ("report", "export", "studio", "reproduce", "doctor"),
 }
-"""Commands by what they are asked about, in the order in which the help lists them; others come last."""
+"""Commands by what they are asked about, in the order in which the help lists them."""
 
 EXAMPLES = """examples:
   kinetostat list
@@ -80,9 +78,8 @@ class Overview(Help):
         if not isinstance(action, argparse._SubParsersAction):
             return super()._format_action(action)
         lines = {each.dest: self._format_action(each) for each in action._get_subactions()}
-        groups = {name: [lines.pop(word) for word in words] for name, words in GROUPS.items()}
-        groups["other"] = [*lines.values()]
-        return "".join(f"\n {name}:\n{''.join(group)}" for name, group in groups.items() if group)
+        groups = {name: "".join(lines[word] for word in words) for name, words in GROUPS.items()}
+        return "".join(f"\n {name}:\n{group}" for name, group in groups.items())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -204,22 +201,13 @@ def _parser() -> Parser:
         "search, whose checksums are then compared",
     )
     check.set_defaults(doing=LOOKING)
-    add_question(commands, "analyze")
-    add_question(commands, "forward")
-    add_question(commands, "identify")
-    for word in ("command", "path"):
-        add_question(commands, word)
     add_grid_commands(commands)
-    for word in ("workspace", "sensitivity", "guidelines"):
-        add_question(commands, word)
-    add_question(commands, "modes")
-    add_question(commands, "budget")
+    add_other_questions(commands)
     add_compare_commands(commands)
     add_optimize_commands(commands)
     add_report_commands(commands)
     add_studio_command(commands)
     add_doctor_command(commands)
-    add_other_questions(commands)
     return parser
 
 

@@ -90,7 +90,7 @@ LEAST_LENGTH = 1e-15
 NO_LINK = 1e-9
 """Length of a link, m, below which it has no direction."""
 
-# Error budgets
+# Errors of the tool by tolerances
 
 NO_REACTION = 1e-9
 """Share of the load, moments over the machine's length, below which the reaction of a joint is round-off, so that the

@@ -30,7 +30,7 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.budget import budget
 from kinetostat.studies.datasets import evaluate
 from kinetostat.studies.identification.identification import identify
 from kinetostat.studies.measured.comparison import validate_measured

@@ -5,10 +5,10 @@ import pytest
 
 from kinetostat import budget, forward, load
 from kinetostat.accuracy.model import error_model
+from kinetostat.accuracy.toleranced_parts import random_inputs, toleranced_parts
 from kinetostat.kinematics.forward import stand
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.budget.tolerances import random_inputs, toleranced_parts
 
 
 @pytest.mark.parametrize("name", ["hexapod", "delta", "planar-3rpr"])

@@ -147,7 +147,10 @@ def test_help_lists_every_command_once_below_a_heading(capsys):
     assert not head.strip()
     assert "other" not in groups
     assert len(listed) == len(set(listed))
-    assert {"list", "doctor", "compare", *QUESTIONS} <= set(listed)
+    with pytest.raises(SystemExit):
+        main(["no-command"])
+    known = re.findall(r"'?([\w-]+)'?(?:, |\))", capsys.readouterr().err.partition("choose from ")[2])
+    assert {*QUESTIONS, "doctor"} <= set(known) == set(listed)
     assert "drives" in groups[groups.index("under load and in motion") + 1]
 
 

@@ -10,13 +10,13 @@ import pytest
 from kinetostat import InputError, budget, load
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import error_model
+from kinetostat.accuracy.toleranced_parts import TolerancedPart, is_about, random_inputs, toleranced_parts
+from kinetostat.accuracy.tool_error import Measures, first_order, measures_of, spread_of
 from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.budget.allocation import allocation_for, reach_of
-from kinetostat.studies.budget.spread import Measures, first_order, measures_of, spread_of
-from kinetostat.studies.budget.tolerances import TolerancedPart, is_about, random_inputs, toleranced_parts
+from kinetostat.studies.allocation import allocation_for, reach_of
 from kinetostat.views.budget_data import contributions_csv
 
 LINES = {

@@ -8,7 +8,7 @@ from kinetostat.kinematics import closure
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies import datasets
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.budget import budget
 from kinetostat.studies.datasets import evaluate
 from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.requirements import requirements

@@ -2,7 +2,7 @@
 
 The tolerance classes of two standards by nominal size come first, as these print them: grades IT1 to IT14 of ISO 286-1,
 classes of ISO 2768-1. Which numbers a line is about depends on the machine, and is looked up in
-`studies.budget.tolerances`.
+`accuracy.toleranced_parts`.
 """
 
 import math

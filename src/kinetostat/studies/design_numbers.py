@@ -24,7 +24,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, parameters, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.budget import budget
 from kinetostat.studies.poses import chosen_axes, given_poses, grid_of
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities
 from kinetostat.tolerances import EQUAL_DESIGNS

@@ -20,6 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.accuracy.toleranced_parts import toleranced_parts
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
@@ -37,8 +38,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, parse_range
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.budget.budget import Budget, budget
-from kinetostat.studies.budget.tolerances import toleranced_parts
+from kinetostat.studies.budget import Budget, budget
 from kinetostat.studies.corrections import GRAVITY_ANGLE, CorrectionTable, correction_table
 from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.tolerances import NO_REACTION, ROUND_OFF_OF_ENTRY

@@ -24,7 +24,7 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.fields import parse_range
 from kinetostat.spec.study import study_toml
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.budget.budget import budget
+from kinetostat.studies.budget import budget
 from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
 from kinetostat.studies.drives import drives
@@ -156,32 +156,49 @@ class ReportQuestion:
         ask: answers the question, from the answers so far.
         when: whether the question is asked.
         part: the part of `REPORT_PARTS` to which it belongs; empty if it is always asked.
+        section: whether the report has a section that is made of its answer alone.
     """
 
     name: str
     ask: Callable[[Answers], Any]
     when: Callable[[Answers], bool] = lambda _known: True
     part: str = ""
+    section: bool = False
 
 
 REPORT_QUESTIONS = (
     ReportQuestion("requirements", lambda known: requirements(known.state)),
-    ReportQuestion("under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded),
     ReportQuestion(
-        "elevation", lambda known: elevation(known.state, known.elevations), lambda known: bool(known.elevations)
+        "under_load", lambda known: under_load(known.state), lambda known: known.machine.loaded, section=True
     ),
-    ReportQuestion("budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances)),
     ReportQuestion(
-        "capability", lambda known: capability(known.state), lambda known: bool(limits_of_drives(known.state))
+        "elevation",
+        lambda known: elevation(known.state, known.elevations),
+        lambda known: bool(known.elevations),
+        section=True,
     ),
-    ReportQuestion("tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine))),
-    ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine)),
+    ReportQuestion(
+        "tensions", lambda known: tensions(known.state), lambda known: bool(cable_signs(known.machine)), section=True
+    ),
+    ReportQuestion(
+        "capability",
+        lambda known: capability(known.state),
+        lambda known: bool(limits_of_drives(known.state)),
+        section=True,
+    ),
+    ReportQuestion("vibration", lambda known: modes(known.state), lambda known: _has_mass(known.machine), section=True),
     ReportQuestion(
         "drives",
         lambda known: drives(known.state, known.motion),
         lambda known: known.motion is not None or len(motions_required(known.machine)) == 1,
+        section=True,
     ),
-    ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _says_what_it_cuts(known.machine)),
+    ReportQuestion(
+        "lobes", lambda known: lobes(known.state), lambda known: _says_what_it_cuts(known.machine), section=True
+    ),
+    ReportQuestion(
+        "budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances), section=True
+    ),
     ReportQuestion(
         "maps",
         lambda known: evaluate_grid(known.state, known.ranges, _compliances(known.machine)),
@@ -197,8 +214,8 @@ REPORT_QUESTIONS = (
     ReportQuestion("sensitivity", lambda known: sensitivity(known.state), part="sensitivity"),
     ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
 )
-"""The questions in the order in which they are asked, each with its condition. Later ones may read earlier answers: the
-map of frequencies is drawn only if vibrations have modes."""
+"""The questions in the order in which they are asked and shown, each with its condition. Later ones may read earlier
+answers: the map of frequencies is drawn only if vibrations have modes."""
 REPORT_STEPS = len(REPORT_QUESTIONS) + 2
 """Number of steps that progress counts; the last two are validation and writing the file."""
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from kinetostat.accuracy.toleranced_parts import is_about
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.budget.budget import (
+from kinetostat.studies.budget import (
     ALLOCATION_RULES,
     DRAWN_DIGITS,
     ROUND_OFF_SHARE,
@@ -24,7 +25,6 @@ from kinetostat.studies.budget.budget import (
     budget,
     possible_errors,
 )
-from kinetostat.studies.budget.tolerances import is_about
 from kinetostat.units import KINDS
 from kinetostat.views.budget_data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records

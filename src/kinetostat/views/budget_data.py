@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.budget.budget import STATISTICS, Budget
+from kinetostat.studies.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
 from kinetostat.units import KINDS
 from kinetostat.views.data_forms import columns_csv

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.machine.machine import setting_of
-from kinetostat.studies.budget.budget import Budget
+from kinetostat.studies.budget import Budget
 from kinetostat.views.budget import ranked_by
 from kinetostat.views.budget_data import budget_dataset
 from kinetostat.views.figures import COLOURS, contour_maps, curves, new_figure

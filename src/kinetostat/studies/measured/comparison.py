@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 
 from kinetostat.accuracy.built import compliances_as_built
 from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
+from kinetostat.accuracy.toleranced_parts import toleranced_parts
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
@@ -26,7 +27,6 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
-from kinetostat.studies.budget.tolerances import toleranced_parts
 from kinetostat.studies.identification.record import read_fit
 from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
 

@@ -14,7 +14,7 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.identification.record import FitRecord, RecordedFit
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.report import Answers
+from kinetostat.studies.report import REPORT_QUESTIONS, Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.answers import description_of
@@ -50,10 +50,8 @@ from kinetostat.views.report.pictures import figure_of
 from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 
-ANSWERS_WITH_SECTIONS = (
-    "under_load", "elevation", "tensions", "capability", "vibration", "drives", "lobes", "budget"
-)  # fmt: skip
-"""Answers of `studies.report.REPORT_QUESTIONS` with a section, in the order of a report."""
+ANSWERS_WITH_SECTIONS = [question.name for question in REPORT_QUESTIONS if question.section]
+"""Answers with a section of their own, in the order of a report."""
 LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
 LINE_OF_FIRST_PAGE = "Pose"
 """Head of the line that is on the first page of a report already."""

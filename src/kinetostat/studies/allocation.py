@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import minimize
 
+from kinetostat.accuracy.toleranced_parts import RandomInputs, TolerancedPart
+from kinetostat.accuracy.tool_error import Measures
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.budget.spread import Measures
-from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart
 
 MOST_DECIDING_POSES = 40
 """Greatest number of poses that decide an allocation together: each is added because it exceeds the wanted error."""

@@ -14,6 +14,19 @@ import numpy as np
 
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.accuracy.toleranced_parts import RandomInputs, TolerancedPart, random_inputs, toleranced_parts
+from kinetostat.accuracy.tool_error import (
+    PARASITIC,
+    USUAL_PERCENT,
+    ExactSample,
+    Measures,
+    Spread,
+    exact_sample,
+    measures_of,
+    shares,
+    spread_of,
+    squares_of,
+)
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
@@ -27,21 +40,8 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
+from kinetostat.studies.allocation import Allocation, allocation_for, reach_of
 from kinetostat.studies.attribution import ranking_of
-from kinetostat.studies.budget.allocation import Allocation, allocation_for, reach_of
-from kinetostat.studies.budget.spread import (
-    PARASITIC,
-    USUAL_PERCENT,
-    ExactSample,
-    Measures,
-    Spread,
-    exact_sample,
-    measures_of,
-    shares,
-    spread_of,
-    squares_of,
-)
-from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart, random_inputs, toleranced_parts
 from kinetostat.studies.grid import GridQuestion, grid_question
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.poses import PoseColumns, given_poses

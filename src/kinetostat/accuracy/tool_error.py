@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.accuracy.toleranced_parts import RandomInputs
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
@@ -19,7 +20,6 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.budget.tolerances import RandomInputs
 from kinetostat.tolerances import NO_FREEDOM
 
 PARASITIC = "parasitic "
