@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+import kinetostat
 from driven_sets import LINEAR, MACHINES, greatest_motion, greatest_wrench
-from kinetostat import InputError, capability, dynamics, load, save
+from kinetostat import InputError, capability, drives, dynamics, evaluate, load, save
 from kinetostat.numerics.polytopes import outline, reach_along, vertices
 from kinetostat.views.capability import CAPABILITY
 from kinetostat.views.capability_figures import capability_figures
@@ -160,3 +161,26 @@ def test_the_greatest_acceleration_brings_a_drive_to_its_limit_in_inverse_dynami
 
 def test_a_machine_without_masses_has_no_accelerations():
     assert capability(load("hexapod", ["limits.actuator_force=500 N"])).set_of("acceleration") is None
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda machine: kinetostat.compile(machine, ["z"], "least_acceleration"),
+        lambda machine: evaluate(machine, {"z": [0.1, 3.0]}, ["greatest_acceleration_x"]),
+        dynamics,
+        lambda machine: drives(machine, speed=0.1, acceleration=1.0),
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "limit", "reason"),
+    [
+        ("hexapod-rus", "limits.actuator_moment=50 N*m", "would have to span"),
+        ("tripteron", "limits.actuator_force=1 kN", "cannot|nearer"),
+    ],
+)
+def test_a_machine_whose_pose_has_no_place_is_refused_accelerations_in_a_sentence(ask, name, limit, reason):
+    machine = load(name, ["tool.mass=12 kg", limit, "pose.z=3 m"])
+    with pytest.raises(InputError, match=rf"has no place at .*({reason})") as refused:
+        ask(machine)
+    assert len(str(refused.value)) < 400

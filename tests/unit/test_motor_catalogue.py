@@ -53,16 +53,22 @@ def test_gears_pass_on_the_torque_that_their_data_sheet_prints_behind_them():
         assert "p. 3-7" in catalogue.sources["gears", name]
 
 
-def test_shafts_of_screws_turn_as_solid_steel_of_their_diameter():
-    """The inertia per length that the tables print, by another route: pi/32 rho d^4 of steel, to their three digits."""
+def test_shafts_of_screws_turn_as_solid_steel_of_their_diameter_unless_the_file_says_more(tmp_path):
+    """A cylinder of the mass m and the radius r has the inertia m r²/2; a number per length is taken as it is."""
     catalogue = read_catalogue()
     for name, screw in catalogue.screws.items():
-        diameter, lead = (1e-3 * float(size) for size in name.removeprefix("thk-").split("x"))
-        assert screw.lead == pytest.approx(lead)
-        assert screw.shaft == pytest.approx(np.pi / 32.0 * 7850.0 * diameter**4, rel=4e-3)
-        assert "THK" in catalogue.sources["screws", name]
-    _, beside = with_transmission(load("hexapod"), catalogue, "", "thk-20x5")
-    assert beside == pytest.approx(1.23e-3 * 1e-4 * 300.0)
+        diameter, lead = (1e-3 * float(size) for size in name.removeprefix("ball-").split("x"))
+        mass = 7850.0 * np.pi * (0.5 * diameter) ** 2 * 0.3
+        assert (screw.lead, screw.length) == pytest.approx((lead, 0.3))
+        assert screw.turning == pytest.approx(0.5 * mass * (0.5 * diameter) ** 2)
+        assert "steel" in catalogue.sources["screws", name]
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '[screws.mine]\nlead = "5 mm"\nshaft = "1.2e-3 kg*cm**2/mm"\ndiameter = "20 mm"\nlength = "300 mm"\n'
+        'inertia = "1e-6 kg*m**2"\n'
+    )
+    _, beside = with_transmission(load("hexapod"), read_catalogue(path), "", "mine")
+    assert beside == pytest.approx(1.2e-3 * 1e-4 * 300.0 + 1e-6)
 
 
 def test_limits_are_constant_then_of_constant_power_then_nothing():

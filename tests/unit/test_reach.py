@@ -40,6 +40,13 @@ def test_the_sentence_names_leg_figures_and_way_out():
     assert "good leg" not in message
 
 
+def test_of_legs_that_miss_their_reach_alike_the_worst_is_named_and_the_others_are_counted():
+    message = why_out_of_reach(spanning(Closure("other leg", 1.2, 0.2, 1.0), FAR, GOOD))
+    assert message.startswith("The far leg would have to span 1.25 m")
+    assert "1 more leg does not reach either" in message
+    assert message.count(". ") == 0
+
+
 def test_the_codes_of_a_status_are_those_of_saved_files():
     assert {status.word: int(status) for status in Status} == {
         "ok": 0,

@@ -32,7 +32,7 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.motion.response import response_in_motion
-from kinetostat.motion.rigid import MotionPlan, mechanism_over_scalars, plan_of
+from kinetostat.motion.rigid import MotionPlan, plan_of
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
 from kinetostat.vibration.slopes import vibrating
@@ -246,11 +246,10 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     state = MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(
-            f"motions of {machine.name} are not known, because it has no place at the pose of its file: "
-            f"{state.refusal} Change [pose]."
+            f"{machine.name} has no place at the pose of its file, which needs one for accelerations and friction of "
+            f"joints; change [pose]. {state.refusal}"
         )
-    with np.errstate(all="ignore"):
-        return plan_of(mechanism_over_scalars(state.machine, state.configuration, state.joints))
+    return plan_of(state.machine, state.configuration, state.joints)
 
 
 def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:

@@ -32,7 +32,7 @@ from kinetostat.machine.parameters import POSE
 from kinetostat.motion.numbers import NUMBERS_OF_DRIVE, drive_numbers, joints_of, motion_details
 from kinetostat.motion.operators import MachineAtPose, at_pose
 from kinetostat.motion.rates import PoseRates
-from kinetostat.motion.rigid import MotionPlan, masses_of_links, mechanism_over_scalars, plan_of
+from kinetostat.motion.rigid import MotionPlan, masses_of_links, plan_of
 
 COMPILED_FROM = 2000
 """Points from which machine code pays, which takes a second or two to compile and is then kept on disk."""
@@ -139,8 +139,7 @@ class RigidForm:
 
 def rigid_form(state: MachineState) -> RigidForm:
     """Decide what the equations of a machine look like, at its pose."""
-    with np.errstate(all="ignore"):
-        plan = plan_of(mechanism_over_scalars(state.machine, state.configuration, state.joints))
+    plan = plan_of(state.machine, state.configuration, state.joints)
     closed = state.machine.family.chains is None
     masses = tuple(map(float, masses_of_links(state.machine, state.configuration))) if closed else ()
     return RigidForm(state.machine, plan, masses if any(masses) else ())

@@ -139,7 +139,8 @@ def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
     if freedom.stiffness > 0.0:
         joint.set("stiffness", _n(freedom.stiffness))
         joint.set("damping", _n(pace.damping(freedom.stiffness)))
-        joint.set("armature", _n(pace.armature(freedom)))
+    if (armature := pace.armature(freedom)) != 0.0:  # of a passive slide as well, along which a link stretches
+        joint.set("armature", _n(armature))
 
 
 def _shapes(element: Element, body: Body, radius: float, material: str) -> None:

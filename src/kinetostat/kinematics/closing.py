@@ -58,18 +58,24 @@ def within_reach(configuration: Configuration) -> Scalar:
 
 
 def why_out_of_reach(configuration: Configuration) -> str:
-    """Say which legs do not close, a sentence each, with the lengths in m and what to change."""
+    """Say which leg misses its reach by most, with lengths in m and what to change: a sentence for each way to miss."""
+    # If the first part of a leg does not close, its next part has no place, and so its span is NaN.
+    open_legs = [c for c in configuration.closures if clearance(c) < 0.0 and not isnan(c.span)]
+    ways = (
+        (True, "at most", "move the platform nearer or lengthen its links"),
+        (False, "at least", "move the platform away or make its links more equal in length"),
+    )
     sentences = []
-    for closure in configuration.closures:
-        # If the first part of a leg does not close, its next part has no place, and so its span is NaN.
-        if clearance(closure) >= 0.0 or isnan(closure.span):
+    for too_far, least, advice in ways:
+        legs = sorted((c for c in open_legs if (c.span > c.longest) is too_far), key=clearance)
+        if not legs:
             continue
-        far = closure.span > closure.longest
-        limit = f"at most {closure.longest:.6g} m" if far else f"at least {closure.shortest:.6g} m"
-        nearer = "move the platform nearer or lengthen its links"
-        advice = nearer if far else "move the platform away or make its links more equal in length"
+        worst, others = legs[0], len(legs) - 1
+        limit = worst.longest if too_far else worst.shortest
+        more = f", and {others} more {'legs do' if others > 1 else 'leg does'} not reach either" if others else ""
         sentences.append(
-            f"The {closure.leg} would have to span {closure.span:.6g} m, but its links can span {limit}; {advice}."
+            f"The {worst.leg} would have to span {worst.span:.6g} m, but its links can span {least} {limit:.6g} m{more}"
+            f"; {advice}."
         )
     return " ".join(sentences) or "The legs cannot reach the platform at this pose; move it nearer to the home pose."
 

@@ -347,12 +347,13 @@ def _following(columns: Sequence[Row], spare: bool) -> tuple[list[Row], list[Row
     return [list(row) for row in zip(*solution, strict=True)], against
 
 
-def plan_of(mechanism: Mechanism) -> MotionPlan:
-    """Decide, at a pose with numbers, which motions there are.
+def plan_of(machine: Machine, configuration: Configuration, joints: Joints | None) -> MotionPlan:
+    """Decide, at a pose with numbers, which motions there are; arguments as of `mechanism_over_scalars`."""
+    with np.errstate(all="ignore"):
+        return _plan_of(mechanism_over_scalars(machine, configuration, joints))
 
-    Args:
-        mechanism: over scalars that are floats.
-    """
+
+def _plan_of(mechanism: Mechanism) -> MotionPlan:
     legs, against = [], []
     for leg in mechanism.legs:
         passive = _coordinates(leg)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import Wrench
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest, state_of
 from kinetostat.frozen import dataclass
@@ -23,12 +23,11 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
-from kinetostat.motion.operators import loads_by_acceleration
+from kinetostat.motion.response import response_in_motion
+from kinetostat.motion.rigid import plan_of
 from kinetostat.numerics.polytopes import reach_along, vertices
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
@@ -183,21 +182,13 @@ def limits_of_drives(state: MachineState) -> set[str]:
 
 
 def _with_loads(state: MachineState) -> Response:
-    """The machine at its pose, with what its drives carry at rest where it is meant so."""
-    response = replace(state.free, acceleration_loads=_acceleration_loads(state))
+    """The machine at its pose, with loads by accelerations, and what its drives carry at rest where it is meant so."""
+    plan = plan_of(state.machine, state.configuration, state.joints)
+    response = response_in_motion(state.machine, state.free, state.joints, plan, ["least_acceleration"])
     if not state.machine.loaded or state.at_rest is None:
         return response
     carried = [float(load[0]) for _, load in actuator_loads_at_rest(state.at_rest)]
     return replace(response, loaded={"drive_loads": carried})
-
-
-def _acceleration_loads(state: MachineState) -> list[Twist] | None:
-    """Loads of drives per unit of acceleration; None without masses, or where drives do not move the machine alone."""
-    try:
-        rows = loads_by_acceleration(rigid_form_of(state).at(state))
-    except InputError:
-        return None
-    return rows if any(float(c) for row in rows for c in row.components()) else None
 
 
 def _drives(response: Response) -> tuple[DriveAtPose, ...]:
@@ -250,9 +241,9 @@ def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> Ca
 
 
 def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
-    """The accelerations from rest that the drives allow, without turning or of turns alone; None if it has none.
+    """The accelerations from rest that the drives allow, without turning or of turns alone.
 
-    Friction does not count.
+    Friction does not count. None if it has none, or nothing that moves so has a mass.
     """
     directions = _null_space(_block_of(response.transmission.constraints, block), response.transmission, block)
     if not response.acceleration_faces or not directions.shape[1]:
@@ -261,6 +252,8 @@ def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str
     rows = whole @ directions @ directions.T
     sizes = np.linalg.norm(rows, axis=1)
     felt = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
+    if not len(felt):
+        return None
     faces = [response.acceleration_faces[number] for number in felt]
     names = [tuple(drives[drive].name for drive in face.drives) for face in faces]
     matrix = np.vstack([rows[felt], -rows[felt]])

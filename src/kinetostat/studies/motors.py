@@ -18,6 +18,7 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
@@ -78,7 +79,14 @@ class ScrewRating:
     efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
     inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it beside the shaft")] = 0.0
     shaft: Annotated[float, Quantity("linear moment of inertia", "of the screw shaft per length")] = 0.0
+    diameter: Annotated[float, Quantity("length", "of a solid steel shaft, if `shaft` is not given")] = 0.0
     length: Annotated[float, Quantity("length", "of the screw shaft")] = 0.0
+
+    @property
+    def turning(self) -> float:
+        """Inertia of all that turns in it, kg·m²; of a solid shaft, pi/32 times density and diameter to the fourth."""
+        solid = math.pi / 32.0 * MATERIALS["steel"].density * self.diameter**4
+        return self.inertia + (self.shaft or solid) * self.length
 
 
 SOURCE = "source"
@@ -268,7 +276,7 @@ def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str)
         if name:
             part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
             settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
-            beside += part.inertia + (part.shaft * part.length if isinstance(part, ScrewRating) else 0.0)
+            beside += part.turning if isinstance(part, ScrewRating) else part.inertia
     return with_every_drive(machine, settings), beside
 
 
