@@ -76,8 +76,8 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
     written = {given.number: name for given, name in zip(inputs, names, strict=True)}
     condition, values = _condition_of(results)
     decided = [code] if condition is None else [condition, code]
-    before = needed_nodes(decided)
-    used = [*before, *(node for node in needed_nodes([*values, *decided]) if node not in set(before))]
+    before = dict.fromkeys(needed_nodes(decided))
+    used = [*before, *(node for node in needed_nodes([*values, *decided]) if node not in before)]
     uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
     uses.update(result.number for result in (*values, *decided) if isinstance(result, Node))
     lines: list[str] = []
@@ -186,6 +186,7 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
     uses.update(result.number for result in results if isinstance(result, Node))
     letters = {operation: chr(ord("a") + place) for place, operation in enumerate(NOTATION)}
     kept = [given.number for given in inputs]
+    known = set(kept)  # to ask the list itself would read all of it for each operation
     numbers: dict[str, int] = {}  # by their digits, so that 0 is not -0
     code: list[str] = []
     counts: list[int] = []
@@ -200,7 +201,8 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
             code.append(letters[operand.operation].upper() if again else letters[operand.operation])
             if again:
                 kept.insert(0, operand.number)
-        elif operand.number in kept:
+                known.add(operand.number)
+        elif operand.number in known:
             counts.append(kept.index(operand.number))
             kept.insert(0, kept.pop(counts[-1]))
             code.append(EARLIER)
