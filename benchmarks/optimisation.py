@@ -29,7 +29,7 @@ def timed(name: str, *settings: str) -> tuple[Log, float, float]:
 
 def best(log: Log) -> float:
     """The objective of the best design."""
-    return float(log.outcome(log.kept[:1]).objectives[0, 0])
+    return float(log.outcome(log.survivors[:1]).objectives[0, 0])
 
 
 def rows() -> Iterator[tuple[str, str]]:

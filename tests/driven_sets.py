@@ -122,7 +122,7 @@ def greatest_wrench(response, direction):
 def greatest_motion(response, direction):
     """By a linear programme over all rates of joints: how fast the platform may move along a direction."""
     passive, driven = screws(response)
-    absent = [] if response.configuration.plane is None else response.configuration.plane.absent
+    absent = [] if response.configuration.plane is None else response.configuration.plane.missing_freedoms
     away = np.array([joint.twist(response.reference).components() for joint in absent], dtype=float).reshape(-1, 6).T
     blocks = [np.hstack([free, held, away]) for free, held in zip(passive, driven, strict=True)]
     size = sum(block.shape[1] for block in blocks)

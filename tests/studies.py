@@ -60,4 +60,4 @@ def solved(name=PAPER, *settings):
 
 def best(log):
     """Objective of the best design of a search with one."""
-    return float(log.outcome(log.kept[:1]).objectives[0, 0])
+    return float(log.outcome(log.survivors[:1]).objectives[0, 0])

@@ -17,7 +17,7 @@ def compliance(response: Response) -> Array:
     """
     configuration, length = response.configuration, float(response.configuration.length)
     plane = configuration.plane
-    absent = () if plane is None else plane.absent
+    absent = () if plane is None else plane.missing_freedoms
     missing = columns([joint.twist(response.reference) for joint in absent], length)
     exist = null_space(missing.T) if absent else np.eye(6)
     bases, yielding = [], []

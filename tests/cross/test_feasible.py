@@ -144,7 +144,7 @@ def test_speeds_are_those_of_a_linear_programme_over_the_joints(name, block, cou
 def worst_motion(response, block):
     """The least of the greatest speeds over directions that the machine has, by the rates of the drives alone."""
     passive, driven = screws(response)
-    absent = [] if response.configuration.plane is None else response.configuration.plane.absent
+    absent = [] if response.configuration.plane is None else response.configuration.plane.missing_freedoms
     away = np.array([joint.twist(response.reference).components() for joint in absent], dtype=float).reshape(-1, 6).T
     # All rates of joints at unit speeds of the platform along the axes of the block, by least squares leg by leg.
     basis = np.eye(6)[:, BLOCKS[block]]

@@ -65,7 +65,7 @@ def test_what_is_not_seen_is_the_null_space_of_the_measurements(name):
     _, sizes, ways = np.linalg.svd(jacobian)
     # Differences keep half of the digits, so that what is hardly seen lies between 1e-6 and the round-off of both.
     assert answer.fit.rank >= (sizes > 1e-5 * sizes[0]).sum()
-    assert np.linalg.norm(jacobian @ answer.fit.unseen, axis=0).max(initial=0.0) < 1e-5 * sizes[0]
+    assert np.linalg.norm(jacobian @ answer.fit.unseen_combinations, axis=0).max(initial=0.0) < 1e-5 * sizes[0]
     assert len(answer.unseen) == len(answer.unknowns) - answer.fit.rank
     assert len(ways) == len(answer.unknowns)
 

@@ -180,7 +180,7 @@ generations = 15
 def test_a_catalogue_is_chosen_from(method):
     """The stiffest actuator is too weak for the load; of the others the stiffer one is best."""
     log = search(Assessor(written(CATALOGUE, f"optimizer.method={method}")))
-    chosen = log.genes(log.kept[:1])[0, 1]
+    chosen = log.genes(log.survivors[:1])[0, 1]
     assert chosen == 1.0
     outcome = log.outcome()
     weak = log.genes()[:, 1] == 0.0

@@ -226,7 +226,7 @@ def test_tied_and_fixed_variables():
     settings = ('variables.0.from="30 cm"', 'variables.0.to="40 cm"', "variables.1.fixed=true")
     study = written(tied, *settings)
     log = search(Assessor(study))
-    columns = study.space.columns(log.genes(log.kept[:1]))
+    columns = study.space.columns(log.genes(log.survivors[:1]))
     assert columns["geometry.passive_links.1"] == pytest.approx(2.0 * columns["geometry.passive_links.0"])
     assert columns["geometry.base_radius"] == 0.22
     assert study.space.size == 1

@@ -250,7 +250,7 @@ def test_a_draft_is_read_as_a_study_file_is():
     with refused(r"optimizer.population is \"many\""):
         draft.problem(machine)
     draft.optimizer["population"] = 8
-    assert draft.problem(machine).space.searched[0].high == pytest.approx(0.264)
+    assert draft.problem(machine).space.searched_variables[0].high == pytest.approx(0.264)
 
 
 def test_a_saved_study_solves_the_same_problem(tmp_path):

@@ -98,7 +98,7 @@ def test_the_bundled_pose_is_regular(name):
 def test_a_leg_carries_all_that_does_no_work_on_its_passive_joints(name):
     machine = somewhere(name)
     configuration = machine.configure()
-    absent = configuration.plane.absent if configuration.plane else ()
+    absent = configuration.plane.missing_freedoms if configuration.plane else ()
     for leg in configuration.legs:
         screws = leg.screws(configuration.platform.translation, configuration.length, absent)
         twists, wrenches = (np.array([components(s) for s in found]) for found in (screws.passive, screws.wrenches))

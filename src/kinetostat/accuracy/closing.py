@@ -200,8 +200,8 @@ def free_screws(row: LegRow, rows: HomeRows, at: PlacedChain, tool: Array) -> Ar
         at: where the leg is.
         tool: the points, m [n x 3].
     """
-    free = row.chain.rates(at)[:, :, list(row.free)] * np.where(
-        np.array(row.slides, dtype=bool)[list(row.free)], rows.length, 1.0
+    free = row.chain.rates(at)[:, :, list(row.free_coordinates)] * np.where(
+        np.array(row.slides, dtype=bool)[list(row.free_coordinates)], rows.length, 1.0
     )
     absent = np.broadcast_to(rows.absent.T, (len(free), 6, len(rows.absent)))
     screws = np.concatenate([free, absent], axis=2)
@@ -210,7 +210,7 @@ def free_screws(row: LegRow, rows: HomeRows, at: PlacedChain, tool: Array) -> Ar
 
 def _units(row: LegRow, length: float) -> Array:
     """The units of its free coordinates, 1 rad or the machine's length, m."""
-    return np.array([length if row.slides[place] else 1.0 for place in row.free])
+    return np.array([length if row.slides[place] else 1.0 for place in row.free_coordinates])
 
 
 def screws_of_legs(
@@ -329,17 +329,17 @@ def closed_legs(
         gaps = [-in_lengths(at_points(closing_gap(there.platform, at.end), tool), length) for at in places]
         twist = sum((hold.twist(i, gap[:, None])[:, 0] for i, gap in enumerate(gaps)), np.zeros((len(poses), 6)))
         every = zip(legs, free, gaps, strict=True)
-        joints = [screws.steps(twist - gap)[:, : len(row.free)] for row, screws, gap in every]
+        joints = [screws.steps(twist - gap)[:, : len(row.free_coordinates)] for row, screws, gap in every]
         step = np.concatenate([twist, *joints], axis=1)
         return largest(np.concatenate(gaps, axis=1)), lambda going: step[going]
 
     def move(there: ClosedLegs, step: Array) -> ClosedLegs:
-        twist, *joints = np.split(step, np.cumsum([6, *(len(row.free) for row in legs[:-1])]), axis=1)
+        twist, *joints = np.split(step, np.cumsum([6, *(len(row.free_coordinates) for row in legs[:-1])]), axis=1)
         back = np.concatenate([twist[:, :3], twist[:, 3:] * length], axis=1)
         platform = exponential(at_points(back, -_tool_at(there.platform, tool_home))) @ there.platform
         coordinates = [q.copy() for q in there.coordinates]
         for row, values, change in zip(legs, coordinates, joints, strict=True):
-            values[:, list(row.free)] += change * _units(row, length)
+            values[:, list(row.free_coordinates)] += change * _units(row, length)
         return ClosedLegs(platform, tuple(coordinates), there.settled)
 
     count = len(start.settled)

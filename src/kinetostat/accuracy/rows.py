@@ -100,14 +100,14 @@ class LegRow:
         return len(self.slides)
 
     @cached_property
-    def driven(self) -> tuple[int, ...]:
+    def driven_coordinates(self) -> tuple[int, ...]:
         """Its coordinates that actuators hold."""
         return tuple(unit.drive.coordinate for unit in self.units if unit.drive)
 
     @cached_property
-    def free(self) -> tuple[int, ...]:
+    def free_coordinates(self) -> tuple[int, ...]:
         """Its coordinates that move freely."""
-        return tuple(i for i in range(self.size) if i not in self.driven)
+        return tuple(i for i in range(self.size) if i not in self.driven_coordinates)
 
     @cached_property
     def chain(self) -> Chain:
@@ -203,7 +203,7 @@ def _platform_placement(configuration: Configuration) -> tuple[Array, Array]:
 
 
 def _absent_twists(configuration: Configuration) -> Array:
-    joints = () if configuration.plane is None else configuration.plane.absent
+    joints = () if configuration.plane is None else configuration.plane.missing_freedoms
     return np.array([joint.twist(ZERO).components() for joint in joints], dtype=float).reshape(-1, 6)
 
 

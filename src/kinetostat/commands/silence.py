@@ -61,9 +61,9 @@ class SilenceWatch:
 
     def _watch(self) -> None:
         while not self._over.wait(max(self._heard + PATIENCE - time.monotonic(), COURTESY)):
-            if self._silent() and not self._over.wait(COURTESY) and self._silent():
+            if self._is_silent() and not self._over.wait(COURTESY) and self._is_silent():
                 with self._lock:
-                    if self._silent() and not self._over.is_set():
+                    if self._is_silent() and not self._over.is_set():
                         self._write(f"{self._words} ...")
                         self._spoken = True
 
@@ -71,7 +71,7 @@ class SilenceWatch:
         self._terminal.write(text)
         self._terminal.flush()
 
-    def _silent(self) -> bool:
+    def _is_silent(self) -> bool:
         return not self._spoken and time.monotonic() >= self._heard + PATIENCE
 
 

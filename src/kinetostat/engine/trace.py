@@ -211,7 +211,7 @@ class Graph:
         """The condition that an operation gives."""
         return self._node(Condition, operation, operands)
 
-    def known(self, operation: str, *operands: Operand) -> Any:
+    def known_node(self, operation: str, *operands: Operand) -> Any:
         """The node of an operation if it has been traced already, else None."""
         return self._known.get(_key(operation, operands))
 
@@ -357,7 +357,7 @@ def _sub(a: Any, b: Any) -> Any:
     if (minus := _negated_operand(a)) is not None:
         return -_add(minus, b)
     graph = (a if isinstance(a, Node) else b).graph
-    opposite = graph.known("sub", b, a)
+    opposite = graph.known_node("sub", b, a)
     return _binary("sub", a, b) if opposite is None else -opposite
 
 

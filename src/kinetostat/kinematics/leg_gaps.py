@@ -52,11 +52,11 @@ class Build:
             poses, legs: numbers of pose and leg [n].
         """
 
-        def chosen(scalar: Scalar) -> Scalar:
+        def entry_of(scalar: Scalar) -> Scalar:
             return scalar if isinstance(scalar, float) else column(scalar[poses if len(scalar) > 1 else 0, legs])
 
         return tuple(
-            Step(_element_of([element], lambda scalars: chosen(scalars[0])), True) for element in self.elements
+            Step(_element_of([element], lambda scalars: entry_of(scalars[0])), True) for element in self.elements
         )
 
 

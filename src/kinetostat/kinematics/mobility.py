@@ -110,7 +110,7 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
 
 def _twists_absent(configuration: Configuration) -> int:
     """Number of twists that a plane takes away."""
-    return 0 if configuration.plane is None else len(configuration.plane.absent)
+    return 0 if configuration.plane is None else len(configuration.plane.missing_freedoms)
 
 
 def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
@@ -163,7 +163,7 @@ def _free(leg: Leg) -> list[Joint]:
 
 def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Array:
     """Unit screws of all joints of a leg, actuated ones and flexures too, and of what a plane takes away [6 x n]."""
-    absent = configuration.plane.absent if configuration.plane else ()
+    absent = configuration.plane.missing_freedoms if configuration.plane else ()
     hinges = [spring.joint for spring in leg.springs if spring.hinge and float(spring.stiffness) > 0.0]
     joints = (*_free(leg), *hinges, *_drives(leg), *absent)
     return _unit_screws([joint.twist(reference) for joint in joints], configuration)
@@ -181,7 +181,7 @@ def _unit_screws(screws: Sequence[Screw], configuration: Configuration) -> Array
 def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple[Array, Array]:
     """Wrenches that hold the platform, scaled to compare [6 x n]: with actuators free, and with actuators held."""
     length = float(configuration.length)
-    absent = configuration.plane.absent if configuration.plane else ()
+    absent = configuration.plane.missing_freedoms if configuration.plane else ()
     guide = []
     if configuration.plane:
         plane = _unit_screws([joint.twist(reference) for joint in configuration.plane.freedoms], configuration)

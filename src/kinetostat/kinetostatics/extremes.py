@@ -131,13 +131,13 @@ def reversal_error(response: Response, row: int) -> Scalar:
 
     Source: theory (105).
     """
-    if response.held_by_joints is None:
+    if response.lost_motion_of_joints is None:
         return math.nan
     pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
     twists = [twist for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
     moved = zip(twists, response.drives, strict=True)
     lost = [abs(twist.components()[row]) * drive.lost_motion for twist, drive in moved]
-    return total([*lost, response.held_by_joints[row]])
+    return total([*lost, response.lost_motion_of_joints[row]])
 
 
 def _least(values: Sequence[Scalar]) -> Scalar:

@@ -67,7 +67,7 @@ class Response:
         drives: what each drive may do, in the order of the actuators that hold something.
         acceleration_loads: load of each drive per unit of acceleration at the tool point (`motion.operators`), where it
             has been computed.
-        held_by_joints: motion of the tool that friction of passive joints holds back, by component, m or rad
+        lost_motion_of_joints: motion of the tool that friction of passive joints holds back, by component, m or rad
             (`motion.response`), where it has been computed.
     """
 
@@ -93,7 +93,7 @@ class Response:
     cables: Mapping[str, Any] | None = None
     drives: tuple[DriveLimits, ...] = ()
     acceleration_loads: Sequence[Twist] | None = None
-    held_by_joints: Sequence[Scalar] | None = None
+    lost_motion_of_joints: Sequence[Scalar] | None = None
     regularity = renamed_property("singularity_margin")
 
     @cached_property
@@ -210,7 +210,7 @@ def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tupl
         return (), ()
     freedoms = [joint.twist(reference) for joint in configuration.plane.freedoms]
     wrenches, _ = reciprocal_wrenches(freedoms, configuration.length)
-    return configuration.plane.absent, wrenches
+    return configuration.plane.missing_freedoms, wrenches
 
 
 def pose_status(

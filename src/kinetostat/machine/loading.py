@@ -324,7 +324,7 @@ def _quantity_lines(fields: type, table: Any, readable: bool) -> Iterator[str]:
         values = getattr(table, field)
         if quantity.unset is not None and values == quantity.unset:
             continue
-        show = quantity.written if readable else quantity.show
+        show = quantity.in_file if readable else quantity.show
         texts = [json.dumps(show(value)) for value in (values if quantity.count else (values,))]
         alone = quantity.count is None or (readable and not quantity.apart and len(set(texts)) == 1)
         yield f"{field} = {texts[0] if alone else '[' + ', '.join(texts) + ']'}"

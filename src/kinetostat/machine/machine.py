@@ -66,7 +66,7 @@ class Plane:
         return Joint(axes.z, self.frame.translation), Joint(axes.x), Joint(axes.y)
 
     @property
-    def absent(self) -> tuple[Joint, ...]:
+    def missing_freedoms(self) -> tuple[Joint, ...]:
         """The two rotations and the translation that do not exist: rx, ry, z of the plane."""
         axes = self.frame.rotation
         return Joint(axes.x, self.frame.translation), Joint(axes.y, self.frame.translation), Joint(axes.z)

@@ -108,14 +108,14 @@ def _field(home: Any, name: str, quantity: Quantity, new: Any, old: Any) -> tupl
     """Return the table, the key and the value that stand for the new numbers of a field."""
     before = home.get(name)
     if quantity.count is None:
-        return home, name, quantity.written(new, before)
+        return home, name, quantity.in_file(new, before)
     if isinstance(before, list) and old is not None:
         for i, (value, former) in enumerate(zip(new, old, strict=True)):
             if value != former:
-                before[i] = quantity.written(value, before[i])
+                before[i] = quantity.in_file(value, before[i])
         return home, name, before
     alike = not quantity.apart and len(set(new)) == 1
-    return home, name, quantity.written(new[0], before) if alike else [quantity.written(v, before) for v in new]
+    return home, name, quantity.in_file(new[0], before) if alike else [quantity.in_file(v, before) for v in new]
 
 
 def _place(document: Any, keys: list[str]) -> Any:

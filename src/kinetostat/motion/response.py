@@ -36,15 +36,15 @@ def response_in_motion(
     if not needs_motion(names):
         return response
     if plan is None:
-        return replace(response, held_by_joints=[0.0] * SIZE)
+        return replace(response, lost_motion_of_joints=[0.0] * SIZE)
     here = at_pose(machine, response.configuration, joints, plan)
     # Fewer drives than motions hold nothing.
     are_enough = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))
     loads = loads_by_acceleration(here) if needs_masses(names) and are_enough else None
-    return replace(response, acceleration_loads=loads, held_by_joints=held_by_joints(here, response))
+    return replace(response, acceleration_loads=loads, lost_motion_of_joints=lost_motion_of_joints(here, response))
 
 
-def held_by_joints(here: MachineAtPose, response: Response) -> list[Scalar]:
+def lost_motion_of_joints(here: MachineAtPose, response: Response) -> list[Scalar]:
     """Motion of the tool, rx ry rz x y z, that friction of passive joints holds back where all of them reverse.
 
     A joint that moves by q under a unit load on the tool moves the tool by q, along this load, under a unit moment of
@@ -60,7 +60,7 @@ def held_by_joints(here: MachineAtPose, response: Response) -> list[Scalar]:
     if all(is_zero(part.coulomb) for leg in here.rigid.legs for part in leg.friction):
         return [0.0] * SIZE
     compliances = _compliances(response)
-    moved = _moved_by_loads(response, compliances)
+    moved = _motions_under_unit_loads(response, compliances)
     first, parts = 0, [[0.0]] * SIZE
     for leg, placed, screws in zip(here.rigid.legs, response.configuration.legs, response.legs, strict=True):
         count = len(placed.springs)
@@ -72,7 +72,7 @@ def held_by_joints(here: MachineAtPose, response: Response) -> list[Scalar]:
                         load = response.statics.flexibility[number].components()[row]
                         twist = screws.elastic[number - first]
                         left = left - twist * (compliances[number] * load)
-                parts[row] = [*parts[row], _held_by_leg(leg, left, here.rigid.length)]
+                parts[row] = [*parts[row], _lost_motion_of_leg(leg, left, here.rigid.length)]
         first += count
     return [total(row) for row in parts]
 
@@ -84,7 +84,7 @@ def _compliances(response: Response) -> list[Scalar]:
     return [loops.get(name, alone) for name, alone in zip(names, response.statics.compliance, strict=True)]
 
 
-def _moved_by_loads(response: Response, compliances: Sequence[Scalar]) -> list[Twist]:
+def _motions_under_unit_loads(response: Response, compliances: Sequence[Scalar]) -> list[Twist]:
     """The twist of the tool by a unit load along each component: columns of C with these compliances."""
     columns = []
     for row in range(SIZE):
@@ -100,7 +100,7 @@ def _halves(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return Vector(*components[:3]), Vector(*components[3:])
 
 
-def _held_by_leg(leg: RigidLeg, motion: Twist, length: Scalar) -> Scalar:
+def _lost_motion_of_leg(leg: RigidLeg, motion: Twist, length: Scalar) -> Scalar:
     """Motion, m or rad, that friction of the joints of a leg holds back, whose end moves so far per unit of a load."""
     scaled = [*motion.rotational.components(), *(motion.translational * (1.0 / length)).components()]
     rates = [total([a * b for a, b in zip(row, scaled, strict=True)]) for row in leg.solved[: leg.passive]]

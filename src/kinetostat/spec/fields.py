@@ -152,7 +152,7 @@ class Quantity:
         """An SI value of it as text that a file may hold."""
         return NO_LIMIT if value == self.unset else write(value, self.kind)
 
-    def written(self, value: float, like: object = None) -> str | float:
+    def in_file(self, value: float, like: object = None) -> str | float:
         """An SI value of it as people write it in a file, in the unit of what stood there before."""
         return NO_LIMIT if value == self.unset else written_value(value, self.kind, like)
 

@@ -133,7 +133,7 @@ class CompiledFunction:
     def __init__(self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str]) -> None:
         """Compile. Arguments and errors are those of `compile`."""
         self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities)
-        self._fields = _different([find(machine.family, name) for name in inputs])
+        self._fields = _without_repetition([find(machine.family, name) for name in inputs])
         self.machine, self.inputs = machine, tuple(field.path for field in self._fields)
         self.quantities, self.shape = _named_quantities(machine, quantities)
         refuse_absent(state_of(machine), self.quantities, self._fields)
@@ -237,7 +237,7 @@ class CompiledFunction:
         return rows.reshape((*self.shape, *shape))[()]
 
 
-def _different(fields: list[Parameter]) -> list[Parameter]:
+def _without_repetition(fields: list[Parameter]) -> list[Parameter]:
     """The fields, none of which another contains."""
     if not fields:
         raise InputError("inputs names no field; name those that vary, e.g. x.")

@@ -261,7 +261,7 @@ LEAST_DEPTH = 1e-3
 
 
 def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Float32s]:
-    """Find the borders along the lines of the grid.
+    """Locate where the verdict changes between neighbouring nodes of the grid.
 
     Args:
         judge: gives the verdict on a pose.

@@ -71,17 +71,17 @@ class StudioPage:
         self._header()
         with ui.element("main").classes("studio") as self.main:
             with ui.element("section").classes("left").props('aria-label="parameters"'):
-                self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
+                self.parameters = ParametersPanel(self.session, self.show_change, lambda: self._pictures.busy)
             with ui.element("section").classes("text-pane left").props('aria-label="machine file"'):
                 self.text = TextPane(self.session, lambda machine: self._take(machine, typed=True))
             with ui.element("section").classes("middle").props('aria-label="machine"'):
                 self.scene = ScenePanel(self._load, self._exaggerate, lambda: self.session.machine.name)
-                self.handles = Handles(self.session, self.scene.view, self.changed)
+                self.handles = Handles(self.session, self.scene.view, self.show_change)
                 with self.scene.tools:
-                    self.playback = Playback(self.session, self.changed, self._is_drawing)
+                    self.playback = Playback(self.session, self.show_change, self._is_drawing)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
-                    self.map = MapPanel(self.session, self.changed)
+                    self.map = MapPanel(self.session, self.show_change)
                 with ui.element("div").classes("card views-card"):
                     self._views()
             self.design = DesignTab(self.session, workshop, self._take)
@@ -111,7 +111,7 @@ class StudioPage:
         self.panels: dict[str, Panel] = {}
         made = [panel() for panel in PANELS]
         for panel in made:
-            panel.changed, panel.view, panel.is_busy = self.changed, self.scene.view, self._is_drawing
+            panel.show_change, panel.view, panel.is_busy = self.show_change, self.scene.view, self._is_drawing
         with ui.tabs(on_change=self._other_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
             for panel in made:
                 ui.tab(panel.name).mark(f"tab-{panel.name}")
@@ -121,7 +121,7 @@ class StudioPage:
                     panel.build()
                 self.panels[panel.name] = panel
 
-    def changed(self) -> None:
+    def show_change(self) -> None:
         """Request map and picture for new numbers of the machine; the report follows the picture."""
         self.map.refresh(time.perf_counter())
         self._pictures.ask(PictureRequest(self.session.machine, self._sizes, self._axes))
@@ -131,7 +131,7 @@ class StudioPage:
         else:
             self.parameters.refresh()
         self.text.refresh()
-        self.questions.changed()
+        self.questions.note_change()
         self._offer_history()
 
     def _is_drawing(self) -> bool:
@@ -156,7 +156,7 @@ class StudioPage:
         self.text.renew()
         self.map.fill()
         self.design.renew()
-        self.questions.changed()
+        self.questions.note_change()
         self._offer_history()
         self.map.refresh()
         self._pictures.ask(PictureRequest(machine, self._sizes, self._axes, fit=True))
@@ -166,7 +166,7 @@ class StudioPage:
         if self._listening and loaded is not self.session.machine.loaded:
             self.session.show_loaded(loaded)
             self.parameters.fill()
-            self.changed()
+            self.show_change()
 
     def _show_state(self) -> None:
         """Bring the switch to the state of the machine."""
@@ -265,14 +265,14 @@ class StudioPage:
             self._leave_front()
         elif self._front is None:
             self._show_front()
-        self.text.front(mode == TEXT)
-        self.design.front(mode == DESIGN)
-        self.questions.front(mode == ASK)
+        self.text.set_front(mode == TEXT)
+        self.design.set_front(mode == DESIGN)
+        self.questions.set_front(mode == ASK)
 
     def _take(self, machine: Machine, typed: bool = False) -> None:
         """Make a design of a search, a favourite, or what was typed as text the machine of this page."""
         if self.session.take(machine, typed):
-            self.changed()
+            self.show_change()
         else:
             self._show_machine()
 
@@ -282,15 +282,15 @@ class StudioPage:
 
     def _undo(self) -> None:
         self.session.undo()
-        self.changed()
+        self.show_change()
 
     def _redo(self) -> None:
         self.session.redo()
-        self.changed()
+        self.show_change()
 
     def _reset(self) -> None:
         self.session.reset()
-        self.changed()
+        self.show_change()
 
     def _close(self) -> None:
         lanes = (self._pictures, self._reports)

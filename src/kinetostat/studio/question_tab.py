@@ -58,7 +58,7 @@ class QuestionForm:
     fields: dict[str, Any] = field(default_factory=dict)
     files: dict[str, dict[str, bytes]] = field(default_factory=dict)
 
-    def given(self) -> dict[str, Any]:
+    def entries(self) -> dict[str, Any]:
         """Return what was filled in: a text, a flag or a list of texts by the name of an option."""
         texts = {}
         for option in self.question.options:
@@ -115,12 +115,12 @@ class AskTab:
             self.answer.props('tabindex="0" role="region" aria-label="answer"')
         self._show_busy(False)
 
-    def front(self, on: bool) -> None:
+    def set_front(self, is_in_front: bool) -> None:
         """Offer the questions once the tab has come to the front."""
-        if on and not self._forms:
+        if is_in_front and not self._forms:
             self._questions.ask(tuple(QUESTIONS))
 
-    def changed(self) -> None:
+    def note_change(self) -> None:
         """Say that an answer is about the machine before its last change."""
         if self._asked is not None and not self._busy:
             self.line.set_text("" if self._asked is self._session.machine else CHANGED)
@@ -210,7 +210,7 @@ class AskTab:
             return
         self._refuse("")
         self._asked, self._stopped = self._session.machine, False
-        request = {"word": str(self.choice.value), "options": form.given(), EVERY_ROW: form.full}
+        request = {"word": str(self.choice.value), "options": form.entries(), EVERY_ROW: form.full}
         sent = {name: data for files in form.files.values() for name, data in files.items()}
         self._show_busy(True)
         background_tasks.create(self._answer(request, sent), name="studio question")
@@ -242,7 +242,7 @@ class AskTab:
         self.answer.set_content(str(shown))
         for form, button in self.files.items():
             button.set_visibility((place / f"{ANSWER}.{form}").exists())
-        self.changed()
+        self.note_change()
 
     async def _run(self, folder: Path, request: bytes) -> str:
         """Run the process in its folder; return why there is no answer, empty if there is one."""

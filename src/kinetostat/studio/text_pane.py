@@ -117,9 +117,9 @@ class TextPane:
             self.back = ui.button("Undo the mistake", on_click=self._discard).props("flat dense no-caps")
             self.back.tooltip("show the text of the machine in the picture").mark("text-back").set_visibility(False)
 
-    def front(self, on: bool) -> None:
+    def set_front(self, is_in_front: bool) -> None:
         """Note whether the pane is in front: only then it follows the machine."""
-        self._front = on
+        self._front = is_in_front
         self.refresh()
 
     def refresh(self) -> None:

@@ -60,7 +60,7 @@ def bounds_table(problem: Problem) -> Table:
     """Return the variables with their bounds and meanings."""
     table = numeric_table("Variables", "variable", ["initial", "from", "to"])
     table.add_column("meaning")
-    for variable in problem.space.searched:
+    for variable in problem.space.searched_variables:
         low = 0.0 if variable.choices is not None else variable.low
         cells = (variable.in_words(value, problem.machine.display) for value in (variable.initial, low, variable.high))
         table.add_row(variable.name, *cells, variable.quantity.meaning)
@@ -118,7 +118,7 @@ def variable_table(result: Result) -> Table:
     )
     influences = {influence.name: influence for influence in result.influences}
     values, display = result.problem.space.values(result.genes), result.problem.machine.display
-    for variable, value in zip(result.problem.space.searched, values, strict=True):
+    for variable, value in zip(result.problem.space.searched_variables, values, strict=True):
         influence = influences.get(variable.name)
         percents = [_percent_text(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
@@ -171,14 +171,14 @@ def front_table(result: Result) -> Table:
         f"{objective.term.label}\n{display.scale(unit).unit}".replace(" (", "\n(")
         for objective, unit in zip(problem.objectives, units, strict=True)
     ]
-    variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
+    variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched_variables]
     title = f"Pareto front: {len(result.front)} designs" + (
         f", {len(shown)} shown" if len(result.front) > len(shown) else ""
     )
     table = numeric_table(title, "", [*names, *variables])
     for k in sorted(k for k in shown if k < len(result.front)):
         genes = result.log.genes(result.front[k : k + 1])[0]
-        values = zip(problem.space.searched, problem.space.values(genes), strict=True)
+        values = zip(problem.space.searched_variables, problem.space.values(genes), strict=True)
         cells = [display.number(value, unit) for value, unit in zip(outcome.objectives[k], units, strict=True)]
         cells += [variable.in_words(value, display) for variable, value in values]
         table.add_row("knee" if k == result.knee else "", *cells, style="bold" if k == result.knee else None)
@@ -250,7 +250,7 @@ def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
     columns = problem.space.columns(genes[None])
     return {
         field.path: float(columns[field.leaves[0]][0])
-        for variable in problem.space.searched
+        for variable in problem.space.searched_variables
         for field in variable.fields
     }
 
@@ -277,7 +277,7 @@ def _objective(result: Result) -> float | None:
 
 
 def _initial(result: Result) -> dict[str, Any]:
-    variables = {variable.name: variable.initial for variable in result.problem.space.searched}
+    variables = {variable.name: variable.initial for variable in result.problem.space.searched_variables}
     return {"variables": variables, **_numbers_of(result.problem, result.initial, 0)}
 
 
@@ -346,7 +346,7 @@ def designs_dataset(result: Result) -> "xr.Dataset":
     outcome = log.outcome()
     steps = np.repeat(np.arange(len(log.steps)), [step["designs"] for step in log.steps])
     content: dict[str, Any] = {"step": ("design", steps, {"long_name": "step of the search"})}
-    for variable, column in zip(problem.space.searched, problem.space.values(log.genes()).T, strict=True):
+    for variable, column in zip(problem.space.searched_variables, problem.space.values(log.genes()).T, strict=True):
         about = {"units": variable.unit, "long_name": variable.quantity.meaning}
         if variable.choices is not None:
             about["choices"] = "; ".join(variable.labels)

@@ -99,7 +99,7 @@ def _places(panel: Axes, result: Result) -> None:
     space, display = result.problem.space, result.problem.machine.display
     most = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
     before, after = space.initial / most, result.genes / most
-    for place, variable in enumerate(space.searched):
+    for place, variable in enumerate(space.searched_variables):
         panel.plot([0.0, 1.0], [place, place], color="#cccccc", linewidth=1.2, zorder=1)
         if -0.05 <= before[place] <= 1.05:
             panel.plot(before[place], place, "o", color="white", markeredgecolor="#444444", zorder=2)
@@ -114,7 +114,7 @@ def _places(panel: Axes, result: Result) -> None:
         ends.append(variable.in_words(variable.high, display))
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
             panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
-    panel.set_yticks(range(space.size), [variable.name for variable in space.searched])
+    panel.set_yticks(range(space.size), [variable.name for variable in space.searched_variables])
     panel.set(xlim=(-0.05, 1.45), xticks=[], xlabel="between its bounds")
     was = Line2D([], [], color="white", marker="o", markeredgecolor="#444444", linestyle="", label="before")
     best = Line2D([], [], color=COLOURS[0], marker="o", linestyle="", label="best")

@@ -42,7 +42,7 @@ def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
                 f'"{origin}": cross-section "{name}": inner_diameter is {data.inner_diameter:g} m; it must be at '
                 f"least 0 and less than outer_diameter, {data.outer_diameter:g} m."
             )
-    for leg in plan.written:
+    for leg in plan.legs_of_file:
         for i, joint in enumerate(leg.joints):
             where = f'"{origin}": leg "{leg.written or leg.name}", joint "{joint.name}"'
             data = tables[leg.table(joint.name)]
@@ -126,7 +126,7 @@ def _centre(joint: Joint) -> tuple[float, ...] | None:
 
 def _dependent_freedoms(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
     """Numbers of the freedoms that depend on those before and beside them; twists out of a plane count as given."""
-    absent = Plane().absent if planar else ()
+    absent = Plane().missing_freedoms if planar else ()
     twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
     if not freedoms:
         return ()

@@ -157,7 +157,7 @@ class Plan(Immutable):
     planar: bool
 
     @property
-    def written(self) -> tuple[LegPlan, ...]:
+    def legs_of_file(self) -> tuple[LegPlan, ...]:
         """The legs of the file: of copies, the first."""
         return tuple({leg.written or leg.name: leg for leg in reversed(self.legs)}.values())[::-1]
 
@@ -171,7 +171,7 @@ def literals(plan: Plan) -> dict[str, dict[str, object]]:
     for name, shape in plan.shapes.items():
         material = plan.materials[name]
         tables[f"sections.{name}"] = {"shape": shape, **({"material": material} if material else {})}
-    for leg in plan.written:
+    for leg in plan.legs_of_file:
         if leg.copies is not None:
             angles = {"angles": list(leg.copies.angles)} if leg.copies.angles else {}
             tables[f"legs.{leg.written}"] = {"copies": leg.copies.count, **angles, "mirrored": leg.copies.mirrored}

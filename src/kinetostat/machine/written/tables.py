@@ -40,7 +40,7 @@ def tables_of(plan: Plan) -> dict[str, type]:
     tables = {"platform": made_table("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
         tables[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
-    for leg in plan.written:
+    for leg in plan.legs_of_file:
         for joint in leg.joints:
             tables[leg.table(joint.name)] = made_table("JointTable", _joint_fields(joint))
             if joint.series:

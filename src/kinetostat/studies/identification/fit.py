@@ -131,7 +131,7 @@ class Fit:
         return np.asarray(self.covariance / np.outer(sizes, sizes))
 
     @property
-    def unseen(self) -> Array:
+    def unseen_combinations(self) -> Array:
         """A basis of the combinations that are not seen, in plausible sizes, as columns [unknowns x k]."""
         return self.ways[:, self.rank :]
 

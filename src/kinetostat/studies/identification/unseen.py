@@ -62,7 +62,7 @@ def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
         fit: to them.
         sizes: plausible size of each unknown, SI [unknowns].
     """
-    basis, result = fit.unseen, []
+    basis, result = fit.unseen_combinations, []
     if not basis.shape[1]:
         return []
     twists = observed.twists(observed.model.rates(values=observed.errors(fit.values)))

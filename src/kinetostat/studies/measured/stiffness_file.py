@@ -1,6 +1,6 @@
 """A measured stiffness from a CSV file: entries of K or C, or deflections under loads. Nothing is computed here.
 
-A file of entries has the columns entry, value and sigma; one of deflections is as `kinetostat identify` reads it.
+A file of entries has the columns entry, value and sigma; one of deflections is a file of measurements.
 """
 
 from collections.abc import Callable, Sequence

@@ -78,7 +78,7 @@ class Log:
     __hash__ = None  # type: ignore[assignment]  # it grows
 
     @property
-    def kept(self) -> Integers:
+    def survivors(self) -> Integers:
         """Numbers of the designs that the last step kept."""
         return np.array(self.steps[-1]["kept"], dtype=np.int64)
 
@@ -134,20 +134,20 @@ def record_of(log: Log, step: Step) -> dict[str, Any]:
 
 def best_feasible(log: Log) -> Integers:
     """Return the number of the best design of a log; empty if it is not feasible."""
-    first = log.kept[:1]
+    first = log.survivors[:1]
     return first if log.outcome(first).violation[0] == 0.0 else first[:0]
 
 
 def front_of(log: Log) -> Integers:
     """Return the Pareto-optimal designs among those that the search kept, ordered by the first objective."""
-    outcome = log.outcome(log.kept)
+    outcome = log.outcome(log.survivors)
     feasible = np.flatnonzero(outcome.violation == 0.0)
     if not feasible.size:
         return feasible
-    wanted = _signed_objectives(log)[log.kept[feasible]]
+    wanted = _signed_objectives(log)[log.survivors[feasible]]
     _, single = np.unique(wanted, axis=0, return_index=True)
     first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)
-    return log.kept[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
+    return log.survivors[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
 
 
 def knee_of(log: Log, front: Integers) -> int:

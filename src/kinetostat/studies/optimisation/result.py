@@ -211,7 +211,7 @@ def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Variab
     terms = [here.term(objective.term, objective.sign > 0) for objective in problem.objectives]
     influences = []
     for place, k in enumerate(survey.free):
-        variable = problem.space.searched[k]
+        variable = problem.space.searched_variables[k]
         slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in terms)
         size = 1.0 if variable.quantity.kind == "angle" else float(design[k])
         levels = [value for value, _ in terms]

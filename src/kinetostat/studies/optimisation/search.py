@@ -88,7 +88,7 @@ class Hybrid:
         """A generation, or the descent from the best of the last one."""
         if number < self.first.steps:
             return self.first.step(number, log)
-        return self.then.descend(log.genes(log.kept[:1])[0], log)
+        return self.then.descend(log.genes(log.survivors[:1])[0], log)
 
 
 def method_of(assess: Assessor) -> Method:

@@ -125,7 +125,7 @@ class Surveyor:
 
     def _chain(self) -> list[Mapping[str, float]]:
         """Return for each continuous gene the scalars of the machine that it changes, each with its rate per gene."""
-        searched = self.problem.space.searched
+        searched = self.problem.space.searched_variables
         return [
             {
                 leaf: ratio * (searched[k].high - searched[k].low)
@@ -292,7 +292,7 @@ class _Ground:
             whole = self.genes.copy()
             whole[numbers] = point
             ends.append(self.problem.space.values(whole)[numbers][taking_part])
-        names = tuple(self.problem.space.searched[numbers[k]].name for k in taking_part)
+        names = tuple(self.problem.space.searched_variables[numbers[k]].name for k in taking_part)
         return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first, second)))
 
     def _follow(self, at: Array, way: Array, level: float) -> tuple[Array, float]:
@@ -321,7 +321,10 @@ def _room(at: Array, way: Array) -> float:
 
 def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
     """Describe ridges in sentences."""
-    by_name, display = {variable.name: variable for variable in problem.space.searched}, problem.machine.display
+    by_name, display = (
+        {variable.name: variable for variable in problem.space.searched_variables},
+        problem.machine.display,
+    )
     sentences = []
     for ridge in ridges:
         ways = [

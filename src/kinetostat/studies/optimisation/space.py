@@ -97,29 +97,29 @@ class Space:
     variables: tuple[Variable, ...]
 
     @cached_property
-    def searched(self) -> tuple[Variable, ...]:
+    def searched_variables(self) -> tuple[Variable, ...]:
         """Those that are not fixed."""
         return tuple(variable for variable in self.variables if not variable.fixed)
 
     @property
     def size(self) -> int:
         """Number of variables that are searched."""
-        return len(self.searched)
+        return len(self.searched_variables)
 
     @cached_property
     def catalogue(self) -> Array:
         """Number of choices of each searched variable; 0 where it has bounds."""
-        return np.array([0 if v.choices is None else len(v.choices) for v in self.searched])
+        return np.array([0 if v.choices is None else len(v.choices) for v in self.searched_variables])
 
     @cached_property
     def paths(self) -> tuple[str, ...]:
         """Leaf paths of everything that the variables set, the fixed ones last."""
-        ordered = [*self.searched, *(variable for variable in self.variables if variable.fixed)]
+        ordered = [*self.searched_variables, *(variable for variable in self.variables if variable.fixed)]
         return tuple(leaf for variable in ordered for field in variable.fields for leaf in field.leaves)
 
     @cached_property
     def _bounds(self) -> tuple[Array, Array]:
-        pairs = [(0.0, 1.0) if v.choices is not None else (v.low, v.high - v.low) for v in self.searched]
+        pairs = [(0.0, 1.0) if v.choices is not None else (v.low, v.high - v.low) for v in self.searched_variables]
         lows, spans = np.array(pairs).T
         return lows, spans
 
@@ -142,7 +142,7 @@ class Space:
         """
         added = deviations or {}
         columns: dict[str, Array] = {}
-        for variable, numbers in zip(self.searched, self.values(genes).T, strict=True):
+        for variable, numbers in zip(self.searched_variables, self.values(genes).T, strict=True):
             columns |= variable.columns(numbers + added.get(variable.name, 0.0))
         for variable in (v for v in self.variables if v.fixed):
             columns |= variable.columns(np.full(len(genes), variable.initial) + added.get(variable.name, 0.0))
@@ -151,7 +151,7 @@ class Space:
     @property
     def initial(self) -> Array:
         """Genes of the machine as its file says [variables]; those of values beyond the bounds lie beyond 0 and 1."""
-        return self.genes(np.array([variable.initial for variable in self.searched]))
+        return self.genes(np.array([variable.initial for variable in self.searched_variables]))
 
     def holds(self, genes: Array) -> bool:
         """Whether a design lies within bounds and choices."""

@@ -83,7 +83,7 @@ class Genetic:
         if number == 0:
             genes, parents = self._random(source), np.empty(0, dtype=np.int64)
         else:
-            parents = log.kept
+            parents = log.survivors
             genes = self._children(log.genes(parents), self._order(log.outcome(parents))[0], source)
         outcome = self.assess(genes)
         family = np.concatenate([parents, log.count + np.arange(len(genes))])
@@ -243,7 +243,7 @@ class Gradient:
         best = int(np.lexsort([signed, outcome.violation])[0])
         kept = [log.count + best]
         if log.steps:
-            kept = self._better(log, log.kept[0], kept[0], signed[best], float(outcome.violation[best]))
+            kept = self._better(log, log.survivors[0], kept[0], signed[best], float(outcome.violation[best]))
         return Step(genes, outcome, np.array(kept), {"method": "gradient"})
 
     def _better(self, log: Log, old: int, new: int, value: float, violation: float) -> list[int]:

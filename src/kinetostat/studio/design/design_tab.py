@@ -72,10 +72,10 @@ class DesignTab:
                     with ui.tab_panel(FAVOURITES):
                         self.favourites = FavouritesPanel(session, workshop.favourites, load)
 
-    def front(self, on: bool) -> None:
+    def set_front(self, is_in_front: bool) -> None:
         """Note whether the tab is in front: only then the page follows its searches."""
-        self.runs.timer.active = on
-        if on:
+        self.runs.timer.active = is_in_front
+        if is_in_front:
             self._workshop.runs.prepare()
             self.favourites.fill()
             self.runs.refresh()

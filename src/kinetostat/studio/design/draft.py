@@ -102,7 +102,7 @@ class Draft:
         head = "" if name in bundled() else f"# Save the machine beside this file, as {name}.\n"
         return f"{slug(self.name, 'study')}.toml", (head + study_toml(study)).encode()
 
-    def unseen(self) -> list[str]:
+    def hidden_parts(self) -> list[str]:
         """Short descriptions of what the study has but the form does not show."""
         parts = [_count_in_words(len(self.poses["list"]), "pose")] if "list" in self.poses else []
         parts += ["poses in the workspace"] if "within" in self.poses else []
@@ -205,7 +205,7 @@ def _reference(machine: Machine) -> tuple[str, dict[str, str]]:
 
 def _changes(machine: Machine, old: dict[str, Any]) -> dict[str, str]:
     quantities = {leaf: p.quantity for p in parameters(machine.family) for leaf in p.leaves}
-    return {path: str(quantities[path].written(value)) for path, value in values(machine).items() if value != old[path]}
+    return {path: str(quantities[path].in_file(value)) for path, value in values(machine).items() if value != old[path]}
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:

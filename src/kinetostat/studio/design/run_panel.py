@@ -337,7 +337,7 @@ def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[
     for objectives, design in zip(progress.objectives, designs, strict=True):
         values.append([*objectives, *design])
         goals = [display.number(value, aim.term.unit) for value, aim in zip(objectives, aims, strict=True)]
-        sizes = [v.in_words(size, display) for v, size in zip(space.searched, design, strict=True)]
+        sizes = [v.in_words(size, display) for v, size in zip(space.searched_variables, design, strict=True)]
         texts.append([*goals, *sizes])
-    names = [plain_name(variable.name.removeprefix("geometry.")) for variable in space.searched]
+    names = [plain_name(variable.name.removeprefix("geometry.")) for variable in space.searched_variables]
     return [*(f"{aim.goal} {progress.label(aim)}" for aim in aims), *names], values, texts

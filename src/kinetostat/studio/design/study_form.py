@@ -152,8 +152,8 @@ class StudyForm:
             self._poses()
             ui.html("<h3>Search</h3>", sanitize=False)
             self._search()
-            if unseen := self.draft.unseen():
-                ui.label(f"Taken over from the study file: {', '.join(unseen)}.").classes("note").mark("study-unseen")
+            if hidden := self.draft.hidden_parts():
+                ui.label(f"Taken over from the study file: {', '.join(hidden)}.").classes("note").mark("study-unseen")
 
     @staticmethod
     def _add(text: str, mark: str, action: Callable[[], None]) -> None:

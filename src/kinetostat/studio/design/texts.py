@@ -50,7 +50,7 @@ def _so_far(progress: Progress) -> str:
     rows = [[f"{aim.goal} {plain_name(aim.term.label)}", progress.exact(aim, progress.objectives[0][0])]]
     if progress.genes is not None:
         space = progress.problem.space
-        pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)
+        pairs = zip(space.searched_variables, space.values(progress.genes[0]), strict=True)
         rows += [[variable.name, variable.in_words(value, display)] for variable, value in pairs]
     return heading("Best so far") + table("Best so far", ["", "best"], rows)
 
@@ -71,7 +71,7 @@ def _objectives(progress: Progress, result: dict[str, Any], best: str) -> str:
 def _design(problem: Problem, result: dict[str, Any]) -> str:
     rows = []
     bounds, slopes = result["at_bounds"], result["sensitivity"]
-    first = {variable.name: variable for variable in problem.space.searched}
+    first = {variable.name: variable for variable in problem.space.searched_variables}
     for path, value in result["variables"].items():
         variable = first.get(path)
         if variable is None or variable.choices is not None:

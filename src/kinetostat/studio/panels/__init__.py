@@ -20,13 +20,13 @@ class Panel(ABC):
 
     Attributes:
         name: text of the tab.
-        changed: of the page, to be called where the panel has given the session's machine other numbers.
+        show_change: of the page, to be called where the panel has given the session's machine other numbers.
         view: the picture of the machine, for panels that draw in it.
         is_busy: of the page, whether the last change is still being drawn, for panels that play something.
     """
 
     name = ""
-    changed: Callable[[], None]
+    show_change: Callable[[], None]
     view: MachineView
     is_busy: Callable[[], bool]
 

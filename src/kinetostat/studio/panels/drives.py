@@ -148,7 +148,7 @@ class DrivesPanel(Panel):
             self._player.pause()
             refuse(str(error))
         else:
-            self.changed()
+            self.show_change()
 
 
 def _apart_from_pose(machine: Machine) -> tuple[object, ...]:

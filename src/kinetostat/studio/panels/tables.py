@@ -283,7 +283,7 @@ class RequirementsPanel(Panel):
     def _go(self, verdict: Verdict) -> None:
         if self._session is not None:
             self._session.move(verdict.worst_pose)
-            self.changed()
+            self.show_change()
 
 
 def _verdicts_or_mistake(machine: Machine) -> tuple[Verdict, ...] | str:

@@ -33,7 +33,7 @@ CUT = "the cut"
 HEADS = ["frequency", "tool", "modal mass", "most strain energy", "most kinetic energy"]
 MASS = "tool.mass"
 NO_MASS = "Nothing says what this machine weighs, and so its natural frequencies are not known."
-GIVE = (
+MASS_HINT = (
     "Give the mass of platform and tool here, and the modes follow at once. Inertia, links, drives and damping are in "
     "the panel Mass."
 )
@@ -58,9 +58,9 @@ class VibrationPanel(Panel):
         self._front = self._is_moving = False
         self._moving: bool | None = None  # what was asked for by the button; None as the browser prefers
         self._modes, self._swings = Lane(ringing, self._deliver), Lane(swing, self._swing)
-        self.view.on("swinging", self._swinging)
+        self.view.on("swinging", self._show_play_state)
         self.about = ui.html("", sanitize=False).mark("vibration-about")
-        self.mass = QuantityRow("mass of platform and tool", GIVE, STEPS, slides=False).mark("vibration-mass")
+        self.mass = QuantityRow("mass of platform and tool", MASS_HINT, STEPS, slides=False).mark("vibration-mass")
         self.mass.on("write", self._weigh)
         with ui.element("div").classes("vibration") as self.content:
             with ui.row().classes("panel-tools"):
@@ -122,7 +122,7 @@ class VibrationPanel(Panel):
         self._show_mode()
 
     def _ask_for_mass(self, machine: Machine) -> None:
-        self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(GIVE))
+        self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(MASS_HINT))
         if self._session is not None:
             control = self._session.controls[MASS]
             self.mass.put(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
@@ -136,7 +136,7 @@ class VibrationPanel(Panel):
             self.mass.complain(str(error))
         else:
             self.mass.take()
-            self.changed()
+            self.show_change()
 
     def _offer(self, new: Ringing) -> None:
         """Offer the components of the machine, and across the cut where the file says where that is."""
@@ -175,7 +175,7 @@ class VibrationPanel(Panel):
         self._moving = not self._is_moving
         self.view.run_method("sway", self._moving)
 
-    def _swinging(self, event: GenericEventArguments) -> None:
+    def _show_play_state(self, event: GenericEventArguments) -> None:
         self._is_moving = bool(event.args)
         self.play.props(f"icon={'pause' if self._is_moving else 'play_arrow'}")
 
