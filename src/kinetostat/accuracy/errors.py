@@ -1,10 +1,10 @@
 """The numbers of a machine that may be wrong: places of joints on their links, zeros and gains, shared sizes.
 
-An error displaces everything behind some motion of the leg by a small screw motion: in front of a joint it moves or
-tilts the joint on its link, behind the last one the platform on the leg. What a passive joint takes up by its own
-freedom is left out, and so is what no motion of the leg can tell from the errors that are listed before it. A strut
-between two balls keeps both centres and its zero, a leg in general 4 numbers for each revolute, 2 for each slide and 6
-for its end.
+A leg is a row of motions from the base to the platform. An error is a small screw motion that is inserted between two
+of them: before a joint it moves or tilts this joint on its link, and behind the last joint it moves the platform on the
+leg. Errors that a passive joint takes up by its own freedom are left out, and so are those that no motion of the leg
+can tell from the errors before them. Thus a strut between two balls keeps both centres and its zero, and a leg in
+general 4 numbers for each revolute, 2 for each slide and 6 for its end.
 
 A number that several legs share, such as the base radius of a family, is a combination of errors of these legs. Where
 it changes, joints lie elsewhere at the home place and actuators count from elsewhere; the rates of both make one error,
@@ -30,10 +30,12 @@ from kinetostat.numerics.motions import Motions, logarithm
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
 
 SHARED_STEP = 1e-5
-"""Of central differences, rad or in units of the machine's length: what they leave out is its square."""
+"""Step of central differences, rad or in units of the machine's length; their error is its square."""
+SHARED_KINDS = ("length", "angle")
+"""Kinds of the numbers of a family that are shared errors."""
 SHARED_TABLE = "geometry."
 ZEROS, BASE, PLATFORM, LENGTHS, LINKS, TILTS, OFFSETS = range(7)
-"""The order in which errors are listed where only some of them can be told apart."""
+"""Ranks of errors: where only some of them can be told apart, those of the lower ranks are listed."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,10 @@ class MachineError:
 
     Attributes:
         path: "legs.leg 1.base joint.x", "legs.leg 1.actuator.zero"; or the field of a family that many legs share.
-        kind: of its quantity: "length", "angle" or "ratio".
+        kind: kind of its quantity: "length", "angle" or "ratio".
         group: "geometry", "zeros", "gains", "clearances", "compliances" or "shared".
-        words: for people, "position of the base joint of leg 1 on the base along x".
-        leg: name of its leg; empty of what legs share.
+        words: its name for people, "position of the base joint of leg 1 on the base along x".
+        leg: name of its leg; empty if several legs share the number.
     """
 
     path: str
@@ -61,9 +63,9 @@ class Insertion:
 
     Attributes:
         leg: number of the leg.
-        behind: how many of its motions stand before it.
+        behind: number of the leg's motions that come before it.
         twist: per unit of the error, in home place [6].
-        factor: what it is multiplied by at coordinates of the leg [n x coordinates]: [n]; None for 1.
+        factor: computes the factor of the twist [n] at coordinates of the leg [n x coordinates]; None for 1.
     """
 
     leg: int
@@ -72,12 +74,12 @@ class Insertion:
     factor: Callable[[Array], Array] | None = None
 
     def amount(self, coordinates: Array) -> Array:
-        """Factor of its twist [n], at coordinates of the leg [n x coordinates]."""
+        """The factor of the twist [n] at coordinates of the leg [n x coordinates]."""
         return np.ones(len(coordinates)) if self.factor is None else self.factor(coordinates)
 
 
 Source = tuple[MachineError, tuple[Insertion, ...]]
-"""An error and what it puts into the legs."""
+"""An error and the screw motions that it puts into the legs."""
 
 
 def leg_error_sources(rows: HomeRows) -> list[Source]:
@@ -89,8 +91,8 @@ def leg_error_sources(rows: HomeRows) -> list[Source]:
     sources: list[Source] = []
     for number, row in enumerate(rows.legs):
         every = [source for _, source in sorted(_candidates(number, row, rows), key=lambda entry: entry[0])]
-        sources += _distinct(row, rows, every)
-        sources += _effective(row, rows, list(_clearances(number, row)))[0]
+        sources += _independent_sources(row, rows, every)
+        sources += _moving_sources(row, rows, list(_clearances(number, row)))[0]
     return sources
 
 
@@ -111,68 +113,72 @@ def effects(row: LegRow, rows: HomeRows, sources: Sequence[Source], coordinates:
     return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
-def _effective(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
-    """Those that move the platform somewhere, and their `effects`."""
+def _moving_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
+    """The errors that move the platform at any of the random coordinates, and their `effects`."""
     columns = effects(row, rows, sources, random_coordinates(row, rows.length))
     moving = np.flatnonzero(np.linalg.norm(columns, axis=0) > SEEN_BY_LEG / rows.length)
     return [sources[int(number)] for number in moving], columns[:, moving]
 
 
-def _distinct(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> list[Source]:
-    """Those whose effects do not follow from the effects of those before them, in the order of the leg."""
-    moving, columns = _effective(row, rows, sources)
-    distinct = [moving[number] for number in independent_columns(columns[None])]
-    return sorted(distinct, key=lambda source: source[1][0].behind)
+def _independent_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> list[Source]:
+    """The errors whose effects do not follow from the effects of those before them, in the order of the leg."""
+    moving, columns = _moving_sources(row, rows, sources)
+    independent = [moving[number] for number in independent_columns(columns[None])]
+    return sorted(independent, key=lambda source: source[1][0].behind)
 
 
 def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int, Source]]:
-    """Every error that may count, each with its rank in the order of listing."""
+    """Generate every error that the joints and the end of a leg may have, each with its rank."""
     before: Vector | None = None
     for place, unit in enumerate(row.units):
-        named = _Named(number, row.name, unit)
+        named = _JointErrors(number, row.name, unit)
         if unit.drive:
             yield from named.drive(row)
         point = unit.point or before or ZERO
         if place == 0 or unit.point is None or before is None:
             rank = BASE if place == 0 else LINKS
             where = "on the base" if place == 0 else "on its link"
-            yield from ((rank, named.shift(name, axis, where)) for name, axis in _ways(None))
+            yield from ((rank, named.shift(name, axis, where)) for name, axis in _named_directions(None))
         elif (unit.point - before).norm() > NO_LINK * rows.length:
             along = (unit.point - before) * (1.0 / (unit.point - before).norm())
             yield LENGTHS, named.length(along, row.units[place - 1].name)
-            yield from ((LINKS, named.shift(name, axis, "on its link")) for name, axis in _ways(along))
+            yield from ((LINKS, named.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
         elif unit.kind != "ball":
-            yield from ((OFFSETS, named.shift(name, axis, "on its link")) for name, axis in _ways(None))
+            yield from ((OFFSETS, named.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
         if unit.kind != "ball":
-            yield from ((TILTS, named.tilt(name, axis, point)) for name, axis in _ways(_tilting(unit)))
+            yield from (
+                (TILTS, named.tilt(name, axis, point)) for name, axis in _named_directions(_axis_without_tilt(unit))
+            )
         if unit.kind == "universal":
             yield from ((OFFSETS, source) for source in named.between_axes(point))
         if unit.bars:
             yield from ((LENGTHS, source) for source in named.bars(unit.bars, row.coordinate[unit.first]))
         before = unit.point or before
     axes = [Vector(*column) for column in rows.rotation.T.tolist()]
-    named, end = _Named(number, row.name, row.units[-1]), len(row.twists)
+    named, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
     for name, axis in zip("xyz", axes, strict=True):
         yield PLATFORM, named.shift(f"platform.{name}", axis, "on the platform", end)
         yield TILTS, named.tilt(f"platform.r{name}", axis, before or Vector(*rows.point.tolist()), end)
 
 
 def _clearances(number: int, row: LegRow) -> Iterator[Source]:
-    """Free motions in the passive joints of a leg, along each direction in which they hold."""
+    """Generate the clearances of the passive joints of a leg, one for each direction in which a joint holds."""
     for unit in row.units:
         if unit.drive or unit.bars:
             continue
-        named = _Named(number, row.name, unit)
-        for name, axis in _ways(unit.axes[0] if unit.kind == "slide" else None):
+        named = _JointErrors(number, row.name, unit)
+        for name, axis in _named_directions(unit.axes[0] if unit.kind == "slide" else None):
             yield named.clearance(name, axis)
 
 
-def _tilting(unit: Unit) -> Vector | None:
+def _axis_without_tilt(unit: Unit) -> Vector | None:
+    """The axis about which a tilt changes nothing; None for a parallelogram, whose near side may tilt about any
+    axis."""
     return unit.axes[0] if unit.bars is None else None
 
 
-def _ways(axis: Vector | None) -> list[tuple[str, Vector]]:
-    """Base axes and their names; or two directions across an axis: base axes where these are, else u, level, and v."""
+def _named_directions(axis: Vector | None) -> list[tuple[str, Vector]]:
+    """Name the base axes or, for an axis, two directions across it: base axes where they are, else u (level) and v."""
     if axis is None:
         return list(zip("xyz", AXES, strict=True))
     level = [pair for pair in zip("xyz", AXES, strict=True) if abs(pair[1].dot(axis)) < PARALLEL_AXES]
@@ -184,6 +190,7 @@ def _ways(axis: Vector | None) -> list[tuple[str, Vector]]:
 
 
 def _direction(axis: Vector) -> str:
+    """The name of a base axis, or the components of another direction."""
     for name, base in zip("xyz", AXES, strict=True):
         if abs(axis.dot(base)) > 1.0 - PARALLEL_AXES:
             return name
@@ -191,16 +198,18 @@ def _direction(axis: Vector) -> str:
 
 
 def _slide(axis: Vector) -> Array:
+    """The screw of a unit displacement along an axis [6]."""
     return np.array(Joint(axis).twist(ZERO).components(), dtype=float)
 
 
 def _turn(axis: Vector, point: Vector) -> Array:
+    """The screw of a unit rotation about an axis through a point [6]."""
     return np.array(Joint(axis, point).twist(ZERO).components(), dtype=float)
 
 
 @dataclass(frozen=True)
-class _Named:
-    """Makes the errors of one joint."""
+class _JointErrors:
+    """The errors of one joint of a leg, each with its words and the screw motion that it puts into the leg."""
 
     number: int
     leg: str
@@ -308,7 +317,7 @@ def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
     fields = {leaf: p for p in parameters(machine.family) if p.path.startswith(SHARED_TABLE) for leaf in p.leaves}
     for path, field in fields.items():
         kind = field.quantity.kind
-        if kind not in ("length", "angle"):
+        if kind not in SHARED_KINDS:
             continue
         step = SHARED_STEP * (rows.length if kind == "length" else 1.0)
         more, less = (home_rows(with_values(machine, {path: float(given[path]) + s * step})) for s in (1.0, -1.0))
@@ -319,7 +328,7 @@ def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
 
 
 def _shared_insertions(rows: HomeRows, more: HomeRows, less: HomeRows, step: float) -> Iterator[Insertion]:
-    """Change of the legs per unit of a number, from the machine with more and less of it."""
+    """Generate the motions of joints and zeros per unit of a number, from the machine with more and less of it."""
     home = Motions(more.rotation[None], more.point[None]) @ Motions(less.rotation[None], less.point[None]).inverse()
     platform = logarithm(home)[0] / step
     for number, row in enumerate(rows.legs):

@@ -81,11 +81,11 @@ def _answer(
     from kinetostat.engine.chunks import Crew, compute_with
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.grid import answer
-    from kinetostat.views.grid import NO_CREW, map_question, sweep_question
+    from kinetostat.views.grid import CARRYING_ALONE, map_question, sweep_question
 
     if carrying:
         if options.workers or options.cluster or options.resume:
-            raise InputError(NO_CREW)
+            raise InputError(CARRYING_ALONE)
         answered: Carrying = question.answer(machine, ranges, progress, quantities, carrying)
         return answered
     wanted = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)

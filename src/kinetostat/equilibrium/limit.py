@@ -1,7 +1,8 @@
 """Load factor of a mechanism up to its loads: the last stable state of rest while these grow from nothing.
 
-Preloads act from the beginning. The state is followed in steps of the loads, each from the one before. It ends where no
-state of rest is nearby, where that is not stable, or where it is a leap away because the mechanism has snapped over.
+Preloads act from the beginning. The loads grow in steps, and the state of rest under each share of them is sought from
+the one before. The search ends where there is no state of rest nearby, where it is not stable, or where it is a leap
+away because the mechanism has snapped over.
 """
 
 from dataclasses import replace
@@ -52,7 +53,7 @@ def limit_of(mechanism: Mechanism) -> LoadLimit | None:
         The last stable state, share 1 if the mechanism stands under all of its loads; None if no share was found under
         which it stands.
     """
-    last = _standing(mechanism, np.zeros(1), None)
+    last = _last_stable(mechanism, np.zeros(1), None)
     reached = None if last is None else _limit_from(mechanism, last)
     if reached is not None and reached.share > 0.0:
         return reached
@@ -70,13 +71,13 @@ def limit_of(mechanism: Mechanism) -> LoadLimit | None:
 
 def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
     """The last stable state while the loads grow from one under which the mechanism stands."""
-    whole = _standing(mechanism, _shares(last.share, FEW_CANDIDATES), last)  # as nearly every machine stands
+    whole = _last_stable(mechanism, _shares(last.share, FEW_CANDIDATES), last)  # as nearly every machine stands
     if whole is not None and whole.share == 1.0:
         return whole
     for _ in range(MOST_LOAD_STEPS):
         if last.share == 1.0:
             return last
-        next_state = _standing(mechanism, _shares(last.share, CANDIDATES), last)
+        next_state = _last_stable(mechanism, _shares(last.share, CANDIDATES), last)
         if next_state is None:
             return last
         accurate = next_state.share - last.share < ACCURACY_OF_SHARE * next_state.share
@@ -87,12 +88,12 @@ def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
 
 
 def _shares(last: float, count: int) -> Array:
-    """Return so many shares of the loads beyond the last one, the greatest of them 1."""
+    """Return `count` shares of the loads beyond the last one, closer together near it; the greatest of them is 1."""
     left = STEP_RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
     return np.append(last + (1.0 - last) * left, 1.0)
 
 
-def _standing(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> LoadLimit | None:
+def _last_stable(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> LoadLimit | None:
     """The state under the greatest of some shares up to which all are stable and near the last one.
 
     Args:

@@ -1,5 +1,8 @@
 """Rods at a place of the platform: the force with which each pulls, and how all of them resist its motion.
 
+All is computed over scalars, so that the same lines serve numbers, arrays and traced programs. No state of rest is
+sought here.
+
 Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
 
@@ -25,11 +28,12 @@ class RodPull:
     Attributes:
         near, at: b and a.
         moment: a x b.
-        length: length of the rod.
+        length: length of the rod, |a - b|.
         tension: the tension with which it pulls.
-        density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
-        stretching, elastic: k - c and k over the square of its length, with its stiffness k.
-        slack: 1 where it carries nothing, else 0.
+        density: force density c, which is the tension over the length: the rod pulls a with c (b - a).
+        stretching, elastic: (k - c) and k over the square of the length, with the stiffness k of the rod: the weights
+            of the dyad of its line in the tangent stiffness, and in the elastic part of it.
+        slack: 1 where the rod carries nothing, else 0.
     """
 
     near: Vector
@@ -49,7 +53,7 @@ class RodPull:
 
 
 def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
-    """A rod at a place of the platform, or in the free state."""
+    """Compute the pull of a rod at a place of the platform, or in the free state if `platform` is None."""
     near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
     at = far if platform is None else Vector(*platform.point(rod.far)[0])
     span, rest = at - near, far - near
@@ -67,12 +71,12 @@ def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
     return RodPull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
 
 
-def wrench_of_rods(pulls: Sequence[RodPull], stretching: Row) -> tuple[Array, Array]:
+def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array]:
     """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6].
 
     Args:
-        pulls: of the rods.
-        stretching: their own, or what is to be counted in its place.
+        pulls: the pulls of the rods.
+        weights: weight of the dyad of each line in the decrease: `stretching` of each pull for the tangent stiffness.
     """
     pulled = [pull.at * pull.density for pull in pulls]
     ends = _sum(pulled)
@@ -83,7 +87,7 @@ def wrench_of_rods(pulls: Sequence[RodPull], stretching: Row) -> tuple[Array, Ar
     ]
     moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
     trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
-    fall = sum_of_dyads(pulls, stretching)[None]
+    fall = sum_of_dyads(pulls, weights)[None]
     for i in range(3):
         for j in range(3):
             fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
@@ -113,7 +117,13 @@ def sum_of_dyads(pulls: Sequence[RodPull], weights: Row) -> Array:
 def loads_of_rods(
     rods: Sequence[ElasticRod], pulls: Sequence[RodPull], twist: Row, force: Scalar
 ) -> list[tuple[Spring, Scalar]]:
-    """The actuators of rods with what they carry after a step of the platform, N; `force` is the unit of force."""
+    """The actuators of rods with their tensions after a step of the platform, to first order, N.
+
+    Args:
+        rods, pulls: the rods, and their pulls before the step.
+        twist: the step of the platform.
+        force: unit of force of the mechanism, N.
+    """
     loads = []
     for rod, pull in zip(rods, pulls, strict=True):
         along = total([a * b for a, b in zip(pull.line, twist, strict=True)])

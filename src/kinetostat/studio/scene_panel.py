@@ -1,7 +1,7 @@
 """The middle of the page: the machine with its overlays, the status of the pose, and the handles that pull it.
 
-What is drawn comes from `answers` as solids, and which numbers follow a pull from `pulling`; here both are only placed
-on the page and passed on.
+`answers` computes the solids that are drawn, and `pulling` the numbers that follow a pull; here both are only placed on
+the page and passed on.
 """
 
 from collections.abc import Callable
@@ -49,16 +49,16 @@ class ScenePanel:
     """The picture and figures of the machine; at a pose without an answer, they stay and the reason is shown."""
 
     def __init__(
-        self, load: Callable[[bool], None], exaggerate: Callable[[float | None], None], name: Callable[[], str]
+        self, set_loaded: Callable[[bool], None], exaggerate: Callable[[float | None], None], name: Callable[[], str]
     ) -> None:
         """Build the picture with its tools, the line about the pose, and the figures.
 
         Args:
-            load: shows the machine at rest under its loads, or without them.
+            set_loaded: shows the machine at rest under its loads, or without them.
             exaggerate: draws the deflected shape with another factor; None to choose one.
             name: gives the name of the machine, for saved pictures.
         """
-        self._load, self._exaggerate, self._name = load, exaggerate, name
+        self._set_loaded, self._exaggerate, self._name = set_loaded, exaggerate, name
         self._shown: dict[str, Any] | None = None
         self._ghost = self._pictured = False
         self._hidden: set[str] = set()
@@ -69,10 +69,10 @@ class ScenePanel:
     def _stage(self) -> None:
         self.view = MachineView("the machine in three dimensions; drag, or arrow keys, to turn it").mark("machine")
         with ui.element("div").classes("scene-tools"):
-            self.loaded = ui.switch("under load", on_change=lambda event: self._load(bool(event.value)))
+            self.loaded = ui.switch("under load", on_change=lambda event: self._set_loaded(bool(event.value)))
             self.loaded.props("dense").tooltip(UNDER_LOAD).mark("loaded")
             with ui.element("div").classes("scene-layers") as shown:
-                self.layers = {layer: self._layer(layer, text) for layer, text in LAYERS.items()}
+                self.layers = {layer: self._layer_box(layer, text) for layer, text in LAYERS.items()}
         with ui.element("div").classes("scene-views") as self.tools:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
@@ -92,12 +92,12 @@ class ScenePanel:
             self.status = ui.label("").classes("pose-status").mark("status")
             self.message = ui.label("").classes("pose-message").mark("message")
 
-    def _layer(self, layer: str, text: str) -> ui.checkbox:
-        box = ui.checkbox(text, value=True, on_change=lambda event: self._toggle(layer, bool(event.value)))
+    def _layer_box(self, layer: str, text: str) -> ui.checkbox:
+        box = ui.checkbox(text, value=True, on_change=lambda event: self._show_layer(layer, bool(event.value)))
         return box.props("dense").mark(f"layer-{layer}")
 
-    def _toggle(self, layer: str, on: bool) -> None:
-        self._hidden = self._hidden - {layer} if on else self._hidden | {layer}
+    def _show_layer(self, layer: str, is_shown: bool) -> None:
+        self._hidden = self._hidden - {layer} if is_shown else self._hidden | {layer}
         self.view.hide(sorted(self._hidden))
 
     def _take_factor(self, event: GenericEventArguments) -> None:
@@ -136,7 +136,7 @@ class ScenePanel:
         sound = report.loaded is None or report.loaded.rest is Rest.OK
         placed = report.analysis.status is Status.OK
         kept = UNLOADED if placed else PICTURED if self._pictured else KEPT
-        self._tell(report.answered, status, message, sound, kept)
+        self._show_verdict(report.answered, status, message, sound, kept)
         if not report.answered:
             if placed or self._pictured:
                 self.view.run_method("overlay", [], [])
@@ -154,20 +154,29 @@ class ScenePanel:
 
     def look_for_nearest(self) -> None:
         """Say at once that a pose is out of reach, while the nearest one is being looked for; `explain` names it."""
-        self._tell(False, Status.OUT_OF_REACH.word.replace("_", " "), LOOKING)
+        self._show_verdict(False, Status.OUT_OF_REACH.word.replace("_", " "), LOOKING)
 
     def fail(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""
-        self._tell(False, "no answer", as_sentence(error))
+        self._show_verdict(False, "no answer", as_sentence(error))
 
-    def _tell(self, answered: bool, status: str, message: str, sound: bool = True, kept: str = KEPT) -> None:
+    def _show_verdict(self, answered: bool, status: str, message: str, sound: bool = True, kept: str = KEPT) -> None:
+        """Show the status of the pose and a message in the line below the picture.
+
+        Args:
+            answered: whether the pose has an answer.
+            status: a word or two.
+            message: sentences.
+            sound: whether the answer is free of faults; otherwise the line is drawn as a refusal.
+            kept: a sentence on what the page still shows if there is no answer.
+        """
         self.line.classes(replace="pose-line" if answered and sound else "pose-line refused")
         self.status.set_text(status)
         self.message.set_text(message if answered else f"{message} {kept}")
 
 
 def _verdict(report: Report) -> tuple[str, str]:
-    """Say in a word and in sentences what is the case."""
+    """The status of a pose in a word or two, and the message about it."""
     if report.refused:
         return "no answer", report.refused
     if report.loaded is not None:
@@ -211,7 +220,8 @@ def _tile(name: str, value: str, unit: str) -> str:
 
 
 class Handles:
-    """Listens to a view while its handles are pulled; the latest wish counts, those in between are never computed."""
+    """Follows the handles of a view while they are pulled; the latest wish counts, those in between are not
+    computed."""
 
     def __init__(self, session: Session, view: Element, on_change: Callable[[], None]) -> None:
         """Listen.
@@ -225,7 +235,7 @@ class Handles:
         self._lane = Lane(numbers_after_pull, self._follow)
         self._pull_number: object = None
         self._home: Displacement | None = None
-        self._ended = False
+        self._has_ended = False  # the handle was let go, while a wish may still be computed
         view.on("pull", self._ask, throttle=THROTTLE)
         view.on("settle", self._settle)
 
@@ -237,7 +247,7 @@ class Handles:
         machine = self._session.machine
         if self._home is None or number != self._pull_number:
             self._pull_number, self._home = number, state_of(machine).configuration.platform
-        self._ended = False
+        self._has_ended = False
         target = goal_of(self._home, axis, float(goal)) if of == PLATFORM else point_goal([float(c) for c in goal])
         self._lane.ask(Pull(machine, of, leg, axis, target))
 
@@ -248,16 +258,16 @@ class Handles:
             except InputError:
                 return  # a pull beyond what the file allows, such as a negative radius, leads no further
             self._on_change()
-        if self._ended:
+        if self._has_ended:
             self._end()
 
     def _settle(self, _event: GenericEventArguments) -> None:
-        self._ended = True
+        self._has_ended = True
         if not self._lane.busy:
             self._end()
 
     def _end(self) -> None:
-        self._ended, self._home = False, None
+        self._has_ended, self._home = False, None
         try:
             self._session.settle()
         except InputError as error:

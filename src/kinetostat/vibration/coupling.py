@@ -52,10 +52,11 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
         tool: between its frequencies, straight lines are followed.
         frequencies: within those of the tool, Hz [n].
     """
-    at_tip, across, at_flange = (_interpolate(tool, values, frequencies) for values in _parts(tool))
+    receptances = tool.tip_tip, tool.tip_flange, tool.flange_flange
+    at_tip, across, at_flange = (_interpolate(tool, values, frequencies) for values in receptances)
     tip, flange = list(tool.tip), list(tool.flange)
     rest = [part for part in range(6) if part not in tip]
-    # What each wrench would move the flange of the free tool by, and of the machine alone: the gap that forces close.
+    # Apart, each unit wrench moves the flange of the tool, or that of the machine: forces between both close this gap.
     gaps = np.zeros((len(frequencies), len(flange), 6), dtype=complex)
     gaps[:, :, tip] = np.swapaxes(across, 1, 2)
     gaps[:, :, rest] = -machine[:, flange][:, :, rest]
@@ -68,10 +69,6 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
         result[:, part, tip] = at_tip[:, place]
         result[:, part] -= np.einsum("fc,fcw->fw", across[:, place], forces)
     return result
-
-
-def _parts(tool: FreeTool) -> tuple[Complex, Complex, Complex]:
-    return tool.tip_tip, tool.tip_flange, tool.flange_flange
 
 
 def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Any:

@@ -1,7 +1,8 @@
 """The width of cut at which a tool begins to chatter, over the speed of its spindle: stability lobes.
 
-An edge cuts what the edge before it has left, so that the chip is as thick as both paths differ, and the force follows
-it. In milling, edges turn through the cut; the force per difference is then replaced by its mean over a turn.
+An edge cuts the surface that the edge before it has left. The chip is as thick as both paths differ, and the force
+grows with it, so that a wave of one edge can raise a larger wave of the next: chatter. In milling, edges turn through
+the cut, and the force per difference of the paths is replaced by its mean over a turn.
 
 Source: theory (106) and (107); J. Tlusty and M. Polacek (1963) for one edge that stays in the cut; Y. Altintas and
 E. Budak, "Analytical prediction of stability lobes in milling", CIRP Annals 44 (1995), for milling. SI.
@@ -14,10 +15,11 @@ import numpy as np
 from kinetostat.arrays import Array, Complex
 from kinetostat.frozen import dataclass
 
-TRIED, BANDWIDTHS = 600, 12.0
-"""Frequencies that are tried about each mode, up to so many of its half-power bandwidths away."""
-SPREAD = 3000
-"""Frequencies that are tried over the whole range besides."""
+TRIED_PER_MODE, BANDWIDTHS = 600, 12.0
+"""Number of frequencies that are tried about each mode, and their greatest distance from it in half-power
+bandwidths."""
+TRIED_OVER_RANGE = 3000
+"""Number of frequencies that are tried over the whole range besides."""
 LEAST_RATIO = 1e-9
 """Damping ratio below which a peak is taken to be as sharp as this one."""
 MOST_LOBES = 2000
@@ -26,10 +28,10 @@ MOST_LOBES = 2000
 
 @dataclass(frozen=True)
 class Engagement:
-    """Edges in the cut.
+    """Edges in the cut, and the force with which they answer a difference of their paths.
 
     Attributes:
-        teeth: edges that pass in a turn of the spindle.
+        teeth: number of edges that pass in a turn of the spindle.
         pressure: tangential force per area of the chip, N/m².
         ways: unit vectors along which paths of edges differ, base axes [k x 3].
         mean: mean of the force per pressure, width of cut, and difference of paths, in the same directions [k x k].
@@ -42,7 +44,7 @@ class Engagement:
 
 
 def turning(pressure: float, direction: Array) -> Engagement:
-    """One edge that stays in the cut, and is pushed back across it by what the chip is too thick.
+    """One edge that stays in the cut, and is pushed back across it where the chip is too thick.
 
     Args:
         pressure: cutting force per area of the chip, N/m².
@@ -82,9 +84,9 @@ def tried_frequencies(frequencies: Array, ratios: Array) -> Array:
         frequencies: of the modes, Hz, ascending.
         ratios: their damping ratios.
     """
-    spread = np.linspace(-BANDWIDTHS, BANDWIDTHS, TRIED)
+    spread = np.linspace(-BANDWIDTHS, BANDWIDTHS, TRIED_PER_MODE)
     rows = [f * np.abs(1.0 + max(float(r), LEAST_RATIO) * spread) for f, r in zip(frequencies, ratios, strict=True)]
-    rows.append(np.geomspace(0.2 * frequencies[0], 5.0 * frequencies[-1], SPREAD))
+    rows.append(np.geomspace(0.2 * frequencies[0], 5.0 * frequencies[-1], TRIED_OVER_RANGE))
     return np.unique(np.concatenate(rows))
 
 
@@ -96,7 +98,7 @@ class Borders:
         frequencies: of the chatter, Hz [n].
         widths: of cut, m; NaN where no width chatters so [n x k].
         phases: by which the wave of an edge is behind that of the edge before it, rad, from 0 to 2 pi [n x k].
-        teeth: edges that pass in a turn.
+        teeth: number of edges that pass in a turn.
     """
 
     frequencies: Array
@@ -123,12 +125,18 @@ class Borders:
             fastest = float(np.nanmax(self.frequencies)) / (self.teeth * float(speeds[0]))
             for waves in range(min(int(fastest) + 1, MOST_LOBES)):
                 turns = self.frequencies / (self.teeth * (waves + phases / (2.0 * math.pi)))
-                _lower(result, speeds, turns, widths)
+                _lower_to_curve(result, speeds, turns, widths)
         return result
 
 
-def _lower(result: Array, speeds: Array, turns: Array, widths: Array) -> None:
-    """Lower what is stable at speeds to a curve over them, which is straight between its points."""
+def _lower_to_curve(result: Array, speeds: Array, turns: Array, widths: Array) -> None:
+    """Lower the stable width at each speed to a curve, where the curve is lower; it is straight between its points.
+
+    Args:
+        result: stable widths so far, which are changed in place [n].
+        speeds: turns per second, ascending [n].
+        turns, widths: points of the curve, turns per second and m; NaN where it is interrupted.
+    """
     start, end, low, high = turns[:-1], turns[1:], widths[:-1], widths[1:]
     known = np.isfinite(low) & np.isfinite(high) & np.isfinite(start) & np.isfinite(end)
     first = np.searchsorted(speeds, np.where(known, np.minimum(start, end), np.inf))
@@ -154,7 +162,7 @@ def borders(receptances: Complex, frequencies: Array, engagement: Engagement) ->
     ways = engagement.ways
     oriented = np.einsum("ia,fab,jb->fij", ways, receptances, ways)
     gains = engagement.pressure * np.linalg.eigvals(engagement.mean @ oriented)
-    # Rows of eigenvalues continue each other where neighbours are nearest; of two, exchange them where that is nearer.
+    # Each column shall follow one eigenvalue over the frequencies: two are exchanged where that continues them better.
     if gains.shape[1] == 2:
         for n in range(1, len(gains)):
             if abs(gains[n, 0] - gains[n - 1, 0]) > abs(gains[n, 1] - gains[n - 1, 0]):

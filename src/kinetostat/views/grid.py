@@ -41,7 +41,7 @@ MOST_NAMED_SETS = 11
 USUAL_OF_A_SWEEP, USUAL_OF_A_MAP = "stiffness", "compliance"
 """Quantities that are computed where nobody names one."""
 ONE_OF_A_SWEEP = "sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`."
-NO_CREW = (
+CARRYING_ALONE = (
     "--carrying shows which legs carry, not a quantity, and computes in this process; leave out --quantity, --workers, "
     "--cluster and --resume."
 )
@@ -312,7 +312,7 @@ def map_or_carrying_legs(
     if len(ranges) < 2:
         raise InputError(TWO_OF_A_MAP)
     if quantities:
-        raise InputError(NO_CREW)
+        raise InputError(CARRYING_ALONE)
     return carrying_legs(machine, ranges, progress)
 
 

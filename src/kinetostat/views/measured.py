@@ -13,7 +13,7 @@ EXACT_SHARE = 1e-9
 
 
 def measured_table(answer: MeasuredComparison) -> FittedTable:
-    """Every measured number with its standard uncertainty, the computed one, and what lies between them."""
+    """A row for each measured number: it, the computed one, and their difference, with standard uncertainties."""
     table = text_table(
         "Measured and computed at the tool point, base axes (± one standard uncertainty)",
         "line", "entry", "measured", "computed", "difference", "unit", "model",
@@ -25,25 +25,25 @@ def measured_table(answer: MeasuredComparison) -> FittedTable:
         table.add_row(
             str(row.entry.line),
             row.entry.name,
-            _with_sure(row, display, row.entry.value, row.u_data),
-            _with_sure(row, display, row.predicted, (row.u_input**2 + row.u_num**2) ** 0.5),
-            _with_sure(row, display, row.error, row.u_val),
+            _with_uncertainty(row, display, row.entry.value, row.u_data),
+            _with_uncertainty(row, display, row.predicted, (row.u_input**2 + row.u_num**2) ** 0.5),
+            _with_uncertainty(row, display, row.error, row.u_val),
             _scale(row, display).unit,
             verdict_of(row, display),
         )
     return table
 
 
-def _with_sure(row: MeasuredRow, display: Display, value: float, sure: float) -> str:
+def _with_uncertainty(row: MeasuredRow, display: Display, value: float, uncertainty: float) -> str:
     """A value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
     factor = _scale(row, display).factor
-    if sure <= EXACT_SHARE * abs(value):
+    if uncertainty <= EXACT_SHARE * abs(value):
         return number(value * factor)
-    return " ± ".join(number_and_uncertainty(value * factor, sure * factor))
+    return " ± ".join(number_and_uncertainty(value * factor, uncertainty * factor))
 
 
 def _scale(row: MeasuredRow, display: Display) -> Scale:
-    """The unit of a row: small ones for deflections."""
+    """The unit in which a row is shown: a small one for deflections."""
     unit = row.entry.unit
     return display.deflection(unit) if unit in ("m", "rad") else display.scale(unit)
 
@@ -72,7 +72,7 @@ def _lines(answer: MeasuredComparison) -> Lines:
     )
     yield "Variance", f"The variance of the differences is made of: {text}."
     if answer.source:
-        yield "Numbers", f"How sure the machine's numbers are is from {answer.source}."
+        yield "Numbers", f"The uncertainty of the machine's numbers is from {answer.source}."
     else:
         yield (
             "Numbers",

@@ -23,7 +23,7 @@ LEAST_PERCENT = 0.0005
 
 
 def masses_of(answer: Vibration) -> str:
-    """Say what moves, and of which parts no mass is known."""
+    """Say how much mass moves, and of which parts no mass is known."""
     text = f"{answer.machine.display.show(answer.moving_mass, 'kg')} move."
     if not answer.uncounted:
         return text

@@ -68,7 +68,7 @@ class DesignTab:
                     with ui.tab_panel(FRONT):
                         self.runs.front.table()
                     with ui.tab_panel(RESULT):
-                        self.runs.answer()
+                        self.runs.place_result()
                     with ui.tab_panel(FAVOURITES):
                         self.favourites = FavouritesPanel(session, workshop.favourites, load)
 

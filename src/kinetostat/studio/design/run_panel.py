@@ -32,8 +32,13 @@ from kinetostat.studio.wording import paragraph
 
 NOTHING = "No search has been started yet. Choose variables and objectives of the study, then start it."
 DAMAGED = 'Search {} cannot be shown, because its folder "{}" is damaged: {}. The other searches are not affected.'
+NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
 INTERVAL = 0.5
 """Seconds between two looks at a search."""
+NO_COLOUR = -1
+"""The choice of no objective for the colour of a front."""
+AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}
+"""The choices of the plot of a front, and their labels."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +68,18 @@ class RunPanel:
     """The list of searches, and one of them in front with its progress, plot and result."""
 
     def __init__(self, runs: Runs, load: Callable[[Machine], None]) -> None:
-        """Build the panel without the result, for which `answer` makes a place.
+        """Build the panel without the result, for which `place_result` makes a place.
 
         Args:
             runs: searches of the server.
             load: takes a machine into the session.
         """
         self._runs, self._load = runs, load
-        self._lane = Lane(self._look, self._deliver)
+        self._lane = Lane(self._read_searches, self._deliver)
         self._follower: Follower | None = None
         self._progress: Progress | None = None
-        self._shown: object = None
-        self._place: int | None = None
+        self._shown: object = None  # search, stage and number of steps that the page shows
+        self._place: int | None = None  # of the design that was loaded last, in the front
         with ui.element("div").classes("design-head"):
             self.choice = choice({}, "search", self._choose, "run-choice").classes("grow")
             self.stop = icon_button("stop", "Stop after this step; all results are kept", self._stop, "run-stop")
@@ -83,10 +88,10 @@ class RunPanel:
         self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"').mark("run-bar")
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
         self.curve = CurveView("objective of the best design and mean of all, over the steps").mark("run-curve")
-        self.front = FrontPanel(self._take)
+        self.front = FrontPanel(self._load_design)
         self.timer = ui.timer(INTERVAL, self.refresh, active=False)
 
-    def answer(self) -> None:
+    def place_result(self) -> None:
         """Make the place of the result; the table of the front must have its place already."""
         with ui.element("div").classes("design-head"):
             self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
@@ -108,7 +113,8 @@ class RunPanel:
         self.timer.deactivate()
         self._lane.close()
 
-    def _look(self, request: ProgressRequest) -> Searches:
+    def _read_searches(self, request: ProgressRequest) -> Searches:
+        """Read the list of searches and the progress of one of them, in a thread."""
         try:
             runs = self._runs.every()
         except InputError as error:
@@ -129,6 +135,8 @@ class RunPanel:
             return Searches(runs, problem=DAMAGED.format(run.number, run.folder, error))
 
     def _deliver(self, request: ProgressRequest, searches: Searches) -> None:
+        """Show what was read, unless another search has been chosen meanwhile; nothing is drawn where nothing is
+        new."""
         if request.number != int(self.choice.value or 0):
             self.refresh()
             return
@@ -146,7 +154,7 @@ class RunPanel:
             self.text.set_content(paragraph(searches.problem or NOTHING))
             return
         self.bar.set_value(progress.steps / progress.total)
-        self.line.set_text(_line(progress))
+        self.line.set_text(_status_line(progress))
         self._draw(progress)
         self.text.set_content(paragraph(searches.problem, "lead") if searches.problem else result_text(progress))
 
@@ -180,9 +188,10 @@ class RunPanel:
 
     def _load_best(self) -> None:
         if self._progress is not None:
-            self._take(self._progress.knee)
+            self._load_design(self._progress.knee)
 
-    def _take(self, place: int) -> None:
+    def _load_design(self, place: int) -> None:
+        """Load a design of the front into the session."""
         if self._progress is not None and 0 <= place < len(self._progress.objectives):
             self._place = place
             self._load(self._progress.design(place))
@@ -204,6 +213,7 @@ class RunPanel:
         self.choice.set_value(None)
 
     def _attempt(self, action: Callable[[int], None]) -> None:
+        """Do something with the search in front; a refusal is shown as a message."""
         try:
             action(int(self.choice.value or 0))
         except InputError as error:
@@ -230,7 +240,8 @@ def convergence(progress: Progress) -> dict[str, object]:
     }
 
 
-def _line(progress: Progress) -> str:
+def _status_line(progress: Progress) -> str:
+    """Say in a line how far a search is, and how good its best design."""
     work = str(progress.run.stage)
     if progress.run.stage is Stage.RUNNING and not progress.steps:
         work = f"{work}, preparing its program"
@@ -239,12 +250,6 @@ def _line(progress: Progress) -> str:
     line = f"{work}: {progress.steps} of {progress.total} steps, {progress.designs:,} designs"
     best = progress.best[-1] if progress.best else None
     return line if best is None else f"{line}, best {progress.exact(progress.problem.objectives[0], best)}"
-
-
-NONE = -1
-"""The choice of no objective for the colour."""
-NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
-AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}
 
 
 class FrontPanel:
@@ -259,11 +264,11 @@ class FrontPanel:
         self._pick = pick
         self._progress: Progress | None = None
         self._chosen: int | None = None
-        self._asking = False
+        self._is_ready = False  # whether the choices are complete, so that a change of one is a wish
         with ui.element("div").classes("front-plot") as self.plot:
             with ui.row().classes("panel-tools") as self.tools:
                 self.across, self.up, self.coloured = (
-                    choice({}, label, self._chosen_axis, f"front-{mark}") for mark, label in AXES.items()
+                    choice({}, label, self._change_axis, f"front-{mark}") for mark, label in AXES.items()
                 )
             self.view = FrontView("designs of the Pareto front; a click, or arrow keys and Enter, load one")
             self.view.mark("run-front").on("pick", self._pick_row)
@@ -291,15 +296,15 @@ class FrontPanel:
 
     def _offer(self, names: dict[int, str]) -> None:
         """Offer the objectives as axes and colour; with only two, the choice is hidden."""
-        self._asking = False
+        self._is_ready = False
         self.tools.set_visibility(len(names) > 2)
         self.across.set_options(names, value=0)
         self.up.set_options(names, value=1)
-        self.coloured.set_options({NONE: "none", **names}, value=2 if len(names) > 2 else NONE)
-        self._asking = True
+        self.coloured.set_options({NO_COLOUR: "none", **names}, value=2 if len(names) > 2 else NO_COLOUR)
+        self._is_ready = True
 
-    def _chosen_axis(self) -> None:
-        if self._asking:
+    def _change_axis(self) -> None:
+        if self._is_ready:
             self._draw()
 
     def _draw(self) -> None:
@@ -313,7 +318,7 @@ class FrontPanel:
             {
                 "points": [_in_units(point, scales) for point in progress.objectives],
                 "axes": [self.across.value, self.up.value],
-                "coloured": None if self.coloured.value == NONE else self.coloured.value,
+                "coloured": None if self.coloured.value == NO_COLOUR else self.coloured.value,
                 "labels": [progress.label(objective) for objective in progress.problem.objectives],
                 "knee": progress.knee,
                 "initial": _in_units(initial, scales) if initial and None not in initial else None,
