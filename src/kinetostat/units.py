@@ -206,6 +206,13 @@ def written_value(value: float, kind: str, like: object = None) -> str | float:
     return min(texts, key=lambda text: sum(c.isdigit() for c in text))
 
 
+def rounded_value(value: float, kind: str, like: object, digits: int) -> float:
+    """Return the SI value next to a finite one that has so many digits in the unit of what stood in a file before."""
+    match = _NUMBER.fullmatch(like) if isinstance(like, str) else None
+    factor = _factor(match[2], KINDS[kind]) if match and match[2] else 1.0
+    return float(f"{value / factor:.{digits}g}") * factor
+
+
 def _texts(value: float, units: Iterable[str], kind: str) -> list[str]:
     return [text for unit in units if (text := _exactly(value, unit, KINDS[kind])) is not None]
 

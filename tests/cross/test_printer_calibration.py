@@ -21,9 +21,11 @@ from synthetic_printer import (
     ENDSTOPS,
     PROBED,
     Truth,
+    commanded,
     endstops,
     firmware_truth,
     probed_heights,
+    reached,
     sent_height,
     write_probes,
 )
@@ -104,20 +106,29 @@ class Linear:
         return self.residuals(values), self.rates
 
 
+def repeated(machine, folder, what, known, draw):
+    """A fit to ten heights, and the wishes with which it is repeated for other printers."""
+    base = fit_of(machine, folder / "probes.csv", Truth(), what, known, draw)
+    before = _sizes_by_name(base.unknowns, {"": {}, "priors": NARROW, "wide": WIDE}[what], "prior")
+    weak = np.full(len(before), PREFERENCE)
+    return base, Wishes(base.sizes, before, np.full(len(before), np.inf), weak, False, known)
+
+
+def true_values(base, truth):
+    paths = numbers_of(truth)
+    return np.array([paths[unknown.path] for unknown in base.unknowns])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("what", "known"), CASES)
 def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(machine, tmp_path, what, known):
     """In 95 % of 200 repetitions with other errors and noise, and to a tenth, whatever priors say and use up."""
     draw, sigma = np.random.default_rng(3), NOISE if known else 1e-5
-    base = fit_of(machine, tmp_path / "probes.csv", Truth(), what, known, draw)
+    base, wishes = repeated(machine, tmp_path, what, known, draw)
     rates = base.observed.linearisation(np.zeros(len(base.unknowns)))[1]
-    before = _sizes_by_name(base.unknowns, {"": {}, "priors": NARROW, "wide": WIDE}[what], "prior")
-    wishes = Wishes(base.sizes, before, np.full(len(before), np.inf), np.full(len(before), PREFERENCE), False, known)
     inside, ratios = [], []
     for _ in range(200):
-        truth = somewhere(draw, what == "wide")
-        paths = numbers_of(truth)
-        true = np.array([paths[unknown.path] for unknown in base.unknowns])
+        true = true_values(base, somewhere(draw, what == "wide"))
         noise = draw.normal(0.0, NOISE / sigma, len(PROBED))
         fit = best_fit(Linear(rates, true, noise), base.observed.pose, wishes)
         answer = replace(base, fit=fit)
@@ -133,6 +144,53 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
     assert np.sqrt(np.mean(ratios)) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("known", [True, False])
+def test_fourteen_numbers_of_exact_printers_leave_residuals_of_the_noise(machine, tmp_path, known):
+    """200 printers with the kinematics of the tests: the nozzle is sent to the same ten places of the bed each time."""
+    draw, sigma = np.random.default_rng(17), NOISE if known else 1e-5
+    base, wishes = repeated(machine, tmp_path, "wide", known, draw)
+    inside, ratios = [], []
+    for _ in range(200):
+        truth = somewhere(draw, wide=True)
+        places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
+        heights = [reached(commanded(place), truth, place)[2] for place in places]
+        observed = replace(base.observed, value=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
+        fit = best_fit(observed, observed.pose, wishes)
+        ratios.append((fit.scatter * sigma / NOISE) ** 2)
+        inside += (np.abs(fit.values - true_values(base, truth)) <= fit.sure).tolist()
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
+    assert np.sqrt(np.mean(ratios)) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("values", [10, 30])
+def test_freedoms_are_the_mean_sum_of_squares_over_machines_as_the_priors_say(values):
+    """Theory, section 15, with fourteen unknowns; for one machine, the mean over noise is another number.
+
+    A sum of squares is a quadratic form, whose mean over independent numbers is that over two points on each axis.
+    """
+    draw, count = np.random.default_rng(4), 14
+    rates, priors = draw.normal(size=(values, count)), np.exp(draw.normal(size=count))
+    wishes = Wishes(np.ones(count), priors, np.full(count, np.inf), np.full(count, 1e-6), robust=False)
+
+    def squares(truth, noise):
+        fit = best_fit(Linear(rates, truth, noise), np.arange(values), wishes)
+        return float(fit.after @ fit.after), fit.freedom
+
+    axes = values + count
+    points = np.sqrt(axes) * np.concatenate([np.eye(axes), -np.eye(axes)])
+    sums, freedoms = zip(*(squares(priors * point[values:], point[:values]) for point in points), strict=True)
+    hat = rates @ np.linalg.solve(rates.T @ rates + np.diag(priors**-2.0), rates.T)
+    left = np.eye(values) - hat
+    assert freedoms == pytest.approx([np.trace(left)] * len(points))
+    assert np.mean(sums) == pytest.approx(np.trace(left), rel=1e-6)
+    truth = 2.0 * priors
+    points = np.sqrt(values) * np.concatenate([np.eye(values), -np.eye(values)])
+    mean = np.mean([squares(truth, noise)[0] for noise in points])
+    assert mean == pytest.approx(np.trace(left @ left) + np.sum((left @ rates @ truth) ** 2), rel=1e-6)
+    assert mean > 1.2 * np.trace(left) or values > count
+
+
 @pytest.mark.parametrize("what", ["", "priors", "wide"])
 def test_exact_printers_are_found_within_their_intervals(machine, tmp_path, what):
     draw, inside = np.random.default_rng(5), []
@@ -140,6 +198,19 @@ def test_exact_printers_are_found_within_their_intervals(machine, tmp_path, what
         truth = somewhere(draw, what == "wide")
         inside += hits(fit_of(machine, tmp_path / "probes.csv", truth, what, True, draw), truth)
     assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize("named", ["zeros", "angles", "radius", "rod", "lean_out", "lean_aside", "gain"])
+def test_each_error_moves_the_nozzle_as_the_kinematics_of_the_tests_say(machine, tmp_path, named):
+    """Also by leans, which turn a tower about its foot on the bed, from where its carriage counts."""
+    base, _ = repeated(machine, tmp_path, "wide", True, np.random.default_rng(1))
+    sizes = {"radius": 3e-5, "rod": 3e-5, "gain": 1e-4}
+    truth = replace(Truth(), **{named: sizes.get(named, np.array([2e-5, -1e-5, 0.0]))})
+    places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
+    heights = np.array([reached(commanded(place), truth, place)[2] for place in places])
+    left = replace(base.observed, value=heights).residuals(true_values(base, truth))
+    assert np.abs(heights).max() > 1e-7
+    assert left == pytest.approx(np.zeros(10), abs=1e-9 / NOISE)  # a nanometre, of the second order
 
 
 def test_a_printer_without_noise_gives_its_numbers_and_firmware_that_prints_flat(machine, tmp_path):

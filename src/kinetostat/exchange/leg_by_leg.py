@@ -25,12 +25,14 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.rods import driven_slides, rods
+from kinetostat.machine.saving import as_file
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key, toml_pairs, toml_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import LARGEST_OTHER, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.studies.identification.identification import Identification
+from kinetostat.studies.identification.own_numbers import identified_machine
 from kinetostat.studies.rounding import clean_screw
 
 
@@ -70,7 +72,10 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
 
 
 def fitted_text(answer: Identification) -> str | None:
-    """The text of a machine file leg by leg of a machine as measurements say it is built.
+    """The text of a machine file of a machine as measurements say it is built.
+
+    Where the numbers of the machine's own file say all that was found, it is that file with these numbers as
+    identified; comments, units and names stay. Otherwise it is a file leg by leg.
 
     Args:
         answer: of `identify`.
@@ -78,6 +83,8 @@ def fitted_text(answer: Identification) -> str | None:
     Returns:
         The text; None where legs with these errors close only by being bent.
     """
+    if machine := identified_machine(answer):
+        return as_file(machine)
     try:
         built = as_built(answer.machine, answer.errors)
     except InputError:

@@ -22,6 +22,7 @@ from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 AHEAD = 1e-4
 """Motion of an actuator, m or rad, that shows its sense."""
 LENGTH, POSITION = "length of the leg", "position along its axis from the base origin"
+HEIGHT = "position along its rail from the foot of that"
 ELEVATION, BEARING = "angle of the crank above the x-y plane", "angle of the crank from x"
 TRAVEL, TURNED = "travel from the home pose", "turn from the home pose"
 
@@ -74,7 +75,9 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
             if slides and leg.name in lengths:
                 meaning, coordinate = LENGTH, lengths[leg.name]
             elif slides:
-                meaning, coordinate = POSITION, _next_point(leg, place, end).dot(spring.joint.axis)
+                point, foot = _next_point(leg, place, end), spring.joint.foot
+                meaning, reached = (POSITION, point) if foot is None else (HEIGHT, point - foot)
+                coordinate = reached.dot(spring.joint.axis)
             else:
                 meaning, coordinate = _crank_angle(spring.joint, leg, place, end)
             result.append(Actuator(name_of(spring), leg.name, meaning, coordinate, slides))

@@ -80,6 +80,8 @@ class Joint:
         name: of the joint it belongs to; a Hooke joint is two of these with one name, a spherical joint three.
         pitch: of a screw, m/rad; 0 for a revolute.
         carriage: of a slide, a point that travels with it, base frame, m: where its load is given; None if not said.
+        foot: of a slide, the point of its rail from which its coordinate counts, base frame, m; None for the base
+            origin. A rail that leans turns about it.
     """
 
     axis: Vector
@@ -87,6 +89,7 @@ class Joint:
     name: str = ""
     pitch: Scalar = 0.0
     carriage: Vector | None = None
+    foot: Vector | None = None
 
     @property
     def freedoms(self) -> tuple["Joint", ...]:
@@ -119,7 +122,8 @@ class Joint:
         """The joint after a rigid displacement of the whole machine."""
         point = None if self.point is None else motion.apply(self.point)
         carriage = None if self.carriage is None else motion.apply(self.carriage)
-        return replace(self, axis=motion.rotation.apply(self.axis), point=point, carriage=carriage)
+        foot = None if self.foot is None else motion.apply(self.foot)
+        return replace(self, axis=motion.rotation.apply(self.axis), point=point, carriage=carriage, foot=foot)
 
     def moved(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
         """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""

@@ -5,7 +5,8 @@ read once more and compared, so that a saved file always gives exactly the same 
 so (a leg among copies, for example), and where there is none, the whole file is written afresh.
 """
 
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import tomlkit
@@ -40,6 +41,24 @@ def as_file(machine: Machine) -> str:
     written = machine.written
     kept = _edited_text(written, machine) if written and len(written.text) <= LONGEST_EDITED_TEXT else None
     return as_toml(machine, readable=True) if kept is None else kept
+
+
+def written_at(machine: Machine, paths: Iterable[str]) -> dict[str, Any]:
+    """Return what the file of a machine says at the paths of numbers; None of those of which it says nothing.
+
+    One value that stands for all entries is that of each of them.
+    """
+    document = tomllib.loads(machine.written.text) if machine.written else {}
+    return {path: _value_at(document, path.split(".")) for path in paths}
+
+
+def _value_at(at: Any, keys: list[str]) -> Any:
+    try:
+        for key in keys:
+            at = _inside(at, key) if isinstance(at, dict | list) else at
+    except (LookupError, ValueError):
+        return None
+    return at
 
 
 def _edited_text(written: Written, machine: Machine) -> str | None:

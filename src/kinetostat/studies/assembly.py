@@ -86,7 +86,8 @@ def forward(
 
     The coordinate of an actuated slide between two passive joints is the length of its leg. Others count from the home
     pose where a machine is written leg by leg; in families a slide has a position along its axis from the base origin,
-    and a crank an angle above the x-y plane. `analyze(machine).actuators` shows them at the pose.
+    or from the foot of a tower, and a crank an angle above the x-y plane. `analyze(machine).actuators` shows them at
+    the pose.
 
     Args:
         machine: its pose is where the search begins.

@@ -26,7 +26,7 @@ from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.machine.parameters import POSE, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
@@ -279,8 +279,13 @@ def home_coordinates(machine: Machine) -> dict[str, float]:
 
 
 def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
-    """Refuse a machine as drawn, whose geometry is not the one that the fit has found."""
-    if record.family == machine.family.name and machine.family.chains is None:
+    """Refuse a machine as drawn, whose numbers are not those that the fit has found."""
+    if record.numbers is None:
+        drawn = record.family == machine.family.name and machine.family.chains is None
+    else:
+        numbers = values(machine)
+        drawn = any(not math.isclose(numbers.get(path, math.nan), number) for path, number in record.numbers.items())
+    if drawn:
         raise InputError(
             f'{machine.name} is the machine as drawn, and the fit "{record.path}" is about the one as built; give the '
             "machine.toml that lies beside it."

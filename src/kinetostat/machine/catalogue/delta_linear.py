@@ -100,9 +100,9 @@ def _leg(number: int, tip: Vector, geometry: Geometry, stiffness: Stiffness) -> 
     travel, distance = slide_travel(foot, joint, -upward, length)
     carriage = foot - upward * travel
     rods = BarPair(name, carriage, joint, aside, length, geometry.rod_spacing, stiffness.bar_axial)
-    rail = carriage + outward * geometry.carriage_offset
+    rail, start = (point + outward * geometry.carriage_offset for point in (carriage, foot))
     chain: tuple[Element, ...] = (
-        Spring(PartName(name, "actuator"), Joint(upward), stiffness.actuator[number], actuated=True),
+        Spring(PartName(name, "actuator"), Joint(upward, foot=start), stiffness.actuator[number], actuated=True),
         Arm(
             rail,
             carriage,

@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array
@@ -320,18 +318,3 @@ def _sizes_by_name(unknowns: Sequence[MachineError], given: Mapping[str, str], w
         for n in named:
             result[n] = min(result[n], fitting.get(unknowns[n].kind, np.inf))
     return result
-
-
-def with_home(answer: Identification, record: dict[str, Any]) -> dict[str, Any]:
-    """Add to the record of a fit where actuators stand at the home pose of the machine as built.
-
-    Args:
-        answer: of the fit.
-        record: plain data; where the machine cannot be placed as built, it gets the reason under "machine_file".
-    """
-    try:
-        built = as_built(answer.machine, answer.errors)
-    except InputError as error:
-        return {**record, "machine_file": str(error)}
-    home = {"commands": built.commands, "actuators": built.coordinates, "senses": built.senses}
-    return {**record, "home": home}

@@ -56,6 +56,7 @@ class FitRecord:
         home: where actuators stand at the home pose of the machine as built, by name, counted as in the drawn machine,
             m or rad; none in a record without a machine file.
         senses: 1 or -1 by name: whether that count grows with the one of the machine as built.
+        numbers: those of the machine's own file as identified, by path, SI; None where that file cannot say all.
     """
 
     path: str
@@ -75,6 +76,7 @@ class FitRecord:
     pictures: Mapping[str, bytes]
     home: Mapping[str, float]
     senses: Mapping[str, float]
+    numbers: Mapping[str, float] | None
 
     def controller_counts(self, actuators: Sequence[str], coordinates: Array, home: Mapping[str, float]) -> Array:
         """Coordinates of actuators as their controller counts them, with the zeros and gains that were found.
@@ -206,4 +208,7 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
             {str(name): float(value) for name, value in record.get("home", {}).get(what, {}).items()}
             for what in ("actuators", "senses")
         ),
+        None
+        if record.get("numbers") is None
+        else {str(path): float(value) for path, value in record["numbers"].items()},
     )
