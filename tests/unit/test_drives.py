@@ -15,7 +15,7 @@ from kinetostat.studies.motion_deflection import swings_under
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.report import REPORT_PARTS, gather
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.drives import DRIVES
+from kinetostat.views.drives import DRIVES, speed_torque_figure
 from kinetostat.views.report.writing import ReportOptions
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
@@ -209,6 +209,23 @@ def test_no_direction_asks_for_more_than_the_worst_ones():
             assert share * second.force <= first.force * (1.0 + 1e-9)
             assert first.force < 1.03 * second.force
             assert first.speed >= second.speed
+
+
+def test_the_diagram_of_all_directions_bounds_what_they_ask_of_a_motor():
+    answer = drives(load("hexapod", [*MASS, *MOTORS]), speed="0.5 m/s", acceleration="5 m/s**2")
+    speed, torque = np.abs(answer.curves.motor_speed[0]) * 30.0 / np.pi, np.abs(answer.curves.motor_torque[0])
+    (panel,) = speed_torque_figure(answer).axes
+    x, y = panel.lines[0].get_data()
+    assert (torque <= np.interp(speed * (1.0 - 1e-12), x[::-1], y[::-1]) * (1.0 + 1e-9)).all()
+    assert (x[0], y[-1]) == pytest.approx((speed.max(), torque.max()))
+
+
+def test_the_diagram_of_a_motion_marks_peak_and_mean_squares(tmp_path):
+    answer = answer_of(tmp_path, MOVES, *MASS, *MOTORS)
+    (panel,) = speed_torque_figure(answer).axes
+    _, peak, mean, *_ = panel.lines
+    assert peak.get_ydata() == pytest.approx([answer.drives[0].motor_torque])
+    assert mean.get_ydata() == pytest.approx([answer.drives[0].rms_torque])
 
 
 def test_without_a_motion_both_limits_are_needed():

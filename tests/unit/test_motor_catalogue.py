@@ -91,6 +91,16 @@ def test_a_fit_is_what_drives_says_with_the_rotor_of_the_motor(motion):
     assert not answer.fits[-1].fits
 
 
+def test_of_motors_that_do_not_fit_the_nearest_comes_first(motion):
+    """Those that are too fast have no torque left, and so no finite share of it."""
+    machine = load("hexapod", [*SETTINGS, "drives.lead=0.5 mm"])
+    answer = motors(machine, motion)
+    missed = [fit for fit in answer.fits if not fit.fits]
+    assert len(missed) > 2
+    assert sum(math.isinf(fit.greatest_share) for fit in missed) > 1
+    assert [fit.hardest[1] for fit in missed] == sorted(fit.hardest[1] for fit in missed)
+
+
 def test_a_gear_or_a_screw_of_the_catalogue_takes_the_place_of_the_file(motion, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(

@@ -260,7 +260,7 @@ def motors(
         if loads.curves is None or not loads.drives:
             return MotorChoice(fitted, loads.status, loads.message)
         fits.append(fit_of(known, name, loads))
-    ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.greatest_share)))
+    ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.hardest[1])))
     return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
 
 

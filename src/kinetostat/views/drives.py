@@ -29,6 +29,8 @@ MOST_MODES = 6
 """Excited modes that are named."""
 MOST_LEGEND = 8
 """Drives that a legend names."""
+MARKS = "\N{MULTIPLICATION SIGN} peak\n\N{BLACK CIRCLE} RMS"
+"""Meaning of the marks in a speed-torque diagram."""
 
 
 def _curves(answer: DriveLoads) -> DriveCurves:
@@ -161,16 +163,15 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
             _lines_over_time(panel, answer, values, chosen)
             panel.set_ylabel(label)
         panels[-1].set_xlabel("time (s)")
-        if len(answer.drives) <= MOST_LEGEND:
-            handles, names = panels[-1].get_legend_handles_labels()
-            figure.legend(handles, names, loc="outside right upper", frameon=False, fontsize="small")
-        _note(figure, answer)
+        name_drives(figure, answer)
+        note_motion(figure, answer)
     return figure
 
 
-def _note(figure: Figure, answer: DriveLoads) -> None:
+def note_motion(figure: Figure, answer: DriveLoads, *further: str) -> None:
+    """Write below a figure where its machine is but for what moves, and along which motion it goes."""
     moving = [POSE + name for name in answer.motion.path.pose]
-    note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind)
+    note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind, *further)
 
 
 def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
@@ -183,41 +184,75 @@ def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: lis
             )
 
 
+def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
+    """Draw the torque of each motor over its speed, its peak as a cross, and its mean squares as a point.
+
+    In all directions at once there is no line through points; what they ask for most is drawn.
+
+    Args:
+        panel: whose axes are labelled as well.
+        answer: along a motion.
+        rotary: whether motors that turn are drawn, in turns per minute, or those that are linear drives themselves.
+    """
+    curves, times = _curves(answer), answer.motion.times
+    scale = answer.machine.display.scale("N·m" if rotary else "N")
+    factor = PER_MINUTE if rotary else 1.0
+    timeless = times[-1] == times[0]
+    style = {"linewidth": 1.2} if timeless else {"linewidth": 0.7, "alpha": 0.6}
+    for k, drive in enumerate(answer.drives):
+        if drive.rotary is not rotary:
+            continue
+        colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
+        speed, peak = np.abs(curves.motor_speed[k]) * factor, int(np.argmax(torque))
+        line = _most_at_speeds(speed, torque) if timeless else (speed, torque)
+        panel.plot(*line, color=colour, **style)
+        panel.plot(
+            speed[peak], torque[peak], "x", color=colour, markersize=6, markeredgewidth=1.5, zorder=3, clip_on=False
+        )
+        if not timeless:
+            mean, rms = float(root_mean_square(times, speed)), drive.rms_torque * scale.factor
+            panel.plot(mean, rms, "o", color=colour, markersize=6, markeredgecolor="white", zorder=4)
+        panel.plot([], [], color=colour, linewidth=3.0, label=drive.name)
+    panel.set_xlabel("speed (1/min)" if rotary else "speed (m/s)")
+    panel.set_ylabel(scale.label("torque" if rotary else "force"))
+    panel.set_xlim(left=0.0)
+    panel.set_ylim(bottom=0.0)
+
+
+def _most_at_speeds(speed: Array, torque: Array) -> tuple[Array, Array]:
+    """The greatest torque at each speed or above it, as a line from the axis of torques to that of speeds."""
+    order = np.argsort(-speed)
+    greatest = np.maximum.accumulate(torque[order])
+    ahead = np.flatnonzero(np.diff(greatest, prepend=-1.0) > 0.0)
+    speeds, torques = speed[order][ahead], greatest[ahead]
+    return np.array([speeds[0], *speeds, 0.0]), np.array([0.0, *torques, torques[-1]])
+
+
+def name_drives(figure: Figure, answer: DriveLoads, meaning: str = "") -> None:
+    """Name the colours of the drives beside a figure, if they are few enough, and say what its marks mean."""
+    pairs = [panel.get_legend_handles_labels() for panel in figure.axes]
+    named = {name: handle for handles, names in pairs for handle, name in zip(handles, names, strict=True)}
+    if len(answer.drives) <= MOST_LEGEND:
+        figure.legend(
+            named.values(),
+            named.keys(),
+            loc="outside right upper",
+            frameon=False,
+            fontsize="small",
+            title=meaning,
+            title_fontsize="small",
+            alignment="left",
+        )
+
+
 def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> Figure:
-    """Draw the torque of each motor over its speed, with its greatest values and its mean squares as points."""
-    curves, display = _curves(answer), answer.machine.display
-    kinds = [(True, PER_MINUTE, "speed (1/min)", "torque"), (False, 1.0, "speed (m/s)", "force")]
-    shown = [kind for kind in kinds if any(drive.rotary is kind[0] for drive in answer.drives)]
+    """Draw the torque of each motor over its speed, with peaks and mean squares."""
+    shown = [rotary for rotary in (True, False) if any(drive.rotary is rotary for drive in answer.drives)]
     with new_figure((6.6, 0.9 + 3.4 * len(shown)), title.format(answer.machine.name)) as figure:
-        for panel, (rotary, factor, label, what) in zip(
-            figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True
-        ):
-            scale = display.scale("N·m" if rotary else "N")
-            times = answer.motion.times
-            for k, drive in enumerate(answer.drives):
-                if drive.rotary is not rotary:
-                    continue
-                colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
-                style = {"linestyle": "none", "marker": "."} if times[-1] == times[0] else {"linewidth": 0.9}
-                panel.plot(np.abs(curves.motor_speed[k]) * factor, torque, color=colour, alpha=0.7, **style)
-                mean = float(root_mean_square(times, curves.motor_speed[k])) * factor
-                panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=5, label=drive.name)
-                panel.plot(
-                    drive.motor_speed * factor, drive.motor_torque * scale.factor, "+", color=colour, markersize=9
-                )
-            panel.set_xlabel(label)
-            panel.set_ylabel(scale.label(what))
-            panel.set_xlim(left=0.0)
-            panel.set_ylim(bottom=0.0)
-            panel.legend(
-                frameon=False,
-                fontsize="small",
-                title=f"points: RMS;\n+ greatest {what}\nand speed",
-                title_fontsize="small",
-                loc="upper left",
-                bbox_to_anchor=(1.0, 1.0),
-            )
-        _note(figure, answer)
+        for panel, rotary in zip(figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True):
+            draw_motion(panel, answer, rotary)
+        name_drives(figure, answer, MARKS if answer.motion.duration else MARKS.partition("\n")[0])
+        note_motion(figure, answer)
     return figure
 
 
@@ -237,7 +272,7 @@ def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}"
         panel.set_xlabel("time (s)")
         panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
         panel.legend(frameon=False, fontsize="small", ncols=3)
-        _note(figure, answer)
+        note_motion(figure, answer)
     return figure
 
 

@@ -11,15 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.display import DASH, number
-from kinetostat.machine.machine import Machine, setting_of
-from kinetostat.studies.drives import root_mean_square
+from kinetostat.machine.machine import Machine
 from kinetostat.studies.motors import MotorChoice, MotorFit, motors
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.views.figures import COLOURS, new_figure
+from kinetostat.views.drives import MARKS, PER_MINUTE, draw_motion, name_drives, note_motion
+from kinetostat.views.figures import new_figure
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 
-PER_MINUTE = 60.0 / (2.0 * math.pi)
 MOST_DRAWN = 4
 """Motors that have a diagram, the best first."""
 
@@ -63,15 +62,15 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
     shown = answer.fits[:MOST_DRAWN]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
-    note = "dark: for ever; light: for a short while; lines: the drives; +: peak; circles: RMS"
-    with new_figure(
-        (0.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name), setting_of(answer.machine), note
-    ) as figure:
+    note = "shaded: torque that the motor may give; dark: for ever, light: for a short while"
+    with new_figure((1.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name)) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, fit in zip(panels, shown, strict=False):
             _diagram(panel, answer, fit)
         for panel in figure.axes[len(shown) :]:
             panel.set_visible(False)
+        name_drives(figure, shown[0].loads, MARKS)
+        note_motion(figure, shown[0].loads, note)
     return figure
 
 
@@ -81,20 +80,9 @@ def _diagram(panel: Axes, answer: MotorChoice, fit: MotorFit) -> None:
     for peak, opacity in ((True, 0.15), (False, 0.3)):
         limit = fit.motor.limit(peak, speeds) * scale.factor
         panel.fill_between(speeds * PER_MINUTE, limit, color="#0072b2", alpha=opacity, linewidth=0.0)
-    if fit.loads.curves is not None and fit.loads.motion is not None:
-        curves = fit.loads.curves
-        for k, drive in enumerate(fit.loads.drives):
-            colour, speed = COLOURS[k % len(COLOURS)], np.abs(curves.motor_speed[k])
-            panel.plot(speed * PER_MINUTE, np.abs(curves.motor_torque[k]) * scale.factor, color=colour, linewidth=0.8)
-            mean = float(root_mean_square(fit.loads.motion.times, speed)) * PER_MINUTE
-            panel.plot(mean, drive.rms_torque * scale.factor, "o", color=colour, markersize=4)
-            hardest = int(np.argmax(np.abs(curves.motor_torque[k])))
-            torque = abs(float(curves.motor_torque[k, hardest])) * scale.factor
-            panel.plot(speed[hardest] * PER_MINUTE, torque, "+", color=colour, markersize=7)
-    panel.set(xlabel="speed (1/min)", ylabel=scale.label("torque"))
+    if fit.loads.curves is not None:
+        draw_motion(panel, fit.loads, rotary=True)
     panel.set_title(f"{fit.name}: {'fits' if fit.fits else 'does not fit'}", loc="left", parse_math=False)
-    panel.set_xlim(left=0.0)
-    panel.set_ylim(bottom=0.0)
 
 
 def _finite(share: float) -> float | None:
