@@ -1,11 +1,11 @@
-"""Ways of the platform from the home pose to a pose, and the span of links that shows at once that there is none.
+"""Ways of the platform from the home pose to a pose, and a quick test that shows that a leg is too short or too long.
 
-Ways are straight, and detours that are tried where that is blocked. A leg by itself goes its own way, because all that
-counts is where it arrives. Solving along a way is elsewhere (`following`).
+The straight way is tried first, then detours, in case that it is blocked. A leg that is followed by itself has detours
+of its own, because all that counts is where it arrives. Joints are solved along a way in `following`.
 
-The span holds for legs of revolutes and parallelograms, which may begin with a slide. From one joint to the next, and
-from the near to the far side of a parallelogram, the distance stays; the second joint moves on a circle about the first
-one, or along the slide. Points are in the base frame, m.
+The quick test is for legs of revolutes and parallelograms, which may begin with a slide. The distance from one joint to
+the next, and from the near to the far side of a parallelogram, never changes; the second joint moves on a circle about
+the first one, or along the slide. Points are in the base frame, m.
 
 Source: theory section 6.
 """
@@ -36,10 +36,10 @@ Plan = Callable[[Problems, Coordinates], Way]
 
 
 def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Plan, Mask]]:
-    """Name the ways in the order in which they are tried, each a plan.
+    """Generate the plans in the order in which they are tried, each with the problems in which it makes a difference.
 
-    With each comes in which of the problems it differs from the straight one: angles first or last where both angles
-    and the point change, angles as they are given where one exceeds half a turn.
+    Turning first or last differs from the straight way where both the angles and the point change, and the long way
+    round where an angle exceeds half a turn.
     """
     everywhere = np.ones(len(problems.poses), dtype=bool)
     yield straight, everywhere

@@ -1,9 +1,10 @@
 """A machine of rigid parts at a pose: motions of its legs as screws, the masses that they carry, and what closes them.
 
-It is the mechanism of `equilibrium.mechanism` over scalars, from which it has masses, friction and loads: springs stand
-still, joints and drives move. Units are those of the mechanism: turns in rad, lengths in units of the machine's length,
-forces in N, so that generalised forces of slides are in N, and moments in N times that length. The origin is the tool
-point where it is now, axes are those of the base. Nothing moves here (`rates`) and nothing is balanced (`forces`).
+It is made of the mechanism of `equilibrium.mechanism` over scalars, which gives masses, friction and loads. Springs
+stand still here, while joints and drives may move. Units are those of the mechanism: turns in rad, lengths in units of
+the machine's length, forces in N, so that generalised forces of slides are in N, and moments in N times that length.
+The origin is the tool point at the pose, and axes are those of the base. How fast parts move is computed in `rates`,
+and the forces that this takes in `forces`.
 
 Source: theory section 20, (85).
 """
@@ -35,12 +36,12 @@ class MassPoint:
     """A mass of a leg or of the platform.
 
     Attributes:
-        name: of the part that it belongs to.
-        carried: how many motions of the leg carry it.
-        point: where it is.
+        name: name of the part that it belongs to.
+        carried: number of the motions of the leg that carry it.
+        point: its place.
         mass: the mass, kg.
-        alone: the part of it whose momentum is its own; the rest is coupled to the other half of a bar.
-        tensor: inertia about the point, rows; none where it has none.
+        alone: the part of the mass whose momentum is its own; the rest is coupled to the other half of a bar.
+        tensor: rows of the inertia about the point; empty if there is none.
     """
 
     name: str
@@ -60,9 +61,9 @@ class RigidDrive:
     """A drive of a rigid machine.
 
     Attributes:
-        spring: of its actuator.
-        turns: radians of the rotor per unit of its coordinate, rad per rad or per unit of length; 0 if nobody says it.
-        inertia, viscous, coulomb: of its rotor as its coordinate feels them.
+        spring: the spring of its actuator.
+        turns: radians of the rotor per unit of its coordinate, rad per rad or per unit of length; 0 if it is not known.
+        inertia, viscous, coulomb: inertia and friction of the rotor as the coordinate of the drive feels them.
         guide: Coulomb friction of the joint itself, behind screw or gear.
     """
 
@@ -93,8 +94,9 @@ class LegFreedoms:
 
     Attributes:
         kept: numbers of the passive coordinates of the mechanism's leg that move.
-        spare: whether there are more coordinates than the platform has motions: rates are then the least.
-        balls: places, among those that are kept, of three turns each about one point: a ball joint.
+        spare: whether there are more coordinates than motions of the platform: their rates are then those of least
+            norm.
+        balls: places among those that are kept of the three turns of each ball joint.
     """
 
     kept: tuple[int, ...]
@@ -104,11 +106,11 @@ class LegFreedoms:
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """The form of the equations: the motions that there are, found once at a pose with numbers.
+    """The form of the equations: the independent motions of a machine, found once at a pose with numbers.
 
     Attributes:
-        legs: of each leg.
-        independent: numbers of the constraints of all legs, in their order, that do not repeat others.
+        legs: the freedoms of each leg.
+        independent: numbers of those constraints of all legs that do not follow from the constraints before them.
         shared: whether there are more drives than motions.
     """
 
@@ -122,18 +124,18 @@ class RigidLeg:
     """A leg of rigid parts.
 
     Attributes:
-        name: of the leg.
-        screws: of its motions in order from the base.
-        follows: number of the coordinate that each motion follows; -1 of those that stand still.
-        drives: numbers of the machine's drives that its last coordinates are; passive ones come first.
-        friction: of its passive coordinates.
-        balls: places of three of them each that are the turns of a ball joint.
-        springs: what flexure hinges pull back with, of its passive coordinates.
+        name: name of the leg.
+        screws: screws of its motions in order from the base.
+        follows: number of the coordinate that each motion follows; -1 for motions that stand still.
+        drives: numbers of the machine's drives that move its last coordinates; passive coordinates come first.
+        friction: friction of its passive coordinates.
+        balls: places of the three passive coordinates of each ball joint.
+        springs: load of the flexure hinge at each passive coordinate; 0 for other joints.
         solved: rates of its coordinates by the platform's twist, J+ [coordinates][6].
         against: wrenches by which it keeps the platform from moving whatever its drives do, N.
         masses: masses that it carries.
-        pairs: which of them are halves of bars.
-        ends: how many of its motions carry what so many of its elements carry, from none to all of them.
+        pairs: pairs of masses that are the halves of a bar.
+        ends: number of the motions that its first k elements make, for each k from 0 to all of them.
     """
 
     name: str
@@ -161,15 +163,15 @@ class RigidMachine:
 
     Attributes:
         legs: its legs.
-        drives: its drives, in their order.
+        drives: its drives.
         platform: masses of platform, tool and payload.
         process: the wrench of all loads but weight on the platform, at the origin.
         gravity: acceleration of free fall, m/s².
         length: unit of length, m.
         origin: the tool point, base frame, m.
         ways: a basis of the twists that the legs allow, orthonormal; none where they allow all.
-        following: rates of the other twists by what the constraints of the legs ask for [6][constraints].
-        plan: by which it was made.
+        following: the twist that the constraints of the legs demand, per unit of each of them [6][constraints].
+        plan: the form by which it was made.
     """
 
     legs: tuple[RigidLeg, ...]
@@ -187,11 +189,11 @@ class RigidMachine:
 def mechanism_over_scalars(
     machine: Machine, configuration: Configuration, joints: Joints | None, masses: Sequence[Scalar] | None = None
 ) -> Mechanism:
-    """The mechanism with its numbers as they are, forces in N.
+    """Return the mechanism of a machine over scalars, which need not be floats, with forces in N.
 
     Args:
         machine: the machine at its pose.
-        configuration: where everything is.
+        configuration: the machine placed at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
         masses: of its links, kg; those that they have at this pose if None.
     """
@@ -232,7 +234,7 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
     return RigidMachine(
         legs,
         drives,
-        _heavy(mechanism.platform, mechanism.length[0]),
+        _mass_points(mechanism.platform, mechanism.length[0]),
         process,
         Vector(*mechanism.gravity[0]),
         mechanism.length[0],
@@ -263,7 +265,7 @@ def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
     )
 
 
-def _heavy(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
+def _mass_points(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
     rows = []
     for number, name in enumerate(masses.names):
         xx, yy, zz, xy, xz, yz = (entry * length for entry in masses.inertia[0, number].tolist())
@@ -276,7 +278,7 @@ def _heavy(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
     return tuple(rows)
 
 
-def _coordinates(leg: ElasticLeg) -> list[int]:
+def _passive_coordinates(leg: ElasticLeg) -> list[int]:
     """Numbers of the coordinates that move without a drive: passive joints and flexure hinges."""
     passive = []
     for number, spring in enumerate(leg.springs):
@@ -312,7 +314,7 @@ def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: 
         tuple(0.0 if leg.springs[n] is None else leg.preload[0, n] for n in plan.kept),
         tuple(solved),
         tuple(against),
-        _heavy(leg.masses, length),
+        _mass_points(leg.masses, length),
         leg.masses.pairs,
         leg.ends,
     )
@@ -337,7 +339,7 @@ def _columns(screws: Sequence[Twist], places: Sequence[int], size: int) -> list[
 
 
 def _following(columns: Sequence[Row], spare: bool) -> tuple[list[Row], list[Row]]:
-    """J+ and N of a leg: rates of its coordinates by the platform's twist, and what it does not let it do."""
+    """J+ and N of a leg: rates of its coordinates by the platform's twist, and the wrenches that hold the platform."""
     if spare:
         solution, _, _ = right_inverse([list(row) for row in zip(*columns, strict=True)])
         return solution, []
@@ -356,7 +358,7 @@ def plan_of(machine: Machine, configuration: Configuration, joints: Joints | Non
 def _plan_of(mechanism: Mechanism) -> MotionPlan:
     legs, against = [], []
     for leg in mechanism.legs:
-        passive = _coordinates(leg)
+        passive = _passive_coordinates(leg)
         screws = [Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist()]
         while True:
             places, drives = _places(leg, passive, len(mechanism.driven))
@@ -387,7 +389,7 @@ def _plan_of(mechanism: Mechanism) -> MotionPlan:
 
 
 def _balls(screws: Sequence[Twist], places: Sequence[int], passive: int) -> tuple[tuple[int, int, int], ...]:
-    """Three passive coordinates in a row whose axes meet in one point and are not in a plane."""
+    """Find the ball joints: three passive coordinates in a row whose axes meet in one point and span the space."""
     motions = [[i for i, place in enumerate(places) if place == k] for k in range(passive)]
     turns = [row[0] if len(row) == 1 and not screws[row[0]].slides else None for row in motions]
     result, first = [], 0

@@ -1,8 +1,8 @@
 """Forces that balance a load and keep within bounds, at least cost, of many problems at once.
 
-More forces than conditions leave a choice: internal forces, which balance each other. Forces are those of least norm,
-or nearest to a wanted level, by the square of their differences or by a higher power of them. Which forces act, and
-along which lines, is not known here.
+Where there are more forces than conditions of balance, internal forces are left to choose: they balance each other. The
+forces that are chosen have the least norm, or are nearest to a wanted level, by the squares of their differences from
+it or by a higher power. Cables and machines are not known here.
 
 Source: theory (76) and (77). Least norm and least distance to a level: T. Bruckmann, A. Pott and M. Hiller,
 "Calculating force distributions for redundantly actuated tendon-based Stewart platforms", Advances in Robot Kinematics
@@ -18,11 +18,12 @@ from kinetostat.frozen import dataclass
 from kinetostat.tolerances import BALANCED, SURELY_REGULAR, UNRESISTED
 
 MOST_CHANGES = 200
-"""Of the set of forces at their bounds: many times as many as a machine has cables."""
+"""Greatest number of changes of the set of forces at their bounds: many times the number of cables of a machine."""
 MOST_POWER_STEPS, MOST_HALVINGS = 100, 30
-"""Of Newton's method for powers, and of one of its steps."""
+"""Greatest number of steps of Newton's method for powers, and of halvings of one of its steps."""
 LEAST_CURVATURE = 1e-12
-"""Of a force at the wanted level, beside 1 at the one that is farthest from it: powers are flat there."""
+"""Least curvature of the cost by a force, beside 1 for the force that is farthest from the wanted level: a higher power
+is flat at the level itself."""
 SAME_FORCE = 1e-13
 """Share of the largest force below which a step is round-off."""
 INDEPENDENT = 1e-20
@@ -36,7 +37,7 @@ class Balancing:
     Attributes:
         given: forces of least norm that balance [n x m].
         internal: orthonormal internal forces, as columns [n x m x r].
-        sure: whether they are surely all of them, and `given` balances the load [n].
+        sure: whether `given` surely balances the load, and there are surely no other internal forces [n].
     """
 
     given: Array
@@ -221,10 +222,8 @@ def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
     points, exist = np.zeros((count, size)), np.ones(count, dtype=bool)
     lengths = np.maximum(np.sqrt((sides * sides).sum(axis=2)), UNRESISTED)
     rows, none = np.arange(count), -1
-    active, pull = (
-        np.full((count, size), none),
-        np.zeros((count, size)),
-    )  # conditions that hold exactly, and multipliers
+    # Conditions that hold exactly, and their multipliers.
+    active, pull = np.full((count, size), none), np.zeros((count, size))
     entering, its_pull = np.full(count, none), np.zeros(count)
     for _ in range(MOST_CHANGES):
         lacking = ends[rows] - np.einsum("nkr,nr->nk", sides[rows], points[rows])

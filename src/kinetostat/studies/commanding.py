@@ -48,7 +48,7 @@ class ActuatorTargets:
         coordinates: coordinates that bring the tool to its pose, or as near as they can, m or rad [n x actuators].
         unloaded: coordinates of the actuators at the pose without loads, m or rad [n x actuators].
         before: distance of the tool point from its pose without a correction, m [n].
-        left: distance of the tool point from its pose with the correction, m [n].
+        left: distance of the tool point from its pose with the correction, m [n]; no actuator can lessen it.
         turned: angle by which the platform is still turned with the correction, rad [n].
         rates: motion of the tool point per unit of each coordinate [n x 3 x actuators].
     """
@@ -175,7 +175,10 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
 def _actuators(
     machine: Machine, columns: Mapping[str, Array], response: Response, joints: Joints | None, count: int
 ) -> tuple[list[Actuator], Array, Array]:
-    """All actuators, their coordinates, and 1 or -1 where these grow or fall as they move forward [n x actuators]."""
+    """All actuators, their coordinates, and 1 where a coordinate grows as its joint moves forward, else -1.
+
+    Both arrays are [n x actuators].
+    """
     if joints is None:
         actuators = actuators_of(response.configuration)
         senses = stacked_columns(senses_of(response.configuration), count)

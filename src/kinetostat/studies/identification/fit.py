@@ -33,6 +33,7 @@ seen less than it is preferred to be zero counts as unseen too."""
 SURELY = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
 FOLDS = 5
+"""Parts of the poses, each of which is predicted from the others."""
 FULL_PREFERENCE = 50.0
 """The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
 would go where the curvature of the equations explains some of the noise."""
@@ -48,10 +49,10 @@ class ResidualEquations(Protocol):
     """Residuals in standard deviations and how they fall with the unknowns."""
 
     def residuals(self, values: Array) -> Array:
-        """At values of the unknowns [rows]."""
+        """The residuals at values of the unknowns [rows]."""
 
     def linearisation(self, values: Array) -> tuple[Array, Array]:
-        """The same, and how each falls per unit of each unknown [rows x unknowns]."""
+        """The residuals, and how each falls per unit of each unknown [rows x unknowns]."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +61,11 @@ class Wishes:
 
     Attributes:
         sizes: plausible size of each unknown, SI [unknowns].
-        priors: standard deviation of what is known of each before, about zero, SI; infinity for nothing [unknowns].
-        bounds: largest size of each, SI; infinity without one [unknowns].
-        preferred: weak preference for zero of each, in standard deviations per plausible size: it decides what is
-            hardly seen and is not counted among what is known [unknowns].
+        priors: standard deviation of each unknown about zero before anything is measured, SI; infinity if nothing is
+            known of it [unknowns].
+        bounds: largest size of each unknown, SI; infinity without a bound [unknowns].
+        preferred: weak preference of each unknown for zero, in standard deviations per plausible size. It decides about
+            combinations that are hardly seen, and does not count as knowledge [unknowns].
         robust: whether outliers are set aside.
         known: whether standard deviations of measurements are known.
         resolution: residual, in standard deviations, up to which it may be round-off.
@@ -126,7 +128,7 @@ class Fit:
 
     @property
     def correlations(self) -> Array:
-        """Of the unknowns [unknowns x unknowns]."""
+        """Correlations of the unknowns [unknowns x unknowns]."""
         sizes = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         return np.asarray(self.covariance / np.outer(sizes, sizes))
 

@@ -1,6 +1,6 @@
 """Natural frequencies and modes: a table, the chosen mode as a swing in the picture, and the tool's response.
 
-Modes, receptance and swing are computed by `ringing`; here they are chosen and written.
+`answers` computes modes and receptance (`ringing`) and the swing (`swing`); here they are chosen and shown.
 """
 
 import math
@@ -57,17 +57,17 @@ class VibrationPanel(Panel):
         self._chosen, self._name = 0, ""
         self._front = self._is_moving = False
         self._moving: bool | None = None  # what was asked for by the button; None as the browser prefers
-        self._modes, self._swings = Lane(ringing, self._deliver), Lane(swing, self._swing)
+        self._modes, self._swings = Lane(ringing, self._deliver), Lane(swing, self._show_swing)
         self.view.on("swinging", self._show_play_state)
         self.about = ui.html("", sanitize=False).mark("vibration-about")
         self.mass = QuantityRow("mass of platform and tool", MASS_HINT, STEPS, slides=False).mark("vibration-mass")
-        self.mass.on("write", self._weigh)
+        self.mass.on("write", self._take_mass)
         with ui.element("div").classes("vibration") as self.content:
             with ui.row().classes("panel-tools"):
-                self.kind = toggle([MODES, RESPONSE], MODES, self._turn, "vibration-kind")
+                self.kind = toggle([MODES, RESPONSE], MODES, self._show_chosen_kind, "vibration-kind")
                 ui.space()
                 self.swinging = ui.label("").classes("note").mark("vibration-mode")
-                self.play = icon_button("pause", "Play or pause the mode", self._toggle, "vibration-play")
+                self.play = icon_button("pause", "Play or pause the mode", self._play_or_pause, "vibration-play")
             with ui.element("div").classes("vibration-part") as self.modes:
                 self.table = DesignTable("natural vibrations; a row shows its mode", "show mode").mark(
                     "vibration-table"
@@ -83,7 +83,7 @@ class VibrationPanel(Panel):
                 self.phase = CurveView("phase of the tool's response over the frequency").mark("vibration-phase")
                 for curve in (self.size, self.phase):
                     curve.on("pick", self._pick)
-        self._turn()
+        self._show_chosen_kind()
 
     def shows(self, report: Report) -> bool:
         return report.answered
@@ -118,7 +118,7 @@ class VibrationPanel(Panel):
             self.view.run_method("swing", [], False)
             return
         self._chosen = min(self._chosen, len(self._ringing.answer.modes) - 1)
-        self._offer(self._ringing)
+        self._offer_directions(self._ringing)
         self._show_mode()
 
     def _ask_for_mass(self, machine: Machine) -> None:
@@ -127,7 +127,8 @@ class VibrationPanel(Panel):
             control = self._session.controls[MASS]
             self.mass.put(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
 
-    def _weigh(self, event: GenericEventArguments) -> None:
+    def _take_mass(self, event: GenericEventArguments) -> None:
+        """Give the machine the mass that was typed, or say why that is not possible."""
         if self._session is None:
             return
         try:
@@ -138,7 +139,7 @@ class VibrationPanel(Panel):
             self.mass.take()
             self.show_change()
 
-    def _offer(self, new: Ringing) -> None:
+    def _offer_directions(self, new: Ringing) -> None:
         """Offer the components of the machine, and across the cut where the file says where that is."""
         machine = new.answer.machine
         names = [*new.answer.components, *([CUT] if any(machine.tables["cutting"].direction) else [])]
@@ -147,17 +148,19 @@ class VibrationPanel(Panel):
             if field.options != options:
                 field.set_options(options, value=field.value if field.value in options else first)
 
-    def _turn(self) -> None:
+    def _show_chosen_kind(self) -> None:
         """Bring the modes or the response to the front."""
         self.modes.set_visibility(self.kind.value == MODES)
         self.response.set_visibility(self.kind.value == RESPONSE)
 
     def _pick(self, event: GenericEventArguments) -> None:
+        """Choose a mode, by a row of the table or by a mark of a curve."""
         if self._ringing is not None:
             self._chosen = min(int(event.args), len(self._ringing.answer.modes) - 1)
             self._show_mode()
 
     def _show_mode(self) -> None:
+        """Show the chosen mode in the table, as energies, in the curves and as a swing of the picture."""
         if self._ringing is None or self._report is None:
             return
         answer, mode = self._ringing.answer, self._ringing.answer.modes[self._chosen]
@@ -167,15 +170,16 @@ class VibrationPanel(Panel):
         self._draw()
         self._swings.ask(SwingRequest(answer, self._chosen, self._report.sizes))
 
-    def _swing(self, request: SwingRequest, solids: list[dict[str, Any]]) -> None:
+    def _show_swing(self, request: SwingRequest, solids: list[dict[str, Any]]) -> None:
         if self._front and self._ringing is not None and request.answer is self._ringing.answer:
             self.view.run_method("swing", solids, self._moving)
 
-    def _toggle(self) -> None:
+    def _play_or_pause(self) -> None:
         self._moving = not self._is_moving
         self.view.run_method("sway", self._moving)
 
     def _show_play_state(self, event: GenericEventArguments) -> None:
+        """Follow the picture, which says whether the mode swings."""
         self._is_moving = bool(event.args)
         self.play.props(f"icon={'pause' if self._is_moving else 'play_arrow'}")
 
