@@ -1,8 +1,9 @@
 """The machine as built at many poses: how the tool moves by small errors of its numbers, to first order and exactly.
 
-Actuators stand where the drawn machine has them at the pose, as a controller commands them that knows the drawing only.
-The model holds for families and machines leg by leg alike, spatial and planar ones. Where legs are redundant they share
-a misfit with the least energy of their springs, or by least squares where all of them are rigid.
+Actuators stand where the drawn machine has them at the pose, because the controller that commands them knows the
+drawing only. Then the legs with their errors no longer close at the drawn pose, and the platform goes to where they do.
+Redundant legs cannot all close: they share the misfit with the least energy of their springs, or by least squares if
+all of them are rigid. Families and machines written leg by leg, spatial and planar ones are treated alike.
 
 Source: theory (45) to (49); compliances, theory (10).
 """
@@ -75,8 +76,9 @@ class DrawnMachine:
         axes: the axes of its platform as columns, base frame [n x 3 x 3].
         actuators: coordinates of its actuators, m or rad [n x actuators].
         load: the wrench at the tool point under which compliances count, base axes, N·m and N [n x 6].
-        springs: those that deflect.
-        leg_compliances: of each leg without its passive joints, at the tool, in the length's units [n x 6 x 6].
+        springs: the springs that deflect.
+        leg_compliances: compliance of each leg whose passive joints are locked, at the tool, in units of the machine's
+            length [n x 6 x 6].
     """
 
     status: Codes
@@ -109,10 +111,11 @@ class ErrorModel:
     """A machine with small errors at n poses.
 
     Attributes:
-        machine: as drawn.
-        drawn: the same at the poses, without errors.
+        machine: the machine as drawn.
+        drawn: the machine without errors at the poses.
         errors: every number that may be wrong.
-        sources: what errors put into the legs, in their order; compliances, the last errors, put nothing there.
+        sources: the screw motions that errors put into the legs, in the order of `errors`; compliances, which are the
+            last errors, put none there.
         rows: the legs at the home place.
         tool_home: the tool point at the home place, m [3].
         independent: by leg, the free screws that do not follow from those before them wherever the leg is.
@@ -266,9 +269,9 @@ def _work_in_body(wrenches: Array, place: Motions) -> Array:
 
 
 def _work_beside(wrenches: Array, error: Array | None) -> Array:
-    """Work of wrenches [n x 6 x m] on the screws by which exp(e) moves on the left per unit added to e [n x 6], small.
+    """Work of wrenches [n x 6 x m] on the screws by which exp(e) changes, on the left, per unit that is added to e.
 
-    With B the transposed bracket of e it is 1 + B / 2 + B^2 / 6.
+    The error e is small [n x 6], so that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices.
     """
     if error is None:
         return wrenches

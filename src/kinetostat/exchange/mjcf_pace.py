@@ -56,6 +56,14 @@ CALM = 2.0
 """Ratio of the period of a spring's armature to the geometric mean of step and damping time."""
 UNKNOWN_COMPLIANCE = 1e-7
 """m/N, assumed where the machine is free or rigid, so that its compliance says nothing."""
+LIGHT_SHARE = 2e-5
+"""Mass of a body that has none, as a share of all known masses: the engine moves no body without a mass."""
+THIN_SHARE = 1e-3
+"""Radius of gyration of a rod about its own axis, as a share of its length: the engine turns none without inertia."""
+SHARE_BETWEEN_SPRINGS = 1e-3
+"""Inertia between springs in a row, as a share of the inertia that hangs on them; the engine needs some."""
+STEPS_OF_SPRING = 8.0
+"""Steps in a period of the fastest spring with what hangs on it; pi of them are the limit of stability."""
 
 
 @dataclass(frozen=True)
@@ -136,16 +144,6 @@ def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
     return sum(masses) / sum(other.leg == body.leg for other in bodies)
 
 
-LIGHT = 2e-5
-"""Mass of a body that has none, as a share of all known masses: the engine moves none without a mass."""
-THIN = 1e-3
-"""Radius of gyration of a rod about its own axis, as a share of its length: the engine turns none without inertia."""
-BETWEEN_SPRINGS = 1e-3
-"""Inertia between springs in a row, as a share of what hangs on them: the engine turns none without inertia."""
-STEPS_OF_SPRING = 8.0
-"""Steps in a period of the fastest spring with what hangs on it; pi of them are the limit of stability."""
-
-
 def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     """Return the machine's masses on its bodies, and a time step that follows all of its springs.
 
@@ -160,27 +158,27 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     joints, response = analysis.state.joints, analysis.state.free
     carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
     members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
-    heavy = _on_bodies(model, response, links(members, response.configuration), armatures)
+    heavy = _parts_by_body(model, response, links(members, response.configuration), armatures)
     known = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
     if known == 0.0:
         raise InputError(
             'Nothing of this machine has a mass, so that it cannot vibrate; give it one, e.g. --set tool.mass="5 kg".'
         )
     gyration = GYRATION * float(analysis.characteristic_length or 1.0)
-    light = LIGHT * known
-    places = {body.name: body.at for body in _moving(model)}
+    light = LIGHT_SHARE * known
+    places = {body.name: body.at for body in _moving_bodies(model)}
     places[model.platform.name] = np.array(reference_point(analysis))
     inertias = {
         name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
         for name, at in places.items()
     }
     least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
-    step = min([step_for(analysis, least, gyration), *_steps(_moving(model), inertias, armatures)])
+    step = min([step_for(analysis, least, gyration), *_steps_for_springs(_moving_bodies(model), inertias, armatures)])
     slowest = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known)
     return Pace(step, 0.0, 10.0 * slowest, inertias, armatures, carried)
 
 
-def _moving(model: Model) -> list[Body]:
+def _moving_bodies(model: Model) -> list[Body]:
     """The bodies of the legs."""
     return [body for body in model.world.every() if body is not model.world]
 
@@ -189,11 +187,11 @@ def _rotors(machine: Machine, model: Model) -> dict[str, float]:
     """Inertia that rotors add to the joints of their actuators, by the names of these."""
     if not has_rotors(machine):
         return {}
-    freedoms = [freedom for body in _moving(model) for freedom in body.freedoms]
+    freedoms = [freedom for body in _moving_bodies(model) for freedom in body.freedoms]
     return {freedom.name: rotor_inertia(machine, freedom.drive) for freedom in freedoms if freedom.drive}
 
 
-def _on_bodies(
+def _parts_by_body(
     model: Model, response: Response, parts: Iterable[HeavyLink], armatures: dict[str, float]
 ) -> dict[str, list[Heavy]]:
     """Parts of links that each body carries, by its name; what stretches evenly changes the armature of its slide."""
@@ -201,12 +199,12 @@ def _on_bodies(
     configuration = response.configuration
     chains = [pieces(leg, configuration.plane) for leg in configuration.legs]
     for link in parts:
-        for body, part in _spread(link, model, chains[link.leg], armatures):
+        for body, part in _parts_of_link(link, model, chains[link.leg], armatures):
             heavy.setdefault(body.name, []).append(part)
     return heavy
 
 
-def _spread(
+def _parts_of_link(
     link: HeavyLink, model: Model, between: Sequence[Piece], armatures: dict[str, float]
 ) -> Iterator[tuple[Body, Heavy]]:
     """Give the bodies that carry a link and what each carries: both bars of a parallelogram, or the bar that it is."""
@@ -264,22 +262,22 @@ def _turns_at(piece: Piece, point: Array) -> bool:
 def rod(mass: float, start: Array, end: Array) -> Heavy:
     """Return a straight uniform rod (kg) between two points (m)."""
     span, thin = end - start, thin_rod(mass, start, end)
-    return Heavy(mass, thin.centre, thin.inertia + mass * THIN**2 * np.outer(span, span))
+    return Heavy(mass, thin.centre, thin.inertia + mass * THIN_SHARE**2 * np.outer(span, span))
 
 
-def _steps(bodies: list[Body], inertias: dict[str, Heavy], armatures: dict[str, float]) -> Iterator[float]:
+def _steps_for_springs(bodies: list[Body], inertias: dict[str, Heavy], armatures: dict[str, float]) -> Iterator[float]:
     """Give a time step for each spring, s; springs in a row on one body get a little inertia between them."""
     for body in bodies:
         for freedom in body.freedoms:
             if freedom.stiffness > 0.0:
-                size = _about(freedom, inertias[body.name])
+                size = _moved_inertia(freedom, inertias[body.name])
                 if len(body.freedoms) > 1:
-                    size *= BETWEEN_SPRINGS
+                    size *= SHARE_BETWEEN_SPRINGS
                     armatures[freedom.name] = armatures.get(freedom.name, 0.0) + size
                 yield 2.0 * math.pi * math.sqrt(size / freedom.stiffness) / STEPS_OF_SPRING
 
 
-def _about(freedom: Freedom, part: Heavy) -> float:
+def _moved_inertia(freedom: Freedom, part: Heavy) -> float:
     """The inertia of a body that a freedom moves, kg or kg·m²."""
     if freedom.point is None:
         return part.mass

@@ -21,7 +21,7 @@ MODESTY = 10
 
 
 class Turns:
-    """Who works, and who waits."""
+    """A queue in which each tab has at most one work, and only some works are done at a time."""
 
     def __init__(self, at_a_time: int, refusal: str) -> None:
         """Create an empty queue.

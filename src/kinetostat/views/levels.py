@@ -12,12 +12,18 @@ from matplotlib.ticker import MaxNLocator
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 
-USUAL = (2.0, 98.0)
+USUAL_PERCENTILES = (2.0, 98.0)
 """Percentiles between which values are usual."""
-FAR = 1.0
+FAR_EXTREME = 1.0
 """Distance of an extreme from the usual values, in units of their range, beyond which a map leaves it out."""
-WIDE = 30.0
+WIDE_RATIO = 30.0
 """Ratio of the usual values of a map, if all are positive, from which its colours follow the logarithm."""
+LEVELS = 12
+"""Number of bands of a map, about."""
+SAME_LEVEL = 1e-9
+"""Share of the range of levels within which a level and an extreme are the same."""
+STEPS_OF_DECADE = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
+"""Levels within a decade, from few decades to many."""
 
 
 def usual_range(values: Array) -> tuple[float, float]:
@@ -29,17 +35,9 @@ def usual_range(values: Array) -> tuple[float, float]:
         values: of any shape; those that are not finite are ignored, at least one must be finite.
     """
     finite = values[np.isfinite(values)]
-    least, low, high, greatest = np.percentile(finite, [0.0, *USUAL, 100.0])
-    far = FAR * (high - low)
+    least, low, high, greatest = np.percentile(finite, [0.0, *USUAL_PERCENTILES, 100.0])
+    far = FAR_EXTREME * (high - low)
     return float(low if low - least > far else least), float(high if greatest - high > far else greatest)
-
-
-LEVELS = 12
-"""Bands of a map, about."""
-SAME = 1e-9
-"""Share of the range of levels within which a level and an extreme are the same."""
-STEPS = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
-"""Levels within a decade, from few decades to many."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Levels:
     """Levels of a map.
 
     Attributes:
-        bounds: of the bands, increasing.
+        bounds: bounds of the bands, increasing.
         logarithmic: whether they follow the logarithm.
         extend: at which ends values lie beyond the bounds, as matplotlib calls it.
     """
@@ -67,11 +65,11 @@ def levels_of(values: Array) -> Levels:
     low, high = usual_range(finite)
     if low == high:  # nearly all values are equal, and only the extremes say something
         low, high = float(finite.min()), float(finite.max())
-    logarithmic = low > 0.0 and high > WIDE * low
+    logarithmic = low > 0.0 and high > WIDE_RATIO * low
     linear = MaxNLocator(LEVELS + 1, min_n_ticks=1).tick_values
     bounds = np.asarray(_round_powers(low, high) if logarithmic else linear(low, high))
     for end, extreme in ((0, finite.min()), (-1, finite.max())):
-        if abs(bounds[end] - extreme) <= SAME * (bounds[-1] - bounds[0]):
+        if abs(bounds[end] - extreme) <= SAME_LEVEL * (bounds[-1] - bounds[0]):
             bounds[end] = extreme  # a level that misses an extreme by round-off would leave a hole there
     return Levels(bounds, logarithmic, _ends(bounds, finite))
 
@@ -84,7 +82,7 @@ def _ends(bounds: Array, finite: Array) -> Literal["neither", "min", "max", "bot
 def _round_powers(low: float, high: float) -> Array:
     """Return 1, 2, 5 (1, 3; 1) times powers of ten from at most `low` to at least `high`: as many as a bar can show."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    for steps in STEPS:
+    for steps in STEPS_OF_DECADE:
         every = [step * 10.0**power for power in range(first, last + 1) for step in steps]
         inner = [n for n, value in enumerate(every) if low < value < high]
         chosen = every[inner[0] - 1 : inner[-1] + 2]

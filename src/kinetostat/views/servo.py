@@ -21,8 +21,6 @@ from kinetostat.views.vibration import RESPONSE, axis_of
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 RIGID = "rigid"
-
-
 SAME_SHARE = 1e-9
 """Share by which two stiffnesses may differ by round-off."""
 
@@ -70,6 +68,7 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
 
 
 def _stiffness(answer: Servo, value: float, unit: str) -> str:
+    """A stiffness with its unit, or "rigid"."""
     return RIGID if math.isinf(value) else answer.machine.display.show(value, unit)
 
 
@@ -84,7 +83,7 @@ def _table_of_drives(answer: Servo) -> FittedTable:
 
 
 def _drives(answer: Servo) -> list[dict[str, Any]]:
-    """The loop of each drive, at its coordinate."""
+    """The numbers of each drive by name: its unit, those of its loop at its coordinate, and its stiffness at rest."""
     if answer.loops is None:
         return []
     return [
@@ -99,7 +98,7 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
 
 
 def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
-    """The same for files, which have no infinite numbers."""
+    """The numbers of each drive for files, in which None stands for an infinite number."""
     return [
         {key: None if isinstance(value, float) and math.isinf(value) else value for key, value in drive.items()}
         for drive in _drives(answer)

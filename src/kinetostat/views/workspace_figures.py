@@ -35,7 +35,7 @@ from kinetostat.studies.workspace_verdicts import (
 )
 from kinetostat.views.figures import COLOURS, Drawings, axis_values, fill_regions, new_figure, set_axis_scales, slim_bar
 from kinetostat.views.grid import display_of
-from kinetostat.views.levels import WIDE, usual_range
+from kinetostat.views.levels import WIDE_RATIO, usual_range
 from kinetostat.views.question import Drawing
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
@@ -230,7 +230,7 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) 
 def _norm_of(values: Array) -> Normalize:
     """Return a colour scale over the usual values on a surface, logarithmic where these span decades."""
     low, high = usual_range(values) if np.isfinite(values).any() else (0.0, 1.0)
-    return LogNorm(low, high) if low > 0.0 and high > WIDE * low else Normalize(low, high)
+    return LogNorm(low, high) if low > 0.0 and high > WIDE_RATIO * low else Normalize(low, high)
 
 
 def _halves(inside: np.ndarray) -> list[np.ndarray]:

@@ -1,8 +1,8 @@
 """The numbers of a fitted linear delta in the words and signs of printers' firmware. Nothing is fitted here.
 
-A controller knows a delta radius, lengths of rods, angles of towers, and where the carriages stand at their endstops.
-The errors of the last are those of the actuators' zeros; where radius or rods change, the height of the nozzle over
-carriages changes as well.
+A controller knows a delta radius, the lengths of the rods, the angles of the towers, and where the carriages stand at
+their endstops. Errors of the endstops are zeros of the actuators in a fit. Another radius or other rods change the
+height of the nozzle below the carriages as well, which the endstops must then make good.
 
 Source: Klipper, docs/Config_Reference.md ("Linear Delta Kinematics"); Marlin, M665 and M666; RepRapFirmware,
 LinearDeltaKinematics, M665 and M666.
@@ -17,8 +17,12 @@ from kinetostat.frozen import dataclass
 from kinetostat.studies.identification.identification import Identification
 
 FAMILY, TOWERS = "delta-linear", "ABC"
+NOMINAL_ANGLES = (210.0, 330.0, 90.0)
+"""Angles of the towers A, B, C of an ideal printer, from the x axis, degrees."""
 STEP = 1e-6
-"""Of central differences of firmware numbers, in plausible sizes of the unknowns."""
+"""Step of central differences of firmware numbers, in plausible sizes of the unknowns."""
+SAME_SCALE = 1e-9
+"""Difference of a scale from 1 up to which it is round-off."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,12 @@ class FirmwareNumbers:
     Attributes:
         radius: delta radius, from the middle of the platform's rods to those of the carriages.
         rods: length of the rods of towers A, B, C.
-        angles: of the towers, by which they are beyond 210, 330 and 90 degrees.
+        angles: angles by which the towers are beyond their nominal 210, 330 and 90 degrees.
         raised: by how much `position_endstop` of each tower must be raised: its carriage stands so much higher.
         scale: factor on the way of all carriages: rotation_distance, or 1 over steps per mm.
-        halves: half of the interval of each, by its name: "radius", "rods", "angles", "raised", "scale".
-        heights: by how much the carriages of each tower stand higher at their endstops than they are believed to.
-        nozzle_rises: by how much the nozzle is higher under the same carriages, because radius or rods are others.
+        halves: half of the interval of each number, by its name: "radius", "rods", "angles", "raised", "scale".
+        heights: height by which the carriage of each tower stands higher at its endstop than the controller assumes.
+        nozzle_rises: height by which the nozzle is higher below the same carriages, because radius or rods are others.
     """
 
     radius: float
@@ -102,7 +106,7 @@ def _numbers(answer: Identification, values: Array) -> Array:
     changed = radius + by_tower("tower_radius").mean() - found_errors.get("geometry.platform_radius", 0.0)
     rods = np.array(geometry.rod_length)
     longer = rods + by_tower("rod_length")
-    nominal = np.radians([210.0, 330.0, 90.0])
+    nominal = np.radians(NOMINAL_ANGLES)
     angles = np.array(geometry.tower_angles) + by_tower("tower_angles") - nominal
     zeros, gains = (
         np.array(
@@ -129,14 +133,14 @@ def _numbers(answer: Identification, values: Array) -> Array:
 def klipper_text(numbers: FirmwareNumbers) -> str:
     """Lines for printer.cfg of Klipper; endstops as changes of what stands there."""
     lines = ["[printer]", "kinematics: delta", f"delta_radius: {numbers.radius:.6f}", ""]
-    for number, (tower, nominal) in enumerate(zip("abc", (210.0, 330.0, 90.0), strict=True)):
+    for number, (tower, nominal) in enumerate(zip("abc", NOMINAL_ANGLES, strict=True)):
         lines += [
             f"[stepper_{tower}]",
             f"angle: {nominal + numbers.angles[number]:.6f}",
             f"arm_length: {numbers.rods[number]:.6f}",
             f"# position_endstop: add {numbers.raised[number]:+.6f} to the present one",
         ]
-        if abs(numbers.scale - 1.0) > 1e-9:
+        if abs(numbers.scale - 1.0) > SAME_SCALE:
             lines.append(f"# rotation_distance: multiply the present one by {numbers.scale:.8f}")
         lines.append("")
     return "\n".join(lines)
@@ -181,6 +185,6 @@ def _letters(values: tuple[float, ...], digits: int) -> str:
 
 
 def _scale_lines(numbers: FirmwareNumbers) -> list[str]:
-    if abs(numbers.scale - 1.0) < 1e-9:
+    if abs(numbers.scale - 1.0) <= SAME_SCALE:
         return []
     return [f"; M92: divide the present steps per mm of all towers by {numbers.scale:.8f}"]

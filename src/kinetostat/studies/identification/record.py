@@ -40,22 +40,22 @@ class FitRecord:
     """The record of a fit, read from its file.
 
     Attributes:
-        path: of the record.
-        machine, family: of the drawn machine; the family is empty in records of earlier versions.
+        path: path of the record.
+        machine, family: name and family of the drawn machine; the family is empty in records of earlier versions.
         data: path of the measurements.
-        poses, values: how many were measured.
-        unknowns: what was found.
-        covariance: of the unknowns, SI [unknowns x unknowns].
-        rank: how many combinations of them are seen.
-        scatter: of the residuals, in standard deviations.
+        poses, values: numbers of measured poses and of measured values.
+        unknowns: the numbers that were fitted.
+        covariance: covariance of the unknowns, SI [unknowns x unknowns].
+        rank: number of combinations of unknowns that the measurements see.
+        scatter: standard deviation of the residuals over that expected.
         known: whether the standard deviations of the measurements were known.
-        residuals: root mean square of lengths (m) and angles (rad), as drawn, as identified, and of poses left out.
-        outliers: line of the file, name, and residual in standard deviations.
-        unseen: a sentence, and how far the combination moves the tool, in all and inside the machine, m.
-        pictures: PNG by name, as far as they lie beside the record.
+        residuals: root mean squares of lengths (m) and angles (rad): as drawn, as identified, and of poses left out.
+        outliers: of each outlier the line of the file, its name, and its residual in standard deviations.
+        unseen: of each unseen combination a sentence, and its motion of the tool, in all and inside the machine, m.
+        pictures: PNG files by name, as far as they lie beside the record.
         home: where actuators stand at the home pose of the machine as built, by name, counted as in the drawn machine,
             m or rad; none in a record without a machine file.
-        senses: 1 or -1 by name: whether that count grows with the one of the machine as built.
+        senses: by name, 1 where that count grows with the count of the machine as built, else -1.
         numbers: those of the machine's own file as identified, by path, SI; None where that file cannot say all.
     """
 
@@ -84,9 +84,9 @@ class FitRecord:
         An actuator that is commanded to c stands at c + zero + gain c, theory (45) and what follows it.
 
         Args:
-            actuators: their names, "leg 1 actuator".
-            coordinates: where they are to stand in the machine as built, m or rad [poses x actuators].
-            home: where they stand at its home pose by its own count, which begins elsewhere for cranks and slides.
+            actuators: names of the actuators, "leg 1 actuator".
+            coordinates: coordinates that they shall have in the machine as built, m or rad [poses x actuators].
+            home: their coordinates at its home pose by its own count, which begins elsewhere for cranks and slides.
 
         Raises:
             InputError: the fit is about an actuator that is not among them.

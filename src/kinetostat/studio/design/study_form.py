@@ -34,6 +34,7 @@ from kinetostat.studio.wording import full_label
 Change: TypeAlias = events.ValueChangeEventArguments[Any]
 
 NEW, SENT = "new", "sent"
+"""Choices of a study besides the names of bundled ones: a new study, and one from a file."""
 METHODS = {1: ["genetic", "gradient", "hybrid"], 2: ["nsga2"]}
 """Methods of search by the number of objectives, the usual one first."""
 BOUNDS = {"at_least": "at least", "at_most": "at most"}
@@ -59,14 +60,14 @@ class StudyForm:
             self.source = choice({}, "study", self._choose, "study-source").classes("grow")
             icon_button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
             icon_button("download", "Save the study as a file", self._save, "study-save")
-            self.upload = upload_field(self._sent, self._refuse, "study-upload")
+            self.upload = upload_field(self._take_file, self._refuse, "study-upload")
         self._body = ui.element("div").classes("design-form")
         with ui.element("div").classes("design-foot"):
             self.problem = ui.label("").classes("form-problem").props('role="alert"').mark("study-problem")
             ui.button("Start", icon="play_arrow", on_click=self._begin).props(
                 "unelevated no-caps text-color=accent-ink"
             ).mark("study-start")
-        self._offer(NEW)
+        self._offer_studies(NEW)
         self._fill()
 
     @property
@@ -80,10 +81,11 @@ class StudyForm:
         """Begin again after another machine has been loaded, unless the study is about a machine that it names."""
         if self.draft.machine is None:
             self.draft = self._blank()
-            self._offer(NEW)
+            self._offer_studies(NEW)
             self._fill()
 
-    def _offer(self, chosen: str) -> None:
+    def _offer_studies(self, chosen: str) -> None:
+        """List the studies to choose from; `chosen` is the one in the form."""
         self._filling = True
         studies = {NEW: "new study of this machine", **{name: name for name in bundled_studies()}}
         self.source.set_options(studies | ({SENT: self.draft.name} if chosen == SENT else {}), value=chosen)
@@ -93,10 +95,11 @@ class StudyForm:
         if not self._filling and self.source.value != SENT:
             name = str(self.source.value)
             self.draft = self._blank() if name == NEW else bundled_draft(name)
-            self._offer(name)
+            self._offer_studies(name)
             self._fill()
 
-    async def _sent(self, event: events.UploadEventArguments) -> None:
+    async def _take_file(self, event: events.UploadEventArguments) -> None:
+        """Show the study of a file that the browser has sent, once a process has found that it can be read."""
         data = await event.file.read()
         try:
             await check_upload("study", data, event.file.name, self.upload.client.id)
@@ -104,7 +107,7 @@ class StudyForm:
         except InputError as error:
             self._refuse(str(error))
         else:
-            self._offer(SENT)
+            self._offer_studies(SENT)
             self._fill()
         self.upload.reset()
 
@@ -143,11 +146,11 @@ class StudyForm:
             for place, table in enumerate(self.draft.objectives):
                 self._objective(place, table)
             if len(self.draft.objectives) < MOST_OBJECTIVES:
-                self._add("add an objective", "study-add-objective", self._add_objective)
+                self._add_button("add an objective", "study-add-objective", self._add_objective)
             ui.html("<h3>Constraints</h3>", sanitize=False)
             for place, table in enumerate(self.draft.constraints):
                 self._constraint(place, table)
-            self._add("add a constraint", "study-add-constraint", self._add_constraint)
+            self._add_button("add a constraint", "study-add-constraint", self._add_constraint)
             ui.html("<h3>Poses</h3>", sanitize=False)
             self._poses()
             ui.html("<h3>Search</h3>", sanitize=False)
@@ -156,7 +159,7 @@ class StudyForm:
                 ui.label(f"Taken over from the study file: {', '.join(hidden)}.").classes("note").mark("study-unseen")
 
     @staticmethod
-    def _add(text: str, mark: str, action: Callable[[], None]) -> None:
+    def _add_button(text: str, mark: str, action: Callable[[], None]) -> None:
         ui.button(text, icon="add", on_click=action).props("flat dense no-caps").classes("form-add").mark(mark)
 
     def _controls(self) -> dict[str, Control]:
@@ -198,7 +201,7 @@ class StudyForm:
 
     def _drop(self, tables: list[dict[str, Any]], place: int) -> None:
         del tables[place]
-        self._method_fits()
+        self._drop_other_method()
         self._fill()
 
     def _more_variables(self, known: dict[str, Control]) -> None:
@@ -225,7 +228,7 @@ class StudyForm:
             usual = usual_goal(name)
             if usual is None:  # a study must then say which: the form shows and writes the first
                 table.setdefault("goal", "minimize")
-            goal = ui.select(GOALS, value=table.get("goal") or usual, on_change=partial(self._aim, table, "goal"))
+            goal = ui.select(GOALS, value=table.get("goal") or usual, on_change=partial(self._write_aim, table, "goal"))
             goal.props('dense options-dense outlined aria-label="goal"').classes("field").mark(
                 f"objective {place} goal"
             )
@@ -236,7 +239,7 @@ class StudyForm:
 
     def _quantity(self, table: dict[str, Any], terms: list[str], what: str, place: int) -> None:
         box = ui.select(
-            terms, value=str(table["quantity"]), with_input=True, on_change=partial(self._aim, table, "quantity")
+            terms, value=str(table["quantity"]), with_input=True, on_change=partial(self._write_aim, table, "quantity")
         )
         box.props(f'dense options-dense outlined aria-label="{what}"').classes("field grow")
         box.mark(f"{what} {place} quantity")
@@ -246,7 +249,9 @@ class StudyForm:
             with ui.element("div").classes("form-row"):
                 ui.label("direction x, y, z").classes("form-name")
                 direction = ", ".join(f"{entry:g}" for entry in table.get("direction") or ())
-                box = ui.input(value=direction, on_change=partial(self._direct, table)).classes("form-text wide")
+                box = ui.input(value=direction, on_change=partial(self._write_direction, table)).classes(
+                    "form-text wide"
+                )
                 box.props('dense borderless aria-label="direction"').mark(f"{what} {place} direction")
 
     def _constraint(self, place: int, table: dict[str, Any]) -> None:
@@ -258,20 +263,20 @@ class StudyForm:
         self._direction(table, "constraint", place)
         with ui.element("div").classes("form-aim"):
             key = next(key for key in BOUNDS if key in table)
-            side = ui.select(BOUNDS, value=key, on_change=partial(self._turn, table))
+            side = ui.select(BOUNDS, value=key, on_change=partial(self._change_side, table))
             side.props('dense options-dense outlined aria-label="side"').classes("field")
             side.mark(f"constraint {place} side")
-            box = ui.input(value=str(table[key]), on_change=partial(self._limit, table))
+            box = ui.input(value=str(table[key]), on_change=partial(self._write_bound, table))
             box.props('dense borderless aria-label="bound"').classes("form-text wide").mark(f"constraint {place} bound")
 
     @staticmethod
-    def _turn(table: dict[str, Any], event: Change) -> None:
+    def _change_side(table: dict[str, Any], event: Change) -> None:
         """Make an upper bound of a lower one, or the other way."""
         former = next(key for key in BOUNDS if key in table)
         table[str(event.value)] = table.pop(former)
 
     @staticmethod
-    def _limit(table: dict[str, Any], event: Change) -> None:
+    def _write_bound(table: dict[str, Any], event: Change) -> None:
         table[next(key for key in BOUNDS if key in table)] = _number(str(event.value))
 
     def _add_constraint(self) -> None:
@@ -282,16 +287,17 @@ class StudyForm:
         """The grid of poses at which designs are judged; empty for the pose of the machine alone."""
         box = ui.input("ranges", value=", ".join(self.draft.poses.get("over", [])), placeholder=POSES)
         box.props("dense outlined stack-label").classes("field").mark("study-poses").tooltip(ABOUT_POSES)
-        box.on_value_change(self._range)
+        box.on_value_change(self._write_ranges)
 
-    def _range(self, event: Change) -> None:
+    def _write_ranges(self, event: Change) -> None:
         ranges = [part.strip() for part in str(event.value).split(",") if part.strip()]
         self.draft.poses.pop("over", None)
         if ranges:
             self.draft.poses.pop("list", None)
             self.draft.poses["over"] = ranges
 
-    def _aim(self, table: dict[str, Any], key: str, event: Change) -> None:
+    def _write_aim(self, table: dict[str, Any], key: str, event: Change) -> None:
+        """Write the goal or the quantity of an objective or a constraint."""
         if not event.value:
             return
         table[key] = event.value
@@ -303,7 +309,7 @@ class StudyForm:
             self._fill()
 
     @staticmethod
-    def _direct(table: dict[str, Any], event: Change) -> None:
+    def _write_direction(table: dict[str, Any], event: Change) -> None:
         parts = [part for part in str(event.value).replace(",", " ").split() if part]
         table["direction"] = [_number(part) for part in parts]
 
@@ -311,13 +317,14 @@ class StudyForm:
         taken = {table["quantity"] for table in self.draft.objectives}
         usual = (name for name in ("compliance_z", "compliance_sum", *known_terms(self._machine)) if name not in taken)
         self.draft.objectives.append({"quantity": next(usual)})
-        self._method_fits()
+        self._drop_other_method()
         self._fill()
 
     def _methods(self) -> list[str]:
         return METHODS[min(len(self.draft.objectives), 2)]
 
-    def _method_fits(self) -> None:
+    def _drop_other_method(self) -> None:
+        """Forget the method of the search if it is not one for so many objectives."""
         if self.draft.optimizer.get("method") not in self._methods():
             self.draft.optimizer.pop("method", None)
 
@@ -327,10 +334,10 @@ class StudyForm:
             method = search.get("method") or methods[0]
             choice(methods, "method", lambda event: search.update(method=event.value), "study-method", method)
             for key in ("population", "generations", "seed"):
-                box = ui.input(key, value=str(search[key]), on_change=partial(self._count, key))
+                box = ui.input(key, value=str(search[key]), on_change=partial(self._write_number, key))
                 box.props("dense outlined").classes("field").mark(f"study-{key}")
 
-    def _count(self, key: str, event: Change) -> None:
+    def _write_number(self, key: str, event: Change) -> None:
         self.draft.optimizer[key] = _number(str(event.value))
 
 

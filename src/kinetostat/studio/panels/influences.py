@@ -31,12 +31,17 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, full_label, heading, paragraph
 from kinetostat.units import KINDS
 
-LEAST = 5e-4
+LEAST_SHARE = 5e-4
 """Share of the compliance below which a part is left out: it would read 0.0 %."""
-USUAL = "free_stiffness_{}"
-"""Quantity that is ranked until another is chosen, of the last component of the machine."""
-MOST = 24
-"""Parameters that are listed."""
+FIRST_RANKED = "free_stiffness_{}"
+"""Quantity that is ranked until another is chosen; the braces are for the last component of the machine."""
+MOST_PARAMETERS = 24
+"""Greatest number of parameters that are listed."""
+CURVE_SPAN = 1e3
+"""Ratio of the ends of a curve to the present stiffness: it runs from the stiffness over this to it times this."""
+BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance", "r"),
+          "K, translation": ("stiffness", "xyz"), "K, rotation": ("stiffness", "r")}  # fmt: skip
+"""Blocks of K and C whose diagonals are drawn: the matrix, and the letters with which their components begin."""
 
 
 class ContributionsPanel(Panel):
@@ -76,7 +81,7 @@ def contributions_text(report: Report, component: str) -> str:
     for spring in analysis.attribution:
         shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance_share[index] or 0.0)
     ranked = sorted(shares.items(), key=lambda item: -item[1])
-    rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST]
+    rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST_SHARE]
     if compliance == 0.0:
         return paragraph(f"The platform is rigid in {component}: no part deflects under this load.")
     if not rows:
@@ -85,7 +90,7 @@ def contributions_text(report: Report, component: str) -> str:
     lead = f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}"
     springs = {each.spring: each.compliance_share[index] or 0.0 for each in analysis.attribution}
     _, together = parts_and_kinds(springs_of(analysis.state.configuration), springs)
-    kinds = [(kind, share, f"{100 * share:.1f} %") for kind, share in together if share > LEAST]
+    kinds = [(kind, share, f"{100 * share:.1f} %") for kind, share in together if share > LEAST_SHARE]
     grouped = bars("contributions by kind of part", kinds) + heading("Part by part") if len(kinds) < len(rows) else ""
     return paragraph(lead, "lead") + grouped + bars("contributions to the compliance", rows, report.legs)
 
@@ -106,7 +111,11 @@ class SensitivityPanel(Panel):
         offered = map_quantities(report.analysis.machine).items()
         names = {name: text for name, text in offered if name != SINGULARITY}
         if self.quantity.options != names:
-            kept = self.quantity.value if self.quantity.value in names else USUAL.format(report.analysis.components[-1])
+            kept = (
+                self.quantity.value
+                if self.quantity.value in names
+                else FIRST_RANKED.format(report.analysis.components[-1])
+            )
             self.quantity.set_options(names, value=kept)
         self._ask()
 
@@ -128,18 +137,16 @@ def ranking_text(answer: Sensitivity) -> str:
     percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents]
     known = [(path, percent) for path, percent in percents if percent is not None]
     largest = max((abs(percent) for _, percent in known), default=1.0)
-    rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]
+    rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST_PARAMETERS]]
     if not rows:
         return paragraph(answer.message or "No parameter changes this quantity at this pose.")
     note = "Change of the quantity in percent, per percent of the parameter; of an angle, per 0.01 rad."
-    more = f" {len(known) - MOST} parameters with less effect are omitted." if len(known) > MOST else ""
+    more = (
+        f" {len(known) - MOST_PARAMETERS} parameters with less effect are omitted."
+        if len(known) > MOST_PARAMETERS
+        else ""
+    )
     return bars("sensitivities", rows) + paragraph(note + more)
-
-
-SPAN = 1e3
-"""The curve runs from the present stiffness divided by this factor to the present stiffness times this factor."""
-BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance", "r"),
-          "K, translation": ("stiffness", "xyz"), "K, rotation": ("stiffness", "r")}  # fmt: skip
 
 
 class LinkPanel(Panel):
@@ -176,7 +183,7 @@ class LinkPanel(Panel):
         matrix, letters = BLOCKS[str(self.block.value)]
         names = [n for n in self._session.machine.family.component_names if (n[0] == "r") == (letters == "r")]
         quantities = tuple(f"{matrix}_{name}" for name in names)
-        ends = Ends(path, middle / SPAN, middle * SPAN)
+        ends = Ends(path, middle / CURVE_SPAN, middle * CURVE_SPAN)
         self._lane.ask(CurveRequest(self._session.machine, ends, quantities))
 
     def _draw(self, request: CurveRequest, answer: Curves) -> None:
