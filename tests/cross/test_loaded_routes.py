@@ -162,6 +162,27 @@ def test_programs_condense_legs_that_close_loops(name):
     assert same.all()
 
 
+@pytest.mark.parametrize("amount", [1e-4, 1e-3])
+def test_the_chord_method_leads_so_near_that_a_step_of_newton_is_repeated_at_few_poses(monkeypatch, amount):
+    """The numbers are compared with the solver above; here it is counted what they cost."""
+    from kinetostat.engine.machine_code import Program
+
+    machine, counted = moved_by_about("tripteron", amount), {}
+    run = Program.run
+
+    def counting(program, fixed, columns, results, codes):
+        counted[len(results)] = counted.get(len(results), 0) + len(codes)
+        run(program, fixed, columns, results, codes)
+
+    monkeypatch.setattr(Program, "run", counting)
+    quantities, poses = quantities_of(machine), poses_near(machine, 64)
+    results, status = np.empty((len(quantities), 64)), np.empty(64, dtype=np.int8)
+    loaded_fill(machine, list(poses), quantities, Way.NATIVE)(poses, results, status)
+    assert (status == Status.OK).all()
+    assert counted[max(counted)] <= 1.5 * 64  # the program with the quantities has the most results; three times before
+    assert counted[min(counted)] <= 6 * 64  # the first step and those of the chord method
+
+
 def test_legs_with_rigid_links_share_what_rigid_parts_hold():
     """The bars and arms of a Delta are rigid unless its file says otherwise: three springs hold nine wrenches."""
     rigid = ["stiffness.bar_axial=rigid", "stiffness.arm_bending=rigid", "stiffness.arm_torsion=rigid"]

@@ -252,7 +252,7 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     return plan_of(state.machine, state.configuration, state.joints)
 
 
-def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> TracedFormula:
+def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False, chord: bool = False) -> TracedFormula:
     """Trace a step of Newton's method towards rest: from coordinates of the state, which are the last columns, to them.
 
     The last result is the square of the step's size.
@@ -262,12 +262,14 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Tr
         form: how its parameters enter.
         closed: as for `objectives_of`.
         first: whether to begin at the free state, without columns of coordinates.
+        chord: whether the step is one of the chord method, see `Reduced.chord_step`.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
     equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
     coordinates = () if first else new_inputs(given.graph, equations.size)
-    stepped, square = equations.start() if first else equations.step([*coordinates])
+    step = equations.chord_step if chord else equations.step
+    stepped, square = equations.start() if first else step([*coordinates])
     results = [result_of(value) for value in (*stepped, square)]
     return formula_of(given, columns, results, 0.0, coordinates=coordinates)
 

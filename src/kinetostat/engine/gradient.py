@@ -17,7 +17,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, where
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes
+from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes, rows_of
 
 TURN_OPERATION = "turn"
 """Operation of a cosine or sine as derivatives see it; its operands are the angle and the derivative by it."""
@@ -160,7 +160,7 @@ class Interpreted:
         """Evaluate points, see `trace.Runnable`."""
         body, count = self._body, len(self._body.results)
         values: Values = {node.number: value for node, value in zip(body.fixed, fixed, strict=True)}
-        values |= {node.number: column for node, column in zip(body.columns, columns, strict=True)}
+        values |= {node.number: column for node, column in zip(body.columns, rows_of(columns), strict=True)}
         with np.errstate(all="ignore"):
             for node in self._lines:
                 values[node.number] = NUMPY_FUNCTIONS[node.operation](*(_value(values, o) for o in node.operands))

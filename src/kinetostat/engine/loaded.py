@@ -38,12 +38,15 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.machine.written.family import at_home
 from kinetostat.motion.response import response_in_motion
+from kinetostat.numerics.iteration import SHRINKING
 from kinetostat.vibration.modes import frequencies
 from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
 
 MOST_NEWTON_STEPS = 8
 """Of Newton's method after the first ones; each point takes as many as it needs, whatever its neighbours need."""
+MOST_CHORD_STEPS = 6
+"""Of the chord method before these: at a tenth of a step each, as many lead from the longest one to `LAST_STEP`."""
 ONE_STEP_AWAY = 1e-7
 """Size of a step, rad or in units of the machine's length, after which another one is exact to round-off."""
 LAST_STEP = 1e-12
@@ -206,7 +209,7 @@ def _response_with_states(
     return response
 
 
-NUMBERS_TOGETHER = 2**18
+NUMBERS_TOGETHER = 2**17
 """Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
 step takes them, and there are enough points for the call of a program to cost nothing beside them."""
 
@@ -215,7 +218,8 @@ class RestFill:
     """The fill of quantities at rest.
 
     Where loops are cut at rods, small programs find the state, and one gives the quantities. Where legs close loops, a
-    step takes as long as the quantities, so that one program does both and is repeated.
+    step of Newton's method takes as long as the quantities, so that one program does both: steps of the chord method,
+    each a quarter of it, lead so near to the state that this program has to be repeated at few points.
     """
 
     def __init__(
@@ -233,6 +237,7 @@ class RestFill:
         objectives = tuple(((name, 1.0),) for name in quantities)
         self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
         self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
+        self._chord = program_of(Recipe(step_of, kind, self._form, (closed, False, True))) if legs else None
         arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities, paths), legs)
         self._step = program_of(Recipe(objectives_of, kind, self._form, arguments))
 
@@ -250,14 +255,15 @@ class RestFill:
             part = slice(start, start + together)
             self._fill([column[part] for column in given], results[:, part], status[part], memory)
 
-    def _fill(self, given: list[Array], results: Array, status: Codes, memory: Sequence[Array]) -> None:
+    def _fill(self, given: list[Array], results: Array, status: Codes, memory: list[Array]) -> None:
         """Evaluate some points, with memory for what two steps give."""
-        before, after = memory
-        rows, states = np.arange(len(status)), before[self._count :, : len(status)]
-        self._first.run(self._fixed, given, states, np.empty_like(status))
+        rows = np.arange(len(status))
+        self._first.run(self._fixed, given, memory[0][self._count :, : len(rows)], np.empty_like(status))
+        self._approach(given, memory, len(rows))
+        states = memory[0][self._count :, : len(rows)]
         for _ in range(MOST_NEWTON_STEPS):
-            stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
-            self._step.run(self._fixed, [*given, *states[:-1]], stepped, codes)
+            stepped, codes = memory[1][:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
+            self._step.run(self._fixed, [*given, states[:-1]], stepped, codes)
             if len(rows) == len(status):
                 results[:], status[:] = stepped[: self._count], codes
             else:
@@ -270,7 +276,34 @@ class RestFill:
             else:
                 rows, given = rows[moving], [part[moving] for part in given]
                 states = np.compress(moving, stepped[self._count :], axis=1)
-            before, after = after, before
+            memory.reverse()
+
+    def _approach(self, given: list[Array], memory: list[Array], count: int) -> None:
+        """Lead states nearer to rest by steps of the chord method, as long as these shrink fast.
+
+        Args:
+            given: columns of the programs before those of the states.
+            memory: the first part holds the states, and in its last row the squares of the sizes of their last steps.
+            count: number of points.
+        """
+        rows = np.arange(count)
+        for _ in range(MOST_CHORD_STEPS if self._chord else 0):
+            states, after = (part[self._count :, :count] for part in memory)
+            every = len(rows) == count
+            at, here = (states, given) if every else (states.take(rows, axis=1), [part[rows] for part in given])
+            stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=np.int8)
+            self._chord.run(self._fixed, [*here, at[:-1]], stepped, codes)
+            before, size = at[-1], stepped[-1]
+            shrinking = size < SHRINKING**2 * before
+            # The next step is shorter by the same ratio.
+            further = rows[shrinking & (size * size > LAST_STEP**2 * before)]
+            if every and not (~shrinking & (before >= 0.0)).any():  # where there is no state, nothing is lost
+                memory.reverse()
+            else:
+                states[:, rows[shrinking]] = stepped.compress(shrinking, axis=1)
+            rows = further
+            if not len(rows):
+                break
 
 
 class StatePrograms:

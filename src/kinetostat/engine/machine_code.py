@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Codes
-from kinetostat.engine.trace import Body
+from kinetostat.engine.trace import Body, rows_of
 from kinetostat.frozen import dataclass
 
 SELF_LINKED = sys.platform == "linux" and platform.machine() == "x86_64"
@@ -130,8 +130,8 @@ class Program:
         arrays: list[AnyArray] = [*columns, results, codes]
         if any(array.strides[-1] != array.itemsize or array.shape[-1] != count for array in arrays):
             raise ValueError("columns, rows of results and codes must be contiguous and of one length")
-        starts = np.array([_address(column) for column in columns], dtype=np.uintp)
-        rows = _address(results) + results.strides[0] * np.arange(len(results), dtype=np.uintp)
+        starts = np.array([row for column in columns for row in _addresses(column)], dtype=np.uintp)
+        rows = np.array(_addresses(results), dtype=np.uintp)
         addresses = [ctypes.c_void_p(_address(array)) for array in (fixed, starts, rows, codes)]
         call, given = self._call, (*addresses, ctypes.c_int64(count))
 
@@ -144,8 +144,9 @@ class Program:
         """Evaluate fewer points than there are lanes, by repeating the last of them."""
         count = len(codes)
         if count:
-            longer = np.empty((len(columns), self.lanes))
-            for row, column in zip(longer, columns, strict=True):
+            given = rows_of(columns)
+            longer = np.empty((len(given), self.lanes))
+            for row, column in zip(longer, given, strict=True):
                 row[:count], row[count:] = column, column[-1]
             padded, all_codes = np.empty((len(results), self.lanes)), np.empty(self.lanes, dtype=np.int8)
             self.run(fixed, list(longer), padded, all_codes)
@@ -154,6 +155,12 @@ class Program:
 
 def _address(array: AnyArray) -> int:
     return array.__array_interface__["data"][0]
+
+
+def _addresses(rows: Array) -> Sequence[int]:
+    """Return where each row of an array begins, of which a column is the only one."""
+    first, distance = _address(rows), rows.strides[0]
+    return [first + distance * number for number in range(len(rows))] if rows.ndim > 1 else [first]
 
 
 def _map(code: MachineCode) -> tuple[int, Any]:

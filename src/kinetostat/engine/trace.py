@@ -255,10 +255,15 @@ class Runnable(Protocol):
 
         Args:
             fixed: values of the fixed inputs.
-            columns: values of the others [points], each contiguous.
+            columns: values of the others [points], or of several of them [k x points]; those of a row are contiguous.
             results: where results go [results x points]; rows may lie apart, the points of a row may not.
             codes: where the codes go [points].
         """
+
+
+def rows_of(columns: Iterable[Array]) -> list[Array]:
+    """Return the columns of a program one by one, see `Runnable.run`."""
+    return [row for column in columns for row in (column if column.ndim > 1 else (column,))]
 
 
 def needed_nodes(results: Iterable[Operand]) -> list[Node]:

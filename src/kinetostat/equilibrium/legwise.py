@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Eliminated, Row, conjugate, definite, elimination, right_inverse, semidefinite_root
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import leg_terms, platform_load
+from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
 from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.cut import Cut
 from kinetostat.equilibrium.mechanism import Mechanism
@@ -76,27 +76,38 @@ class CondensedLeg:
         sure: whether its passive motions are independent, and whether its springs hold it by a margin.
     """
 
-    def __init__(self, leg: ElasticLeg, mechanism: Mechanism, row: Row, wrench: Row, platform: Motions) -> None:
+    def __init__(
+        self, leg: ElasticLeg, mechanism: Mechanism, row: Row, wrench: Row, platform: Motions, chord: bool
+    ) -> None:
+        """Condense a leg.
+
+        Args:
+            leg, mechanism: the leg, and the machine that it belongs to.
+            row, wrench: its coordinates, and the wrench that the platform exerts on it [ways].
+            platform: displacement of the platform.
+            chord: whether to take the rates of the free state, see `LegwiseTangent`.
+        """
         self._ways, count = mechanism.ways.astype(object), len(mechanism.actuators)
-        amounts = np.concatenate([np.zeros((1, count)), mechanism.growth], axis=1)
-        coordinates, acting = of_scalars(row), self._ways @ of_scalars(wrench)[0]
-        placed = leg.chain.place(coordinates, amounts)
-        self.terms = terms = leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
+        acting = self._ways @ of_scalars(wrench)[0]
+        here = _terms_at(leg, mechanism, row, acting)
+        self.terms = terms = _terms_at(leg, mechanism, [0.0] * leg.size, 0.0 * acting) if chord else here
+        geometric = terms.geometric[0].astype(object)
+        if chord:
+            acting, geometric = 0.0 * acting, 0.0 * geometric
         self._driven = terms.driven[0][:, :count].astype(object)
         self._elastic, self._passive = (
             [k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1)
         )
         rates, size = self._ways.T @ terms.rates[0].astype(object), len(self._ways.T)
-        springs, left = len(self._elastic), terms.left[0].astype(object)
+        springs, left = len(self._elastic), here.left[0].astype(object)
         self.sure: Scalar = True
         self._closes, self._across = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
         if self._passive:
             solution, rest, margin = right_inverse(rates[:, self._passive].T.tolist())
             self._closes, self._across = array_of(solution, size, len(self._passive)).T, array_of(rest, len(rest), size)
             self.sure = margin > SURELY_MORE
-        self._gap = self._ways.T @ _gap(platform, terms.end)
+        self._gap = self._ways.T @ _gap(platform, here.end)
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
-        geometric = terms.geometric[0].astype(object)
         self._bracket = turning_of(acting, self._ways)
         self._inner = geometric[np.ix_(self._passive, self._passive)]
         self._mixed = geometric[np.ix_(self._passive, self._elastic)]
@@ -155,6 +166,14 @@ class CondensedLeg:
         """The loads that keep the machine's actuators after its wrench has changed so [actuators]; 0 of other legs."""
         count = self._driven.shape[1]
         return self.terms.holding[0, :count] + self._driven.T @ (self._ways @ of_scalars(change)[0])
+
+
+def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) -> LegTerms:
+    """Contribution of a leg at some coordinates to the equations, while a wrench acts on it [6]."""
+    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
+    coordinates = of_scalars(row)
+    placed = leg.chain.place(coordinates, amounts)
+    return leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
 
 
 def _gap(platform: Motions, end: Motions) -> Array:
@@ -229,7 +248,16 @@ def solve_condensed(lines: Array, roots: Array, turning: Array, load: Array, gap
 class LegwiseTangent:
     """Resistance of a machine with legs that close loops at some coordinates, and Newton's step from there."""
 
-    def __init__(self, machine: Cut, coordinates: Row) -> None:
+    def __init__(self, machine: Cut, coordinates: Row, chord: bool = False) -> None:
+        """Condense all legs.
+
+        Args:
+            machine: the machine.
+            coordinates: of the carrier, then of each leg with its wrench.
+            chord: whether to take the rates of springs alone in the free state. The step then is one of the chord
+                method (the simplified Newton method): it takes a quarter of the operations and leaves a share of what
+                is missing that is as small as the loads turn the legs.
+        """
         self.mechanism, self._rods = machine.mechanism, machine.rods
         mechanism, carrier = machine.mechanism, machine.carrier
         self._ways = ways = mechanism.ways.astype(object)
@@ -246,11 +274,15 @@ class LegwiseTangent:
         turned = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self._pulls]
         (load, change), (hold, fall) = platform_load(mechanism, self.platform), wrench_of_rods(self._pulls, turned)
         force, turning = ways.T @ (load + hold)[0], ways.T @ (fall - change)[0] @ ways
+        if chord:
+            turning = 0.0 * turning
         self._legs: list[CondensedLeg] = []
         for leg in machine.legs:
             row = coordinates[start : start + leg.size]
             start += leg.size + size
-            self._legs.append(CondensedLeg(leg, mechanism, row, coordinates[start - size : start], self.platform))
+            self._legs.append(
+                CondensedLeg(leg, mechanism, row, coordinates[start - size : start], self.platform, chord)
+            )
             force, turning = force - self._legs[-1].taken, turning + self._legs[-1].turning
         lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self._pulls]
         rows = [array_of(lines, len(lines), 6) @ ways, *(leg.lines for leg in self._legs)]

@@ -120,12 +120,17 @@ class Reduced:
 
         The first one is linear and takes few operations; where loops are cut at rods, so does another one.
         """
-        first = self.step([0.0] * self.size)
-        return first if self.cut.legs else self.step(first[0])
+        if self.cut.legs:
+            return self.chord_step([0.0] * self.size)
+        return self.step(self.step([0.0] * self.size)[0])
 
     def step(self, coordinates: Row) -> tuple[Row, Scalar]:
         """The coordinates after a step of Newton's method, and the square of its size; NaN where it is too long."""
         return _after(coordinates, self.tangent(coordinates))
+
+    def chord_step(self, coordinates: Row) -> tuple[Row, Scalar]:
+        """The same by the chord method, of a machine whose legs close loops; see `LegwiseTangent`."""
+        return _after(coordinates, LegwiseTangent(self.cut, coordinates, chord=True))
 
     def tangent(self, coordinates: Row) -> "Tangent | LegwiseTangent":
         """The machine's resistance at some coordinates."""
