@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from kinetostat import InputError, Status, analyze, compile, evaluate, load  # noqa: A004
+from kinetostat.engine.form import Specimen, form_of, objectives_of
+from kinetostat.engine.trace import needed_nodes
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.machine.machine import Machine
 
@@ -78,6 +80,31 @@ def test_where_there_is_no_answer_values_are_nan_and_the_status_says_why(hexapod
     assert (status == Status.OK).tolist() == [True, False, False]
     np.testing.assert_array_equal(np.isnan(values), status != Status.OK)
     assert np.isnan(function.jacobian(50.0)).all()
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tripteron", "delta"])
+def test_values_alone_are_the_values_and_know_no_status(name):
+    machine, pose = load(name), load(name).tables["pose"]
+    whole, alone = (
+        compile(machine, ["x", "z"], ["stiffness", "compliance"], judged=judged) for judged in (True, False)
+    )
+    x, z = pose.x + np.linspace(-1e-3, 1e-3, 9), pose.z + np.linspace(-1e-3, 1e-3, 9)
+    assert not whole.status(x, z).any()
+    np.testing.assert_allclose(alone(x, z), whole(x, z), rtol=SAME)
+    with pytest.raises(InputError, match="judged"):
+        alone.status(x, z)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(alone))(x, z), alone(x, z))
+
+
+def test_values_alone_know_no_limits_and_cost_fewer_operations():
+    machine = load("hexapod", ["limits.longest_leg=30 cm"])
+    assert np.isnan(compile(machine, "z", "stiffness_x")(0.4))
+    assert np.isfinite(compile(machine, "z", "stiffness_x", judged=False)(0.4))
+    form, _ = form_of(machine, ["pose.z"])
+    objectives = ((("stiffness_x", 1.0),),)
+    bodies = [objectives_of(Specimen(machine), form, objectives, judged=judged).body for judged in (True, False)]
+    whole, alone = (len(needed_nodes([*body.results, body.code])) for body in bodies)
+    assert alone < 0.95 * whole
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tripteron", "hexapod-hardware", "planar-3rrr"])

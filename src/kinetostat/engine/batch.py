@@ -118,7 +118,9 @@ class Function:
         return fill if isinstance(fill, ProgramFill) and fill.alone else None
 
 
-def function_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: float = math.inf) -> Function:
+def function_of(
+    machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: float = math.inf, judged: bool = True
+) -> Function:
     """Return quantities of a machine as a function of some of its parameters, compiled.
 
     Args:
@@ -127,10 +129,12 @@ def function_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         count: number of points at which it will be evaluated. For few points, states of rest and vibrations are not
             found by machine code, which takes seconds to compile.
+        judged: whether points are judged, see `form.objectives_of`; states of rest and vibrations always are, because
+            only that says whether they are some.
     """
     key, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)
     if not _needs_state(key, quantities):
-        return _function(key, paths, quantities)
+        return _function(key, paths, quantities, judged=judged)
     return _function(key, paths, quantities, way_of(machine, paths, quantities, count))
 
 
@@ -141,9 +145,9 @@ def _needs_state(machine: Identical, quantities: tuple[str, ...]) -> bool:
 
 @lru_cache(FUNCTIONS_KEPT)
 def _function(
-    machine: Identical, paths: tuple[str, ...], quantities: tuple[str, ...], way: Way | None = None
+    machine: Identical, paths: tuple[str, ...], quantities: tuple[str, ...], way: Way | None = None, judged: bool = True
 ) -> Function:
-    method = slab_fill if way is None else partial(loaded_fill, way=way)
+    method = partial(slab_fill, judged=judged) if way is None else partial(loaded_fill, way=way)
     fill = by_free_springs(machine.value, paths, quantities, method)
     return Function(fill, paths, len(quantities), way.slab if way else None)
 

@@ -178,8 +178,9 @@ def objectives_of(
     limited: bool = True,
     plan: MotionPlan | None = None,
     stepping: bool = False,
+    judged: bool = True,
 ) -> TracedFormula:
-    """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
+    """Trace weighted sums of quantities as functions of the parameters; NaN where the code is not OK.
 
     Args:
         kind: of the machine.
@@ -194,6 +195,8 @@ def objectives_of(
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
         stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
             of its size, so that the program can be repeated until this is small.
+        judged: whether the code is the status of the pose. Otherwise it says whether joints are known, and reach,
+            margin and limits are computed only as far as quantities need them.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
@@ -218,11 +221,12 @@ def objectives_of(
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     names = [name for weights in objectives for name, _ in weights]
     response = response_in_motion(given.machine, response, joints, plan, names)
-    accepted = response.status < Status.OK + 0.5
+    code = response.status if judged else response.joint_status
+    accepted = code < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
     if stepping and response.loaded is not None:
         results += [result_of(value) for value in response.loaded["after"]]
-    return formula_of(given, columns, results, result_of(response.status), paths, coordinates)
+    return formula_of(given, columns, results, result_of(code), paths, coordinates)
 
 
 def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()) -> MotionPlan | None:

@@ -160,33 +160,36 @@ class ProgramFill:
         self.program.run(self.fixed, given, results, status)
 
 
-def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Fill:
+def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str], judged: bool = True) -> Fill:
     """Return the fill of quantities of unloaded machines; 0.1 s unless such a program is there already.
 
     Args:
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
+        judged: whether points are judged, see `objectives_of`.
     """
     if not closes_inside(machine):
-        return program_fill(machine, varying, quantities, closed=False)
-    inside = program_fill(machine, varying, quantities, closed=True)
-    return FallingBack(inside, lambda: program_fill(machine, varying, quantities, closed=False))
+        return program_fill(machine, varying, quantities, False, judged)
+    inside = program_fill(machine, varying, quantities, True, judged)
+    return FallingBack(inside, lambda: program_fill(machine, varying, quantities, False, judged))
 
 
-def program_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool) -> ProgramFill:
+def program_fill(
+    machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool, judged: bool = True
+) -> ProgramFill:
     """Return the fill of quantities by a single program, see `ProgramFill`.
 
     Args:
-        machine, varying, quantities: as for `slab_fill`.
+        machine, varying, quantities, judged: as for `slab_fill`.
         closed: see `ProgramFill`.
     """
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
     arguments: tuple[Any, ...] = (objectives, None, closed)
     plan = plan_for(machine, quantities, varying)
-    if plan is not None:
-        arguments = (*arguments, 0, True, plan)
+    if plan is not None or not judged:
+        arguments = (*arguments, 0, True, plan, False, judged)
     kind = Specimen(at_home(machine, varying) if closed else machine)
     program = program_of(Recipe(objectives_of, kind, form, arguments))
     return ProgramFill(machine, form, fixed, program, closed)

@@ -94,7 +94,7 @@ NOT_CONVERGED = int(Status.NOT_CONVERGED)
 
 @checked
 def compile(  # noqa: A001 - `kinetostat.compile` is what users write
-    machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str]
+    machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str], judged: bool = True
 ) -> "CompiledFunction":
     """Compile quantities of a machine as a function of some of its fields.
 
@@ -103,6 +103,9 @@ def compile(  # noqa: A001 - `kinetostat.compile` is what users write
         inputs: names of the fields that vary, in the order in which the function takes them. A field with several
             entries gives all of them the same value.
         quantities: a name of a quantity; a list of names and groups; or "K" or "C" for a whole matrix.
+        judged: whether the function knows the status of a pose. If False, values alone are computed, without reach,
+            singularity margin and limits; they mean nothing where the machine has no answer. Values at rest under
+            loads and of vibrations are judged in any case.
 
     Returns:
         The function.
@@ -110,7 +113,7 @@ def compile(  # noqa: A001 - `kinetostat.compile` is what users write
     Raises:
         InputError: an unknown field, or the same one twice; an unknown quantity, or one that the machine cannot have.
     """
-    return CompiledFunction(machine, tuple(several(inputs)), quantities)
+    return CompiledFunction(machine, tuple(several(inputs)), quantities, judged)
 
 
 class CompiledFunction:
@@ -128,11 +131,15 @@ class CompiledFunction:
         quantities: names of the quantities; of a matrix its entries, row by row.
         distinct: the same names, each once.
         shape: of the axes in front: () of one quantity, (n,) of a list, (6, 6) or (3, 3) of a matrix.
+        judged: whether the function knows the status of a pose.
     """
 
-    def __init__(self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str]) -> None:
+    def __init__(
+        self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str], judged: bool = True
+    ) -> None:
         """Compile. Arguments and errors are those of `compile`."""
-        self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities)
+        self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities), judged
+        self.judged = judged
         self._fields = _without_repetition([find(machine.family, name) for name in inputs])
         self.machine, self.inputs = machine, tuple(field.path for field in self._fields)
         self.quantities, self.shape = _named_quantities(machine, quantities)
@@ -141,7 +148,7 @@ class CompiledFunction:
         self._rows = [self.distinct.index(name) for name in self.quantities]
         self._leaves = {leaf: row for row, field in enumerate(self._fields) for leaf in field.leaves}
         self._numbers = values(machine)
-        self._function: Function = function_of(machine, tuple(self._leaves), self.distinct)
+        self._function: Function = function_of(machine, tuple(self._leaves), self.distinct, judged=judged)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CompiledFunction, self._given
@@ -163,7 +170,13 @@ class CompiledFunction:
         return self._arrange(results[self._rows], shape)
 
     def status(self, *given: Scalar) -> Codes:
-        """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values."""
+        """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values.
+
+        Raises:
+            InputError: the function gives values alone.
+        """
+        if not self.judged:
+            raise InputError("judged is False, so that this function knows no status; compile it with judged=True.")
         points, shape = self._points(given)
         return self._function.at(points)[1].reshape(shape)[()]
 
