@@ -265,8 +265,8 @@ class Machine(Immutable):
         written: the file it was read from; None where it was made of data. Comparisons leave it out.
         requirements: the requirements of its file's table [requirements], by name; they change no number
             (`studies.requirements`).
-        tolerances: the tolerances of its file's table [tolerances], by what they are about
-            (`accuracy.toleranced_parts`).
+        tolerances: the tolerances of its file's table [tolerances], by what they are about; they change
+            no number of the drawn machine.
         loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
             machine at rest under its loads.
         whole_check: compares numbers that have changed, by name, with all others, as reading a file does; None of a
