@@ -23,7 +23,7 @@ def test_a_motion_that_is_sent_is_drawn_and_the_machine_follows_the_slider(tmp_p
         assert NO_MOTION in page.one("drives-about").content.replace("&quot;", '"')
         await page.upload("shake.csv", SINE.encode(), "drives-upload")
         machine = load("hexapod", MASSES)
-        answer = drives(machine, read_motion(machine, tmp_path, 300, SINE))
+        answer = drives(machine, read_motion(machine, tmp_path, text=SINE))  # as the command does
         assert answer.message in page.one("drives-about").content
         shown = page.shown("CurveView", "show")
         assert len(shown["lines"]) == 6
@@ -68,7 +68,7 @@ def test_the_motion_of_a_requirement_is_drawn_at_once(tmp_path):
 
 def test_every_kind_of_curve_has_its_unit(tmp_path):
     machine = load("hexapod", MASSES)
-    answer = drives(machine, read_motion(machine, tmp_path, 300, SINE))
+    answer = drives(machine, read_motion(machine, tmp_path, text=SINE))  # as the command does
     times = answer.motion.times[::10]
     units = {}
     for kind in ("Force", "Speed", "Motor", "Power", "Tool"):

@@ -358,8 +358,6 @@ def swing(request: SwingRequest) -> list[dict[str, Any]]:
 
 MOTION_FILE = Path("motion.csv")
 """Name of a motion in messages."""
-MOTION_POINTS = 300
-"""Points of a motion that is looked at, about."""
 
 
 @dataclass(frozen=True)
@@ -380,8 +378,8 @@ def drives_along(request: MotionRequest) -> DriveLoads | str:
     machine = request.machine
     try:
         if request.text:
-            return drives(machine, read_motion(machine, MOTION_FILE, MOTION_POINTS, request.text))
-        motion = required_motion(machine, MOTION_POINTS)
+            return drives(machine, read_motion(machine, MOTION_FILE, text=request.text))
+        motion = required_motion(machine)
         return "" if motion is None else drives(machine, motion)
     except InputError as error:
         return str(error)

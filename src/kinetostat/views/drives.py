@@ -281,10 +281,11 @@ def _figures(answer: DriveLoads) -> dict[str, Drawing]:
         return {}
     if answer.motion.timeless:
         return {"speed_torque": Drawing("Torque and speed in all directions.", partial(speed_torque_figure, answer))}
+    hardest = "" if answer.worst is None else answer.worst[1]
     return {
         "drives": Drawing("Speed, force and power of the drives along the motion.", partial(over_time_figure, answer)),
         "speed_torque": Drawing("Torque and speed that the motors must give.", partial(speed_torque_figure, answer)),
-        "parts": Drawing("Parts of the force of the drive that does most.", partial(parts_figure, answer)),
+        "parts": Drawing(f"Parts of the force of {hardest}, which does most.", partial(parts_figure, answer)),
     }
 
 

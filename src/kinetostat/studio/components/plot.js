@@ -78,9 +78,14 @@ export function niceTicks(low, high, wanted) {
   if (!(span > 0)) return [low];
   const rough = span / wanted;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 2.5, 5, 10].map((s) => s * power).find((s) => s >= rough * 0.999);
-  const ticks = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) ticks.push(i * step);
+  const steps = [0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10].map((s) => s * power);
+  let number = steps.findIndex((s) => s >= rough * 0.999);
+  let ticks = [];
+  do { // a range of few ticks may have a single multiple of the step, which would give no scale
+    const step = steps[number];
+    ticks = [];
+    for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) ticks.push(i * step);
+  } while (ticks.length < 2 && number-- > 0);
   return ticks;
 }
 

@@ -59,7 +59,7 @@ class DrivesPanel(Panel):
                 self.place.props('aria-label="time"').classes("grow").mark("drives-place")
                 self.time = ui.label("").classes("note").mark("drives-time")
             self.curves = (
-                CurveView("curves of the drives over the time of the motion").style("flex: none").mark("drives-curves")
+                CurveView("curves of the drives over the time of the motion").classes("tall").mark("drives-curves")
             )
             self.further = ui.html("", sanitize=False).style("flex: none").mark("drives-further")
         self.content.set_visibility(False)
