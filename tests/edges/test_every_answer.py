@@ -1,11 +1,15 @@
 """Every answer about a machine is plotted or has no figure, is saved in all its forms, and is shown in a session."""
 
+from dataclasses import fields, is_dataclass
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from report_pages import no_layout
+from scipy.spatial.transform import Rotation
 
 import kinetostat as k
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.spec.errors import InputError
 from kinetostat.views import notebook
 from kinetostat.views.answers import description_of
@@ -71,6 +75,55 @@ def test_an_answer_has_every_surface(machine, name, tmp_path, monkeypatch):
     for form in description_of(answer).forms:
         k.save(answer, tmp_path / f"answer.{form}")
         assert (tmp_path / f"answer.{form}").stat().st_size > 0
+
+
+PAIRS = {"bounds", "extents", "best", "slowest", "direction", "poses"}
+"""Two numbers of different meaning, and directions as they were given, empty where none was."""
+INDEXED = {"legs", "errors", "points", "springs"}
+"""Counts, and places in other lists."""
+DESIGNS = {"values"}
+"""A row of designs, some of which have no such number: None."""
+
+
+def numeric(value):
+    if isinstance(value, list | tuple):
+        return bool(value) and all(map(numeric, value))
+    return isinstance(value, float | int) and not isinstance(value, bool)
+
+
+def lists_of_numbers(value, path):
+    """Places in an answer at which numbers stand in a list instead of an array; machines and their states left out."""
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            yield from lists_of_numbers(entry, f"{path}[{key}]")
+    elif isinstance(value, list | tuple) and not numeric(value):
+        for entry in value[:2]:
+            yield from lists_of_numbers(entry, f"{path}[]")
+    elif isinstance(value, list | tuple):
+        yield path
+    elif is_dataclass(value) and not isinstance(value, k.Machine | MachineState):
+        for field in fields(value):
+            if field.name not in PAIRS | INDEXED | DESIGNS:
+                yield from lists_of_numbers(getattr(value, field.name), f"{type(value).__name__}.{field.name}")
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_numbers_of_an_answer_are_arrays(machine, name):
+    answer = ANSWERS[name](machine)
+    if is_dataclass(answer):
+        assert [*lists_of_numbers(answer, name)] == []
+
+
+def test_other_libraries_take_the_arrays_of_answers(machine):
+    """SciPy refuses arrays that are read-only in places; what is written into one changes no answer."""
+    state = k.under_load(machine.with_values({"load.moment.2": 5.0}))
+    assert Rotation.from_rotvec(state.displacement[:3]).magnitude() > 0.0
+    state.displacement[:] = 0.0
+    assert state.displacement.any()
+    analysis = k.analyze(machine)
+    assert Rotation.from_rotvec(analysis.load.deflection[:3]).apply(analysis.indices.centres["stiffness"]).shape == (3,)
+    shares = analysis.attribution[0].compliance_share
+    assert 1.0 / shares == pytest.approx([1.0 / share for share in shares])
 
 
 def test_diagonals_are_arrays(machine):

@@ -53,7 +53,8 @@ def test_what_is_finite_beside_a_free_actuator_is_the_limit_of_a_soft_one(name):
 
 def test_a_load_that_does_not_drive_the_free_actuator_deflects_as_ever():
     free = analyze(changed(load("orthoglide"), {"stiffness.actuator.0": 0.0, "load.force.2": -500.0}))
-    assert free.load.deflection == analyze(changed(load("orthoglide"), {"load.force.2": -500.0})).load.deflection
+    held = analyze(changed(load("orthoglide"), {"load.force.2": -500.0})).load
+    assert free.load.deflection.tolist() == held.deflection.tolist()
     assert "Nothing holds" not in free.message
 
 

@@ -1,4 +1,4 @@
-"""Results as Python takes them: read-only arrays, tables of pandas, shares by name; other numbers, families."""
+"""Results as Python takes them: arrays, tables of pandas, shares by name; other numbers, families."""
 
 import math
 import subprocess
@@ -16,14 +16,15 @@ from refusals import refused
 HEXAPOD = load("hexapod")
 
 
-def test_matrices_are_read_only_arrays():
+def test_matrices_are_arrays_and_what_is_written_into_them_changes_no_answer():
     analysis = analyze(HEXAPOD)
     assert analysis.K.shape == (6, 6)
-    assert analysis.K.tolist() == analysis.stiffness
-    assert analysis.C.tolist() == analysis.compliance
+    assert analysis.K.tolist() == analysis.stiffness.tolist()
+    assert analysis.C.tolist() == analysis.compliance.tolist()
     np.testing.assert_allclose(analysis.K @ analysis.C, np.eye(6), atol=1e-9)
-    with pytest.raises(ValueError, match="read-only"):
-        analysis.C[0, 0] = 1.0
+    first = analysis.C[0, 0]
+    analysis.C[0, 0] = 1.0
+    assert analysis.C[0, 0] == first
 
 
 def test_a_matrix_without_a_finite_value_says_why():
@@ -91,7 +92,7 @@ def test_a_family_is_registered_without_editing_the_package(monkeypatch):
     text = as_toml(HEXAPOD).replace('family = "hexapod"', 'family = "my-hexapod"')
     machine = build(text)
     assert isinstance(machine, Machine)
-    assert analyze(machine).stiffness == analyze(HEXAPOD).stiffness
+    assert analyze(machine).stiffness.tolist() == analyze(HEXAPOD).stiffness.tolist()
     assert build(as_toml(machine)).family is mine
     with refused('family "hexapod" belongs to kinetostat'):
         register(HEXAPOD.family)

@@ -121,7 +121,8 @@ def changeable(value, where, seen):
             yield from changeable(entry, f"{where}[{number}]", seen)
     elif is_dataclass(value) and not isinstance(value, type):
         for field in fields(value):
-            yield from changeable(getattr(value, field.name), f"{where}.{field.name}", seen)
+            held = vars(value).get(field.name, getattr(value, field.name))  # small arrays are handed out as copies
+            yield from changeable(held, f"{where}.{field.name}", seen)
 
 
 @pytest.mark.parametrize("name", ANSWERS)
@@ -151,9 +152,9 @@ def test_what_belongs_to_the_program_cannot_be_changed():
                 change()
         assert mapping == before
     analysis = analyze(machine)
-    with pytest.raises(TypeError, match=r"cannot be changed; copy it with list\(\.\.\.\)"):
-        analysis.stiffness[0][0] = 1.0
-    assert [list(row) for row in analysis.stiffness] == analysis.stiffness
+    whole = analysis.stiffness
+    analysis.stiffness[0][0] = 1.0
+    assert analysis.stiffness.tolist() == whole.tolist()
 
 
 def test_a_family_must_be_registered_before_its_machines_are_pickled(monkeypatch):

@@ -16,6 +16,7 @@ import xarray as xr
 from scipy.io import savemat
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
@@ -276,8 +277,8 @@ def matlab_variables(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _matrix(rows: list[list[float]] | None) -> Any:
-    return np.zeros((0, 0)) if rows is None else np.array(rows)
+def _matrix(matrix: Array | None) -> Array:
+    return np.zeros((0, 0)) if matrix is None else matrix
 
 
 def _matlab_name(text: str) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL, Matrix, finite
-from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.tolerances import NO_UNIQUE_CENTRE, PURE_COUPLE, ZERO_EIGENSCREW
 
 ROTATION, TRANSLATION = slice(0, 3), slice(3, 6)
@@ -28,7 +28,7 @@ MOMENT, FORCE = ROTATION, TRANSLATION
 
 
 @dataclass(frozen=True, eq=False)
-class Eigenscrew(Immutable):
+class Eigenscrew(ImmutableAnswer):
     """A screw on which a twist causes a wrench on the same screw.
 
     Attributes:
@@ -44,8 +44,8 @@ class Eigenscrew(Immutable):
 
     eigenvalue: float
     pitch: float
-    direction: list[float]
-    point: list[float] | None
+    direction: Array
+    point: Array | None
     weight: float
 
 
@@ -114,12 +114,12 @@ def _eigenscrew(product: float, line: Array, moment: Array, eigenvalue: float) -
     axis = moment if pure else line
     size = float(np.linalg.norm(axis))
     direction = axis * math.copysign(1.0 / size, axis[np.argmax(np.abs(axis))])
-    point = None if pure else [float(c) for c in np.cross(line, moment) / size**2]
+    point = None if pure else np.cross(line, moment) / size**2
     pitch = math.inf if pure else 0.5 * product / size**2
-    return Eigenscrew(eigenvalue, pitch, direction.tolist(), point, size**2)
+    return Eigenscrew(eigenvalue, pitch, direction, point, size**2)
 
 
-Point: TypeAlias = list[float]
+Point: TypeAlias = Array
 """From the reference point P, base axes, m [3]."""
 
 
@@ -180,7 +180,8 @@ def centre_of_elasticity(
         ValueError: as there.
     """
     if tuple(components) == PLANAR:
-        return centre_of_stiffness(stiffness, components) or centre_of_compliance(compliance, components)
+        centre = centre_of_stiffness(stiffness, components)
+        return centre_of_compliance(compliance, components) if centre is None else centre
     stiff, soft = _spatial(stiffness, components), _spatial(compliance, components)
     if stiff is not None:
         return _skew_part(stiff[:3, 3:], stiff[3:, 3:])
@@ -208,7 +209,7 @@ def _centre(block: Array, coupling: Array, components: Sequence[int]) -> Point |
         return None
     offset = np.zeros(3)
     offset[axes] = np.linalg.solve(matrix, _vee(coupling)[axes])
-    return [float(c) for c in offset]
+    return offset
 
 
 def _skew_part(coupling: Array, block: Array) -> Point | None:
@@ -216,7 +217,7 @@ def _skew_part(coupling: Array, block: Array) -> Point | None:
     values = np.linalg.eigvalsh(block)
     if values[0] <= NO_UNIQUE_CENTRE * values[-1]:
         return None
-    return [0.5 * float(c) for c in _vee(np.asarray(np.linalg.solve(block, coupling.T).T, dtype=float))]
+    return 0.5 * _vee(np.asarray(np.linalg.solve(block, coupling.T).T, dtype=float))
 
 
 def _vee(matrix: Array) -> Array:

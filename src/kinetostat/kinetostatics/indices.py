@@ -23,7 +23,7 @@ from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
@@ -36,7 +36,7 @@ PLANAR = (2, 3, 4)
 
 
 @dataclass(frozen=True, eq=False)
-class Principal(Immutable):
+class Principal(ImmutableAnswer):
     """Principal compliances of one block, the other free, in increasing order.
 
     Attributes:
@@ -44,12 +44,12 @@ class Principal(Immutable):
         directions: unit vectors, base axes, one row each [n x 3].
     """
 
-    compliances: list[float]
-    directions: list[list[float]]
+    compliances: Array
+    directions: Array
 
 
 @dataclass(frozen=True, eq=False)
-class PrincipalStiffness(Immutable):
+class PrincipalStiffness(ImmutableAnswer):
     """Principal stiffnesses of one block, in increasing order: the semi-axes of its stiffness ellipsoid.
 
     Attributes:
@@ -57,8 +57,8 @@ class PrincipalStiffness(Immutable):
         directions: unit vectors, base axes, one row each [n x 3].
     """
 
-    stiffnesses: list[float]
-    directions: list[list[float]]
+    stiffnesses: Array
+    directions: Array
 
 
 def finite(matrix: Matrix | None, components: Sequence[int] = SPATIAL) -> Array | None:
@@ -97,7 +97,7 @@ def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIA
     result: dict[str, Principal] = {}
     for name, inside, _, axes in _blocks(components):
         values, vectors = np.linalg.eigh(matrix[np.ix_(inside, inside)])
-        result[name] = Principal(np.maximum(values, 0.0).tolist(), (vectors.T @ axes).tolist())
+        result[name] = Principal(np.maximum(values, 0.0), vectors.T @ axes)
     return result
 
 
@@ -159,7 +159,9 @@ def free_stiffness_along(
     shares = _shares(direction, block, components, blocks)
     if blocks is None:
         return None
-    return reciprocal(math.fsum(s * reciprocal(k) for s, k in zip(shares, blocks[block].stiffnesses, strict=True) if s))
+    return reciprocal(
+        math.fsum(s * reciprocal(k) for s, k in zip(shares, blocks[block].stiffnesses.tolist(), strict=True) if s)
+    )
 
 
 def guided_stiffness_along(
@@ -174,7 +176,7 @@ def guided_stiffness_along(
     shares = _shares(direction, block, components, blocks)
     if blocks is None:
         return None
-    return math.fsum(s * k for s, k in zip(shares, blocks[block].stiffnesses, strict=True) if s)
+    return math.fsum(s * k for s, k in zip(shares, blocks[block].stiffnesses.tolist(), strict=True) if s)
 
 
 def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int], Array]]:
@@ -210,8 +212,8 @@ def _ellipsoids(
         order = range(len(inside))
         if inverse:
             stiffnesses, order = [reciprocal(value) for value in stiffnesses], range(len(inside) - 1, -1, -1)
-        rows = (vectors.T @ axes).tolist()
-        result[name] = PrincipalStiffness([stiffnesses[i] for i in order], [rows[i] for i in order])
+        chosen = list(order)
+        result[name] = PrincipalStiffness(np.array(stiffnesses)[chosen], (vectors.T @ axes)[chosen])
     return result
 
 

@@ -35,9 +35,9 @@ from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import no_limits_sentence
 from kinetostat.machine.loads import Mass
 from kinetostat.machine.machine import Machine, springs
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
@@ -49,15 +49,13 @@ from kinetostat.tolerances import CLOSING_ROUND_OFF
 if TYPE_CHECKING:
     import pandas as pd
 
-Rows = list[list[float]]
-
 AXES = ("base", "platform")
 """Axes in which results are given."""
 
 
 @former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
 @dataclass(frozen=True, eq=False)
-class Analysis(Immutable):
+class Analysis(ImmutableAnswer):
     """Stiffness of a machine at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:
@@ -99,10 +97,10 @@ class Analysis(Immutable):
     message: str
     components: tuple[str, ...] = COMPONENTS
     axes: str = "base"
-    platform: tuple[tuple[float, ...], Rows] | None = None
-    stiffness: Rows | None = None
-    compliance: Rows | None = None
-    finite_compliance: Rows | None = None
+    platform: tuple[Array, Array] | None = None
+    stiffness: Array | None = None
+    compliance: Array | None = None
+    finite_compliance: Array | None = None
     stiffness_diagonal: Array = field(default_factory=lambda: np.zeros(0))
     compliance_diagonal: Array = field(default_factory=lambda: np.zeros(0))
     rank: int | None = None
@@ -141,7 +139,7 @@ class Analysis(Immutable):
 
     @property
     def K(self) -> Array:  # noqa: N802
-        """Stiffness at T [n x n], SI, as a read-only array; rows and columns as in `components`.
+        """Stiffness at T [n x n], SI, as an array; rows and columns as in `components`.
 
         Raises:
             InputError: it is not finite here, or the pose has no answer.
@@ -150,19 +148,17 @@ class Analysis(Immutable):
 
     @property
     def C(self) -> Array:  # noqa: N802
-        """Compliance at T [n x n], SI, as a read-only array; rows and columns as in `components`.
+        """Compliance at T [n x n], SI, as an array; rows and columns as in `components`.
 
         Raises:
             InputError: it is not finite here, or the pose has no answer.
         """
         return self._matrix("C", self.compliance)
 
-    def _matrix(self, name: str, rows: Rows | None) -> Array:
+    def _matrix(self, name: str, rows: Array | None) -> Array:
         if rows is None:
             raise InputError(f"{name} has no finite value at this pose. {self.message}")
-        array = np.array(rows)
-        array.setflags(write=False)
-        return array
+        return rows
 
     @checked
     def shares_of(self, component: str, matrix: str = "C") -> dict[str, float]:
@@ -179,9 +175,9 @@ class Analysis(Immutable):
         pick = attrgetter({"C": "compliance_share", "K": "stiffness_share"}[choice(matrix, ("C", "K"), "matrix")])
         parts = by_part(self.attribution).items()
         known = {part: [pick(spring)[row] for spring in members] for part, members in parts}
-        if not known or any(share is None for shares in known.values() for share in shares):
+        if not known or np.isnan([*known.values()]).any():
             raise InputError(f"{matrix}_{component} is zero or infinite here and has no shares. {self.message}")
-        return dict(sorted(((part, sum(shares)) for part, shares in known.items()), key=lambda pair: -pair[1]))
+        return dict(sorted(((part, float(sum(shares))) for part, shares in known.items()), key=lambda pair: -pair[1]))
 
     @checked
     def to_pandas(self, which: str = "attribution") -> "pd.DataFrame":
@@ -288,10 +284,10 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
     return twist_condition(actuator_jacobian(response.legs, groups, length, response.guide), length)
 
 
-def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
+def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Array | None:
     """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
-    return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
+    return np.array(clean_matrix(rows)) if all(math.isfinite(entry) for row in rows for entry in row) else None
 
 
 def _turned_statics(statics: Statics, turn: Rotation) -> Statics:

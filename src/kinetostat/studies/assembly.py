@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, stand, system_of, undriven
@@ -17,10 +18,10 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity
-from kinetostat.spec.immutable import Immutable
 from kinetostat.units import UnitError
 
 MOST_STARTS = 10_000
@@ -28,7 +29,7 @@ MOST_STARTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class ForwardPose(Immutable):
+class ForwardPose(ImmutableAnswer):
     """One assembly mode: a pose at which the actuators stand at the given coordinates.
 
     Attributes:
@@ -49,12 +50,12 @@ class ForwardPose(Immutable):
     residual: float
     present: bool
     by_pose: bool
-    position: tuple[float, ...]
-    rotation: tuple[tuple[float, ...], ...]
+    position: Array
+    rotation: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Forward(Immutable):
+class Forward(ImmutableAnswer):
     """The poses of a machine whose actuators stand at given coordinates.
 
     Attributes:
@@ -159,8 +160,8 @@ def _judged_pose(machine: Machine, mode: AssemblyMode) -> ForwardPose:
     status = Status(int(respond(there, mode.joints).status))
     turn = mode.placement.rotation
     rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
-    position = tuple(float(c) for c in mode.placement.translation.components())
-    return ForwardPose(mode.pose, status, mode.residual, mode.present, mode.by_pose, position, tuple(rows))
+    position = np.array(mode.placement.translation.components(), dtype=float)
+    return ForwardPose(mode.pose, status, mode.residual, mode.present, mode.by_pose, position, np.array([*rows]))
 
 
 def _count_of_modes(count: int) -> str:

@@ -7,34 +7,38 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol, TypeAlias, TypeVar
 
+import numpy as np
+
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.machine.leg import Spring
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import EQUAL_STIFFNESSES
 
 
 @former_names(name="spring", compliance="compliance_share")
-@dataclass(frozen=True)
-class Contribution:
+@dataclass(frozen=True, eq=False)
+class Contribution(ImmutableAnswer):
     """The contribution of one spring to the diagonal entries of C and K.
 
     Attributes:
         spring: its name.
         part: the joint or link that it stands for.
         stiffness: N/m or N·m/rad; infinity if rigid.
-        compliance_share: its share of each diagonal entry of C, 0 to 1, or None where the entry is zero or infinite.
+        compliance_share: its share of each diagonal entry of C, 0 to 1, or NaN where the entry is zero or infinite [n].
         stiffness_share: the same for K.
     """
 
     spring: str
     part: str
     stiffness: float
-    compliance_share: tuple[float | None, ...]
-    stiffness_share: tuple[float | None, ...]
+    compliance_share: Array
+    stiffness_share: Array
 
 
 def contributions(
@@ -61,9 +65,9 @@ def contributions(
     )
 
 
-def _ratios(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> tuple[float | None, ...]:
+def _ratios(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> Array:
     pairs = [(part.entry(i, i), whole.entry(i, i)) for i in kept]
-    return tuple(p / w if 0.0 < w < math.inf else None for p, w in pairs)
+    return np.array([float(p / w) if 0.0 < w < math.inf else math.nan for p, w in pairs])
 
 
 def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]]:
@@ -99,8 +103,8 @@ Shares: TypeAlias = tuple[tuple[str, float], ...]
 """Names of parts and their shares, the greatest share first."""
 
 
-@dataclass(frozen=True)
-class Softest:
+@dataclass(frozen=True, eq=False)
+class Softest(ImmutableAnswer):
     """The direction in which a force, or a moment, meets the least stiffness, and what makes it soft.
 
     Attributes:
@@ -111,7 +115,7 @@ class Softest:
     """
 
     stiffness: float
-    directions: tuple[tuple[float, ...], ...]
+    directions: Array
     shares: Shares
     kinds: Shares = ()
 
@@ -130,11 +134,11 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     Returns:
         None where the whole block is rigid.
     """
-    least = block.stiffnesses[0]
+    least = float(block.stiffnesses[0])
     if math.isinf(least):
         return None
     pairs = zip(block.stiffnesses, block.directions, strict=True)
-    alike = tuple(tuple(way) for k, way in pairs if math.isclose(k, least, rel_tol=EQUAL_STIFFNESSES))
+    alike = np.array([way for k, way in pairs if math.isclose(k, least, rel_tol=EQUAL_STIFFNESSES)])
     if least == 0.0:
         return Softest(least, alike, ())
     rows = ROTATIONS if name == "rotation" else TRANSLATIONS

@@ -26,8 +26,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.motion.response import response_in_motion
 from kinetostat.motion.rigid import plan_of
 from kinetostat.numerics.polytopes import reach_along, vertices
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
@@ -55,8 +55,8 @@ class DriveAtPose:
     slides: bool
 
 
-@dataclass(frozen=True)
-class CapabilitySet:
+@dataclass(frozen=True, eq=False)
+class CapabilitySet(ImmutableAnswer):
     """All forces, moments, speeds or angular speeds that the drives allow: a convex polytope about zero.
 
     Attributes:
@@ -78,7 +78,7 @@ class CapabilitySet:
     unit: str
     least: float
     greatest: float
-    weakest: tuple[float, ...]
+    weakest: Array
     limited_by: tuple[str, ...]
     normals: Array
     bounds: Array
@@ -102,7 +102,7 @@ class CapabilitySet:
 
 
 @dataclass(frozen=True, eq=False)
-class Capability(Immutable):
+class Capability(ImmutableAnswer):
     """The forces, moments and speeds that the drives of a machine allow at its pose.
 
     Attributes:
@@ -281,9 +281,9 @@ def _set(
     corners = np.zeros((0, 3)) if ended is None else ended @ directions.T
     greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else math.inf
     if not np.isfinite(least):
-        return CapabilitySet(name, unit, least, greatest, (), (), normals, bounds, directions, corners)
+        return CapabilitySet(name, unit, least, greatest, np.zeros(0), (), normals, bounds, directions, corners)
     worst = int(np.argmin(reaches))
-    weakest = tuple(float(c) for c in normals[worst] / sizes[worst])
+    weakest = normals[worst] / sizes[worst]
     return CapabilitySet(name, unit, least, greatest, weakest, names[worst], normals, bounds, directions, corners)
 
 

@@ -27,9 +27,9 @@ from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.poses import PoseColumns, given_poses
@@ -198,7 +198,7 @@ def _actuators(
 
 
 @dataclass(frozen=True, eq=False)
-class Command(Immutable):
+class Command(ImmutableAnswer):
     """Coordinates of the actuators that put the loaded tool where an unloaded machine would have it.
 
     Attributes:

@@ -21,10 +21,10 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
 from kinetostat.studies.poses import PoseColumns, chosen_axes, grid_of
 from kinetostat.tolerances import EXACT_LAW
@@ -41,8 +41,8 @@ GOOD_ENOUGH = 1e-3
 """Share of the error without corrections that a law may leave, if no tolerance is given."""
 
 
-@dataclass(frozen=True)
-class Law:
+@dataclass(frozen=True, eq=False)
+class Law(ImmutableAnswer):
     """Corrections as sums of terms.
 
     Attributes:
@@ -53,8 +53,8 @@ class Law:
     """
 
     paths: tuple[str, ...]
-    middles: tuple[float, ...]
-    halves: tuple[float, ...]
+    middles: Array
+    halves: Array
     terms: tuple[Term, ...]
     coefficients: Array
 
@@ -63,9 +63,7 @@ class Law:
         return _functions(self.terms, values, self.middles, self.halves) @ self.coefficients
 
 
-def _functions(
-    terms: Sequence[Term], values: Sequence[Array], middles: Sequence[float], halves: Sequence[float]
-) -> Array:
+def _functions(terms: Sequence[Term], values: Sequence[Array], middles: Array, halves: Array) -> Array:
     """Value of each term at each point [n x terms]."""
     columns = []
     for term in terms:
@@ -94,8 +92,8 @@ def shortest_law(
     Returns:
         The law and its error.
     """
-    middles = tuple(float(0.5 * (axis.min() + axis.max())) for axis in axes)
-    halves = tuple(float(0.5 * (axis.max() - axis.min())) or 1.0 for axis in axes)
+    middles = np.array([0.5 * (axis.min() + axis.max()) for axis in axes])
+    halves = np.array([float(0.5 * (axis.max() - axis.min())) or 1.0 for axis in axes])
     points = [grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")]
     known = np.isfinite(corrections).all(axis=1)
     best: tuple[Law, float] | None = None
@@ -156,7 +154,7 @@ def _with_harmonics(terms: Sequence[Term], axis: int, harmonics: int) -> tuple[T
 
 
 @dataclass(frozen=True, eq=False)
-class CorrectionTable(Immutable):
+class CorrectionTable(ImmutableAnswer):
     """Corrections of the actuators' coordinates over a grid.
 
     Attributes:

@@ -29,10 +29,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
@@ -125,7 +125,7 @@ class DriveCurves:
 
 
 @dataclass(frozen=True, eq=False)
-class DriveLoads(Immutable):
+class DriveLoads(ImmutableAnswer):
     """The demands of a motion on the drives of a machine.
 
     Attributes:

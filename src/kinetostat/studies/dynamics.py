@@ -23,13 +23,13 @@ from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import PARTS, drive_forces
 from kinetostat.motion.operators import MachineAtPose, Operators, forces_along, operators
 from kinetostat.motion.rates import PoseRates
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
 
 
 @dataclass(frozen=True, eq=False)
-class Dynamics(Immutable):
+class Dynamics(ImmutableAnswer):
     """The equations of motion M(x) x'' + C(x, x') x' + g(x) = J^T f of a machine at its pose, SI.
 
     Over the pose, x are its coordinates in the order of `coordinates` (m and rad); over the drives, x are those of the

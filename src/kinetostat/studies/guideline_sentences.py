@@ -146,7 +146,7 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
 def _design(answer: Guidelines) -> Iterator[Statement]:
     """Statements on the directions that each parameter stiffens or softens."""
     for move in answer.parameters[:MOST_MOVES]:
-        directions = [(i, p) for i, p in enumerate(move.percents) if p is not None]
+        directions = [(i, p) for i, p in enumerate(move.percents) if not math.isnan(p)]
         rising = sorted(((i, p) for i, p in directions if p > LEAST_EFFECT), key=lambda pair: -pair[1])
         falling = sorted(((i, p) for i, p in directions if p < -LEAST_EFFECT), key=lambda pair: pair[1])
         none = [answer.components[i] for i, p in directions if abs(p) <= LEAST_EFFECT]
@@ -166,9 +166,7 @@ def _same_signs(answer: Guidelines, move: Move) -> float | None:
     if answer.everywhere is None or not move.stiffer:
         return None
     shares = [
-        move.stiffer[i] if p > 0.0 else move.softer[i]
-        for i, p in enumerate(move.percents)
-        if p is not None and abs(p) > LEAST_EFFECT
+        move.stiffer[i] if p > 0.0 else move.softer[i] for i, p in enumerate(move.percents) if abs(p) > LEAST_EFFECT
     ]
     return min(shares, default=None)
 

@@ -7,7 +7,7 @@ Sentences and plain data are in `guideline_sentences`; what is printed or drawn 
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -31,9 +31,9 @@ from kinetostat.kinetostatics.elements import (
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
-from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.poses import chosen_axes, grid_of
@@ -60,7 +60,7 @@ NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
 
 
 @dataclass(frozen=True, eq=False)
-class Roles(Immutable):
+class Roles(ImmutableAnswer):
     """The effect of each element on each direction, pose by pose; NaN if the direction is rigid or free or has no pose.
 
     Attributes:
@@ -76,8 +76,8 @@ class Roles(Immutable):
     gains: Array
 
 
-@dataclass(frozen=True)
-class Move:
+@dataclass(frozen=True, eq=False)
+class Move(ImmutableAnswer):
     """The effect of a parameter of the design, or of all entries of a stiffness together, on the stiffness 1 / C_ii.
 
     Attributes:
@@ -90,7 +90,7 @@ class Move:
     """
 
     path: str
-    percents: tuple[float | None, ...]
+    percents: Array
     stiffer: tuple[float, ...] = ()
     softer: tuple[float, ...] = ()
     turning: bool = False
@@ -115,7 +115,7 @@ class Move:
     skipped="left_out",
 )
 @dataclass(frozen=True, eq=False)
-class Guidelines(Immutable):
+class Guidelines(ImmutableAnswer):
     """Design guidelines.
 
     Attributes:
@@ -141,10 +141,10 @@ class Guidelines(Immutable):
     status: Status
     message: str
     components: tuple[str, ...]
-    compliance_diagonal: tuple[float, ...] = ()
+    compliance_diagonal: Array = field(default_factory=lambda: np.zeros(0))
     elements: tuple[Element, ...] = ()
     here: Roles | None = None
-    stiffness_equations: dict[str, tuple[float, ...]] | None = None
+    stiffness_equations: dict[str, Array] | None = None
     meaning: str = ""
     parameters: tuple[Move, ...] = ()
     without_influence: tuple[str, ...] = ()
@@ -211,7 +211,7 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
         sensitivities.status,
         sensitivities.message,
         names,
-        tuple(whole.tolist()),
+        whole,
         tuple(every),
         roles_at(response, every, kept),
         equations_of_k(response, single, kept),
@@ -303,9 +303,7 @@ def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
         return rigid / without_rounding(diagonal_with(response, element, 1.0 / factors), response)[kept]
 
 
-def equations_of_k(
-    response: Response, elements: Sequence[Element], kept: Sequence[int]
-) -> dict[str, tuple[float, ...]] | None:
+def equations_of_k(response: Response, elements: Sequence[Element], kept: Sequence[int]) -> dict[str, Array] | None:
     """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is not such a sum.
 
     Arguments as for `roles_at`, at one pose.
@@ -313,12 +311,8 @@ def equations_of_k(
     by_element = stiffness_equations(response, elements)
     if by_element is None:
         return None
-    rows = {name: [float(matrix.entry(i, i)) for i in kept] for name, matrix in by_element.items()}
-    most = [max(column) for column in zip(*rows.values(), strict=True)]
-    return {
-        name: tuple(c if c > NO_ROLE * top else 0.0 for c, top in zip(row, most, strict=True))
-        for name, row in rows.items()
-    }
+    rows = np.array([[float(matrix.entry(i, i)) for i in kept] for matrix in by_element.values()])
+    return dict(zip(by_element, np.where(rows > NO_ROLE * rows.max(axis=0, initial=0.0), rows, 0.0), strict=True))
 
 
 def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
@@ -332,17 +326,14 @@ def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
     entries: dict[str, list[Array]] = {}
     for parameter in sensitivities.parameters:
         if designed(machine, parameter.path):
-            row = np.where(compliant, [math.nan if p is None else -p for p in parameter.percents], math.nan)
+            row = np.where(compliant, -parameter.percents, math.nan)
             entries.setdefault(_path_of_element(machine, parameter.path), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
     quiet = [_path_of_element(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
     zero = np.where(compliant, 0.0, math.nan)
     rows |= {path: zero for path in quiet if path not in rows}
     kinds = _kinds(machine)
-    moves = [
-        Move(path, tuple(None if math.isnan(p) else float(p) for p in row), turning=kinds[path] == "angle")
-        for path, row in rows.items()
-    ]
+    moves = [Move(path, row, turning=kinds[path] == "angle") for path, row in rows.items()]
     return strongest_first(moves)
 
 

@@ -8,6 +8,9 @@ from collections.abc import Iterable, Sequence
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
+from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.eigenscrews import (
     Eigenscrew,
@@ -30,11 +33,9 @@ from kinetostat.kinetostatics.indices import (
     principal_compliances,
     stiffness_condition,
 )
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-
-Rows = Sequence[Sequence[float]]
 
 LARGEST_COMPONENT = 1e100
 """Greatest component of a direction, whose square is still a finite number."""
@@ -42,7 +43,7 @@ LARGEST_COMPONENT = 1e100
 
 @former_names(principal="principal_compliances", condition="stiffness_condition")
 @dataclass(frozen=True, eq=False)
-class Indices(Immutable):
+class Indices(ImmutableAnswer):
     """Indices of a pose, at T and in the axes of K and C.
 
     Attributes:
@@ -62,8 +63,8 @@ class Indices(Immutable):
     eigenscrews: tuple[Eigenscrew, ...]
 
 
-@dataclass(frozen=True)
-class Along:
+@dataclass(frozen=True, eq=False)
+class Along(ImmutableAnswer):
     """Stiffness along one direction, in the axes of K and C.
 
     Attributes:
@@ -73,7 +74,7 @@ class Along:
         moment, moment_held: moment per angle about it, N·m/rad, with the tool point free and with it held.
     """
 
-    direction: tuple[float, ...]
+    direction: Array
     force: float | None
     force_held: float | None
     moment: float | None
@@ -81,7 +82,7 @@ class Along:
 
 
 def stiffness_along(
-    direction: Sequence[float], stiffness: Rows | None, compliance: Rows | None, components: tuple[int, ...]
+    direction: Sequence[float], stiffness: Array | None, compliance: Array | None, components: tuple[int, ...]
 ) -> Along:
     """Compute the stiffness of the tool point along and about a direction.
 
@@ -107,7 +108,7 @@ def stiffness_along(
             f"The direction {shorten(direction)} is zero, or perpendicular to the plane of this machine; give three "
             "numbers, e.g. (1, 0, 0), on the command line --along 1,0,0."
         )
-    return Along(direction, **values)
+    return Along(np.array(direction), **values)
 
 
 def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
@@ -143,7 +144,9 @@ def unit_direction(direction: Sequence[float], name: str) -> tuple[float, ...]:
     return tuple(c / size for c in numbers)
 
 
-def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:
+def indices_of(
+    stiffness: Array | None, compliance: Array | None, length: float, components: tuple[int, ...]
+) -> Indices:
     """Compute every index that K [n x n] and C [n x n] give; either matrix may be missing.
 
     Args:
@@ -153,9 +156,10 @@ def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, c
     """
     screws: list[Eigenscrew] = []
     if components == SPATIAL:
-        screws = eigenscrews(stiffness) if stiffness else compliance_eigenscrews(compliance) if compliance else []
+        known = stiffness if stiffness is not None else compliance
+        screws = [] if known is None else (compliance_eigenscrews if stiffness is None else eigenscrews)(known)
     return Indices(
-        principal_compliances(compliance, components) if compliance else None,
+        None if compliance is None else principal_compliances(compliance, components),
         free_stiffnesses(stiffness, compliance, components),
         guided_stiffnesses(stiffness, compliance, components),
         stiffness_condition(stiffness, compliance, length, components),

@@ -6,8 +6,11 @@ The formulas are in `kinetostatics.loading`.
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import Rotation
+from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics
@@ -15,6 +18,7 @@ from kinetostat.kinetostatics.loading import JointReaction, deflection, held_com
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import springs
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.studies.rounding import clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
@@ -37,8 +41,8 @@ class SpringLoad:
     deformation: float
 
 
-@dataclass(frozen=True)
-class LoadCase:
+@dataclass(frozen=True, eq=False)
+class LoadCase(ImmutableAnswer):
     """A wrench on the platform at the tool point and its effects, all in the axes of K and C.
 
     Attributes:
@@ -52,8 +56,8 @@ class LoadCase:
     springs held, and the load of a free spring is the one that would hold it.
     """
 
-    wrench: tuple[float, ...]
-    deflection: tuple[float, ...]
+    wrench: Array
+    deflection: Array
     springs: tuple[SpringLoad, ...]
     reactions: tuple[JointReaction, ...]
 
@@ -90,8 +94,8 @@ def load_case(response: Response, statics: Statics, turn: Rotation) -> LoadCase 
     size = float(wrench.rotational.norm() + wrench.translational.norm() * length)
     loaded = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
-        load.components(),
-        _deflection(statics, load),
+        np.array(load.components(), dtype=float),
+        np.array(_deflection(statics, load)),
         tuple(_spring_load(spring, float(amount)) for spring, amount in loaded),
         tuple(
             replace(reaction, wrench=clean_screw(reaction.wrench.rotated(turn), length, size))

@@ -20,10 +20,10 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, positive
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.tool_receptance import read_tool
@@ -44,7 +44,7 @@ STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Lobes(Immutable):
+class Lobes(ImmutableAnswer):
     """Widths of cut that stay stable over the speed of the spindle.
 
     Attributes:

@@ -22,10 +22,10 @@ from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity, quantities, table
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.drives import DriveLoads, drive_loads, root_mean_square
 from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.motions import Motion, read_motion, required_motion
@@ -96,7 +96,7 @@ TABLES: Mapping[str, Any] = {"motors": MotorRating, "gears": GearRating, "screws
 
 
 @dataclass(frozen=True, eq=False)
-class Catalogue(Immutable):
+class Catalogue(ImmutableAnswer):
     """Motors, gears and screws by name, and where their numbers are printed, by table and name."""
 
     motors: Mapping[str, MotorRating]
@@ -200,7 +200,7 @@ class MotorFit:
 
 
 @dataclass(frozen=True, eq=False)
-class MotorChoice(Immutable):
+class MotorChoice(ImmutableAnswer):
     """The motors of a catalogue along a motion.
 
     Attributes:

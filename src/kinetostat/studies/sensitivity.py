@@ -5,6 +5,7 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,9 +29,9 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
@@ -65,9 +66,9 @@ FREE = "because free (C is infinite, or does not depend on it)"
 OPENS = "because the legs would no longer close if one of them changed alone"
 
 
-def greatest_of(percents: Sequence[float | None]) -> float:
+def greatest_of(percents: Array) -> float:
     """Return the size of the greatest percentage; 0 if there is none."""
-    return max((abs(percent) for percent in percents if percent is not None), default=0.0)
+    return float(np.fmax.reduce(np.abs(percents), initial=0.0))
 
 
 def relative_sensitivity(slope: Array | float, size: Array | float, index: Array | float) -> Array:
@@ -103,8 +104,8 @@ def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
     return (1.0, "radian") if kind == "angle" else (abs(value), "itself")
 
 
-@dataclass(frozen=True)
-class Influence:
+@dataclass(frozen=True, eq=False)
+class Influence(ImmutableAnswer):
     """The effect of one parameter on the indices.
 
     Attributes:
@@ -114,8 +115,8 @@ class Influence:
         percent_of: what one percent of a change is of, SI: the value itself, or a `measure`.
         measure: "itself", "length" where a length is zero (the machine's characteristic length), "radian" of an angle
             (whose percent is 0.01 rad), or "axis" (the direction's length).
-        derivatives: of each index by it, SI; None where the index is infinite.
-        percents: percent by which each index changes per percent of a change; None where the index is infinite, or 0 up
+        derivatives: of each index by it, SI; NaN where the index is infinite [indices].
+        percents: percent by which each index changes per percent of a change; NaN where the index is infinite, or 0 up
             to round-off.
     """
 
@@ -124,8 +125,8 @@ class Influence:
     value: float
     percent_of: float
     measure: str
-    derivatives: tuple[float | None, ...]
-    percents: tuple[float | None, ...]
+    derivatives: Array
+    percents: Array
 
     @property
     def greatest(self) -> float:
@@ -141,7 +142,7 @@ class Influence:
     skipped="without_derivative",
 )
 @dataclass(frozen=True, eq=False)
-class Sensitivity(Immutable):
+class Sensitivity(ImmutableAnswer):
     """Sensitivities at one pose, ranked.
 
     Attributes:
@@ -161,7 +162,7 @@ class Sensitivity(Immutable):
     status: Status
     message: str
     quantities: tuple[str, ...] = ()
-    indices: tuple[float, ...] = ()
+    indices: Array = field(default_factory=lambda: np.zeros(0))
     characteristic_length: float = math.nan
     parameters: tuple[Influence, ...] = ()
     without_influence: tuple[str, ...] = ()
@@ -215,10 +216,8 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
         why = FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal
         return Sensitivity(machine, status, why, loads_left_out=uncounted)
     length = float(response.configuration.length)
-    indices = tuple(
-        _without_round_off(machine, name, value, response)
-        for name, value in zip(names, answer.values[:, 0].tolist(), strict=True)
-    )
+    pairs = zip(names, answer.values[:, 0].tolist(), strict=True)
+    indices = np.array([_without_round_off(machine, name, value, response) for name, value in pairs])
     slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
     known = [p for p in candidates if not reasons[p.path]]
@@ -292,7 +291,7 @@ def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[st
 
 
 def _influence(
-    parameter: Parameter, here: dict[str, float], indices: Sequence[float], slopes: Sequence[float], length: float
+    parameter: Parameter, here: dict[str, float], indices: Array, slopes: Sequence[float], length: float
 ) -> Influence:
     path, kind = parameter.path, parameter.quantity.kind
     if kind == "direction":
@@ -300,15 +299,15 @@ def _influence(
         size, measure = math.hypot(*(here[f"{field}.{i}"] for i in range(3))), "axis"
     else:
         size, measure = measure_of(kind, here[path], length)
-    percents = relative_sensitivity(np.array(slopes), size, np.array(indices)).tolist()
+    percents = relative_sensitivity(np.array(slopes), size, indices)
     return Influence(
         path,
         kind,
         here[path],
         size,
         measure,
-        tuple(None if math.isnan(slope) else slope for slope in slopes),
-        tuple(None if math.isnan(percent) else percent for percent in percents),
+        np.array(slopes, dtype=float),
+        percents,
     )
 
 

@@ -8,7 +8,7 @@ Source: theory (101)-(104). At the tool point, base axes.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -21,9 +21,9 @@ from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.drives import numbers_of_drive, with_every_drive
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
@@ -38,7 +38,7 @@ UNSTABLE_REAL_PART = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Servo(Immutable):
+class Servo(ImmutableAnswer):
     """The tool of a machine with its servo loops closed.
 
     Attributes:
@@ -48,7 +48,8 @@ class Servo(Immutable):
         loops: the machine with its servo loops; None without an answer.
         standing: free stiffness with motors that stand still, by component, N/m or N·m/rad.
         static: free stiffness at 0 Hz with the loops closed, by component, N/m or N·m/rad.
-        least: for each component, the least free stiffness over the frequencies of the response, and its frequency, Hz.
+        least: for each component, the least free stiffness over the frequencies of the response, and its frequency,
+            Hz [n x 2].
         poles: poles of the closed loops, rad/s.
         stable: whether all poles decay.
         slowest: frequency (Hz) and damping ratio of the least damped pole; None if none oscillates.
@@ -60,10 +61,10 @@ class Servo(Immutable):
     status: Status
     message: str
     loops: ClosedLoops | None = None
-    standing: tuple[float, ...] = ()
-    static: tuple[float, ...] = ()
-    least: tuple[tuple[float, float], ...] = ()
-    poles: tuple[complex, ...] = ()
+    standing: Array = field(default_factory=lambda: np.zeros(0))
+    static: Array = field(default_factory=lambda: np.zeros(0))
+    least: Array = field(default_factory=lambda: np.zeros(0))
+    poles: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
     stable: bool = True
     slowest: tuple[float, float] | None = None
     assumed: bool = False
@@ -182,7 +183,7 @@ def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoo
         closed,
         _free_stiffness(still, still, parts),
         _free_stiffness(closed.receptance(np.zeros(1))[0].real, still, parts),
-        poles=tuple(complex(pole) for pole in poles),
+        poles=poles,
         stable=stable,
         assumed=vibration.assumed,
     )
@@ -190,23 +191,25 @@ def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoo
     slowest = slowest_decay(poles, (0.0, float(given[-1])))
     sizes = np.abs(closed.receptance(given))[:, parts, parts]
     unmoved = [UNFELT * float(still[i, i]) for i in parts]
-    least = tuple(
-        (math.inf if row.max() <= small else float(1.0 / row.max()), float(given[row.argmax()]))
-        for row, small in zip(sizes.T, unmoved, strict=True)
+    least = np.array(
+        [
+            (math.inf if row.max() <= small else 1.0 / row.max(), given[row.argmax()])
+            for row, small in zip(sizes.T, unmoved, strict=True)
+        ]
     )
     return replace(answer, least=least, slowest=slowest, message=_message(answer, slowest))
 
 
-def _free_stiffness(compliance: Array, still: Array, parts: Sequence[int]) -> tuple[float, ...]:
+def _free_stiffness(compliance: Array, still: Array, parts: Sequence[int]) -> Array:
     """Reciprocals of a diagonal [6 x 6]; infinite if it is round-off beside that with motors that stand still."""
     pairs = [(float(compliance[i, i]), float(still[i, i])) for i in parts]
-    return tuple(math.inf if abs(soft) <= UNFELT * least else 1.0 / soft for soft, least in pairs)
+    return np.array([math.inf if abs(soft) <= UNFELT * least else 1.0 / soft for soft, least in pairs])
 
 
 def _message(answer: Servo, slowest: tuple[float, float] | None) -> str:
     show = answer.machine.display.show
     if not answer.stable:
-        growing = max(answer.poles, key=lambda pole: pole.real)
+        growing = max(answer.poles.tolist(), key=lambda pole: float(pole.real))
         return (
             f"The loops are unstable: a motion of {show(abs(growing) / (2.0 * math.pi), 'Hz')} grows; lower "
             "servo.velocity_gain or servo.position_gain, or measure more of the position at the motor."

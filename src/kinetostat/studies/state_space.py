@@ -11,9 +11,9 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.vibration import modes
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.state_space import Equations
@@ -37,7 +37,7 @@ class Port:
 
 
 @dataclass(frozen=True, eq=False)
-class StateSpace(Immutable):
+class StateSpace(ImmutableAnswer):
     """A machine at its pose as x' = A x + B u, y = C x + D u; forces and motions from the state of rest.
 
     Attributes:

@@ -17,9 +17,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
 from kinetostat.numerics.polytopes import wrench_closure
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.poses import given_poses
 from kinetostat.studies.under_load import why_no_tensions
 
@@ -51,7 +51,7 @@ class CableState:
 
 
 @dataclass(frozen=True, eq=False)
-class Tensions(Immutable):
+class Tensions(ImmutableAnswer):
     """Tensions of the cables of a machine.
 
     Attributes:

@@ -32,7 +32,7 @@ def standing_fields(state: MachineState) -> dict[str, Any]:
     turn = configuration.platform.rotation
     rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
     return {
-        "platform": (tuple(float(c) for c in configuration.platform.translation.components()), [list(r) for r in rows]),
+        "platform": (np.array(configuration.platform.translation.components(), dtype=float), np.array([*rows])),
         "rigid": tuple(spring.name for spring in every if math.isinf(spring.stiffness)),
         "free": tuple(spring.name for spring in every if spring.stiffness == 0.0),
         "masses": tuple(moving_masses(state.machine, configuration)),
@@ -74,13 +74,13 @@ def _matrices(machine: Machine, response: Response, turn: Rotation) -> dict[str,
     free = np.abs(vectors[:, ~resisted]).max(axis=1, initial=0.0) > FREE_COMPONENT
     compliance = units[:, None] * ((vectors[:, resisted] / values[resisted]) @ vectors[:, resisted].T) * units
     compliance[free, :] = compliance[:, free] = math.nan
-    stiffness = (scaled / units[:, None] / units).tolist()
+    stiffness = scaled / units[:, None] / units
     diagonal = np.where(free, math.inf, np.diag(compliance))
     return {
         "stiffness": stiffness,
-        "stiffness_diagonal": np.array([stiffness[i][i] for i in range(len(kept))]),
-        "finite_compliance": clean_matrix(compliance.tolist()),
-        "compliance_diagonal": np.array([float(entry) for entry in diagonal]),
+        "stiffness_diagonal": np.diag(stiffness),
+        "finite_compliance": np.array(clean_matrix(compliance.tolist())),
+        "compliance_diagonal": diagonal,
         "rank": int(resisted.sum()),
     }
 

@@ -30,8 +30,8 @@ from kinetostat.kinetostatics.loading import DeflectedLink
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine, springs
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import Softest, softest
 from kinetostat.studies.rounding import clean_matrix, clean_screw, clean_statics
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
@@ -64,7 +64,7 @@ class SpringState:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadedState(Immutable):
+class LoadedState(ImmutableAnswer):
     """A machine at rest under gravity, its preload and its table [load]; base axes, at the loaded tool point, SI.
 
     Attributes:
@@ -191,7 +191,7 @@ def under_load(machine: Machine | MachineState) -> LoadedState:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadCurve(Immutable):
+class LoadCurve(ImmutableAnswer):
     """Displacement of the tool and loads of the springs of a preloaded machine while its loads grow in proportion.
 
     Attributes:

@@ -25,10 +25,10 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import positive
-from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
@@ -74,8 +74,8 @@ BELOW, ABOVE = 0.2, 1.6
 """Range of the curves as multiples of the lowest and of the highest frequency that is drawn."""
 
 
-@dataclass(frozen=True)
-class Mode:
+@dataclass(frozen=True, eq=False)
+class Mode(ImmutableAnswer):
     """A natural vibration.
 
     Attributes:
@@ -95,11 +95,11 @@ class Mode:
 
     frequency: float
     ratio: float
-    tool: tuple[float, ...]
+    tool: Array
     direction: str
     modal_mass: float
     modal_stiffness: float
-    effective_mass: tuple[float, float, float]
+    effective_mass: Array
     strain: Mapping[str, float]
     kinds: Mapping[str, float]
     kinetic: Mapping[str, float]
@@ -107,7 +107,7 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Vibration(Immutable):
+class Vibration(ImmutableAnswer):
     """The natural vibrations of a machine at its pose.
 
     Attributes:
@@ -359,11 +359,11 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
             Mode(
                 float(solution.frequencies[k]),
                 float(damping.ratios(solution)[k]),
-                tuple(float(value) for value in twist[parts]),
+                twist[parts],
                 _names(machine)[largest],
                 mass,
                 mass * omega**2,
-                effective[k],
+                np.array(effective[k]),
                 strain,
                 dict(parts_and_kinds(springs, strain)[1]),
                 {name: float(shares[k]) for name, shares in kinetics.items()},

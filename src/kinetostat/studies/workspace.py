@@ -20,9 +20,9 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
-from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question
@@ -124,7 +124,7 @@ def unit_product(units: Sequence[str]) -> str:
 
 @former_names(found="exists", counts="nodes", joined="connected", divided="singularities_divide")
 @dataclass(frozen=True, eq=False)
-class Workspace(Immutable):
+class Workspace(ImmutableAnswer):
     """The workspace of a machine over a grid of poses.
 
     Attributes:

@@ -175,7 +175,10 @@ ANALYSIS = Description(
         Field("platform", _platform),
         Field("tool_offset", lambda analysis: analysis.machine.tables["tool"].offset),
         Field("stiffness"),
-        Field("compliance", lambda analysis: analysis.compliance or analysis.finite_compliance),
+        Field(
+            "compliance",
+            lambda analysis: analysis.finite_compliance if analysis.compliance is None else analysis.compliance,
+        ),
         Field(
             "stiffness_diagonal",
             lambda analysis: analysis.stiffness_diagonal if analysis.stiffness_diagonal.size else None,

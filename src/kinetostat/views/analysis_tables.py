@@ -7,6 +7,8 @@ answer takes its lines from here.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
@@ -133,14 +135,14 @@ def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
 def stiffness_table(analysis: Analysis) -> FittedTable:
     """K, or its diagonal where a direction is rigid."""
     display = analysis.machine.display
-    rows: Sequence[Sequence[float]] = analysis.stiffness or [analysis.stiffness_diagonal.tolist()]
+    rows = analysis.stiffness_diagonal[None] if analysis.stiffness is None else analysis.stiffness
     return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
 def compliance_table(analysis: Analysis) -> FittedTable:
     """C, or its diagonal where a direction is free."""
     display = analysis.machine.display
-    rows: Sequence[Sequence[float]] = analysis.compliance or [analysis.compliance_diagonal.tolist()]
+    rows = analysis.compliance_diagonal[None] if analysis.compliance is None else analysis.compliance
     return matrix_table("Compliance C", "compliance", analysis.components, rows, display, "free")
 
 
@@ -181,9 +183,8 @@ def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
     table = numeric_table("Attribution: share of each part in the diagonal of C", "part", analysis.components)
     springs = {share.spring: [share] for share in analysis.attribution}
     for name, contributions in (springs if full else by_part(analysis.attribution)).items():
-        columns = zip(*(contribution.compliance_share for contribution in contributions), strict=True)
-        parts = [None if None in column else sum(c for c in column if c is not None) for column in columns]
-        table.add_row(name, *("–" if part is None else f"{100 * part:.1f} %" for part in parts))
+        parts = np.sum([contribution.compliance_share for contribution in contributions], axis=0)
+        table.add_row(name, *("–" if math.isnan(part) else f"{100 * part:.1f} %" for part in parts))
     return table
 
 
@@ -234,7 +235,7 @@ def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     return f"any ⊥ {direction_words(others[0])}" if others else "any"
 
 
-def direction_words(vector: Sequence[float]) -> str:
+def direction_words(vector: Sequence[float] | Array) -> str:
     """A direction by its three numbers, "+0.71 +0.00 -0.71"."""
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
@@ -256,7 +257,7 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
     return table
 
 
-def _point(point: Sequence[float], display: Display) -> str:
+def _point(point: Array, display: Display) -> str:
     """A point given in m, without round-off."""
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 

@@ -34,7 +34,7 @@ def _weakest(answer: Capability) -> str:
     sentences = []
     for name in ("force", "speed", "acceleration"):
         part = answer.set_of(name)
-        if part and part.weakest and part.least > 0.0:
+        if part and part.weakest.size and part.least > 0.0:
             sentences.append(
                 f"The {name} is least along {direction_words(part.weakest)}, where {_names(part.limited_by)} reach"
                 f"{'es its limit' if len(part.limited_by) == 1 else ' their limits'}."
@@ -72,7 +72,7 @@ def _tables(answer: Capability, _full: bool) -> Iterator[FittedTable]:
     columns = ["in every direction", "least along", "in the best"]
     table = numeric_table("The drives allow at the tool point, beside the loads that count", "", columns)
     for part in answer.sets:
-        weakest = direction_words(part.weakest) if part.weakest else ""
+        weakest = direction_words(part.weakest) if part.weakest.size else ""
         greatest = _amount_text(answer, part.greatest, part.unit)
         table.add_row(TITLES[part.name], _amount_text(answer, part.least, part.unit), weakest, greatest)
     yield table
@@ -95,7 +95,7 @@ SETS = (
     Field("unit"),
     Field("least", lambda part: _finite(part.least), long_name="in whichever direction, SI"),
     Field("greatest", lambda part: _finite(part.greatest), long_name="in the best direction, SI"),
-    Field("weakest", lambda part: list(part.weakest), long_name="direction of the least, base axes", forms=("json",)),
+    Field("weakest", lambda part: part.weakest, long_name="direction of the least, base axes", forms=("json",)),
     Field("limited_by", lambda part: list(part.limited_by), long_name="drives at their limits there", forms=("json",)),
     Field("vertices", lambda part: part.vertices.tolist(), long_name="of the polytope, SI, base axes", forms=("json",)),
 )

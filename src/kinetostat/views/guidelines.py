@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.text import Text
 
+from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import with_leg
@@ -83,7 +84,7 @@ def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
         yield _move_table(answer, len(answer.parameters) if full else MOST_MOVES)
 
 
-def _equation_table(answer: Guidelines, rows: dict[str, tuple[float, ...]]) -> FittedTable:
+def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
     """K as sums over elements, in the form of the paper's equations 33-38."""
     table = text_table("K at this pose as a sum over elements; k is the stiffness of one part (SI)", "entry", "sum")
     for i, name in enumerate(answer.components):
@@ -152,18 +153,16 @@ def _move_table(answer: Guidelines, count: int) -> FittedTable:
     return table
 
 
-def _arrow(percent: float | None) -> Text:
-    if percent is None or abs(percent) < LEAST_EFFECT:
-        return Text("–" if percent is None else "·")
+def _arrow(percent: float) -> Text:
+    if not abs(percent) >= LEAST_EFFECT:
+        return Text("–" if math.isnan(percent) else "·")
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
     return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
 
 
 def _share_alike(move: Move) -> str:
     shares = [
-        move.stiffer[i] if p > 0.0 else move.softer[i]
-        for i, p in enumerate(move.percents)
-        if p is not None and abs(p) >= LEAST_EFFECT
+        move.stiffer[i] if p > 0.0 else move.softer[i] for i, p in enumerate(move.percents) if abs(p) >= LEAST_EFFECT
     ]
     least = min(shares, default=1.0)
     return "all" if least == 1.0 else f"{100 * least:.0f} %"
@@ -262,7 +261,10 @@ GUIDELINES = Description(
         LOADS_LEFT_OUT,
         Field("components"),
         Field("rigid_within", lambda _answer: EXCESS),
-        Field("compliance_diagonal", lambda answer: answer.compliance_diagonal or None),
+        Field(
+            "compliance_diagonal",
+            lambda answer: answer.compliance_diagonal if answer.compliance_diagonal.size else None,
+        ),
         Records("elements", "element", ELEMENT, _elements, forms=("json", "nc")),
         Field("stiffness_equations", _equations),
         Records("parameters", "parameter", PARAMETER, _parameters),

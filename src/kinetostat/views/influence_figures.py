@@ -56,19 +56,19 @@ def sensitivity_figure(sensitivity: Sensitivity, title: str = "{}") -> Figure:
 
 
 def coloured_table(
-    titles: tuple[str, str], rows: Mapping[str, Sequence[float | None]], heads: Sequence[str], colours: str, label: str
+    titles: tuple[str, str], rows: Mapping[str, Array], heads: Sequence[str], colours: str, label: str
 ) -> Figure:
     """Draw numbers in cells coloured by sign and size; the first rows, as many as a page takes.
 
     Args:
         titles: over the figure, and below it where its numbers hold.
-        rows: percent per percent in each column, by parameter; None is grey.
+        rows: percent per percent in each column, by parameter; NaN is grey.
         heads: of the columns.
         colours: name of a diverging colour map.
         label: of its bar.
     """
     shown = list(rows)[:MOST_LINES]
-    cells = np.array([[np.nan if p is None else p for p in rows[path]] for path in shown], dtype=float)
+    cells = np.array([rows[path] for path in shown], dtype=float)
     beside = max(NAMES, width_of(shown))
     with new_figure((beside + 0.5 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), titles[0], titles[1]) as figure:
         panel = figure.subplots()

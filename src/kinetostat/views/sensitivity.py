@@ -1,5 +1,6 @@
 """Sensitivities: the question, and the description of its answer. Nothing is computed here but rounding."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -40,9 +41,9 @@ def influence_table(answer: Sensitivity, count: int) -> FittedTable:
     return table
 
 
-def _percent(value: float | None) -> str:
+def _percent(value: float) -> str:
     """Return a number with three decimals, or a dash where there is none."""
-    if value is None:
+    if math.isnan(value):
         return "–"
     return "0" if abs(value) < NEGLIGIBLE else f"{value:.3f}"
 

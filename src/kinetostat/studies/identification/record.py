@@ -204,11 +204,11 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
         tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
         tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
         {name: data for name, data in pictures.items() if data.startswith(PNG)},
-        *(
-            {str(name): float(value) for name, value in record.get("home", {}).get(what, {}).items()}
-            for what in ("actuators", "senses")
-        ),
-        None
-        if record.get("numbers") is None
-        else {str(path): float(value) for path, value in record["numbers"].items()},
+        _numbers(record.get("home", {}).get("actuators", {})),
+        _numbers(record.get("home", {}).get("senses", {})),
+        None if record.get("numbers") is None else _numbers(record["numbers"]),
     )
+
+
+def _numbers(data: Any) -> dict[str, float]:
+    return {str(name): float(value) for name, value in data.items()}

@@ -217,7 +217,7 @@ def _numbers(
         yield compare(place, name, text, value, unit)
 
 
-def coefficients(*settings: str) -> dict[str, tuple[float, ...]]:
+def coefficients(*settings: str) -> dict[str, Array]:
     """Per stiffness Ka, k52, k54, its coefficients in the six diagonal entries of K (all actuators alike)."""
     response = at(*settings)
     equations = equations_of_k(response, elements(response.configuration), range(len(COMPONENTS)))

@@ -249,7 +249,7 @@ def _first_link() -> Claim:
     here = coefficients()
     ratios = [here["k52"][i] / here["k54"][i] for i in HELD_AXES]
     links = analyze(load(printed.MACHINE)).attribution[:2]
-    shares = [link.compliance_share[HELD_AXES[1]] or 0.0 for link in links]
+    shares = [float(np.nan_to_num(link.compliance_share[HELD_AXES[1]])) for link in links]
     return Claim(
         "Guideline (v)",
         "The first passive link matters more than the second for holding the constrained directions.",

@@ -5,6 +5,7 @@ The numbers come from `studies` and the engine; here they are ranked and written
 
 import math
 
+import numpy as np
 from nicegui import ui
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -79,7 +80,7 @@ def contributions_text(report: Report, component: str) -> str:
     compliance = float(analysis.compliance_diagonal[index])
     shares: dict[str, float] = {}
     for spring in analysis.attribution:
-        shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance_share[index] or 0.0)
+        shares[spring.part] = shares.get(spring.part, 0.0) + float(np.nan_to_num(spring.compliance_share[index]))
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST_SHARE]
     if compliance == 0.0:
@@ -88,7 +89,7 @@ def contributions_text(report: Report, component: str) -> str:
         return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
     unit = QUANTITIES[f"compliance_{component}"].unit
     lead = f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}"
-    springs = {each.spring: each.compliance_share[index] or 0.0 for each in analysis.attribution}
+    springs = {each.spring: float(np.nan_to_num(each.compliance_share[index])) for each in analysis.attribution}
     _, together = parts_and_kinds(springs_of(analysis.state.configuration), springs)
     kinds = [(kind, share, f"{100 * share:.1f} %") for kind, share in together if share > LEAST_SHARE]
     grouped = bars("contributions by kind of part", kinds) + heading("Part by part") if len(kinds) < len(rows) else ""
@@ -134,8 +135,8 @@ class SensitivityPanel(Panel):
 
 def ranking_text(answer: Sensitivity) -> str:
     """Bars of the parameters that influence the first quantity of a sensitivity study."""
-    percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents]
-    known = [(path, percent) for path, percent in percents if percent is not None]
+    percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents.size]
+    known = [(path, percent) for path, percent in percents if not math.isnan(percent)]
     largest = max((abs(percent) for _, percent in known), default=1.0)
     rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST_PARAMETERS]]
     if not rows:

@@ -9,6 +9,7 @@ from functools import partial
 
 from nicegui import ui
 
+from kinetostat.arrays import Array
 from kinetostat.display import DASH, Display
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
@@ -59,7 +60,7 @@ class MatricesPanel(Panel):
             ui.notify(f"{self.kind.value} copied", position="bottom", timeout=1500)
 
 
-def _rows(analysis: Analysis, kind: str) -> list[list[float]] | None:
+def _rows(analysis: Analysis, kind: str) -> Array | None:
     return analysis.compliance if kind == "C" else analysis.stiffness
 
 

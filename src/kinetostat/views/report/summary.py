@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from kinetostat.display import Display, number
 from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -133,7 +135,7 @@ def _shown_value(value: float, quantity: str, infinite: str, display: Display) -
 
 def _contributors(analysis: Analysis, i: int) -> str:
     parts = by_part(analysis.attribution).items()
-    shares = {name: sum(spring.compliance_share[i] or 0.0 for spring in springs) for name, springs in parts}
+    shares = {name: float(np.nansum([spring.compliance_share[i] for spring in springs])) for name, springs in parts}
     largest = [pair for pair in ranking_of(shares) if pair[1] >= LEAST_NAMED_SHARE]
     named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_PARTS_NAMED])
     more = len(largest) - MOST_PARTS_NAMED

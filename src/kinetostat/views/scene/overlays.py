@@ -11,6 +11,7 @@ from typing import Any
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Rotation, Vector, rotation_along
+from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.indices import Principal
 from kinetostat.kinetostatics.loading import Deflection, deflected_links, deflection
@@ -54,7 +55,7 @@ def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Pro
     ]
 
 
-def _three(directions: Sequence[Sequence[float]]) -> Rotation:
+def _three(directions: Array) -> Rotation:
     """Right-handed axes along up to three directions."""
     given = [Vector(*direction) for direction in directions]
     first = given[0]
