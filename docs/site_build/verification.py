@@ -108,7 +108,7 @@ def _closed_row(machine: str, entry: str, form: str, expected: float, found: flo
 
 def published_elsewhere(_folder: Path) -> str:
     """The general hexapod beside what its authors print."""
-    found = analyze(load("hexapod")).compliance or []
+    found = analyze(load("hexapod")).C
     rows = ((name, text, _as_printed(abs(found[i][j]), text)) for name, (text, i, j) in PUBLISHED.items())
     return table(("entry of C", "printed", "computed"), rows, 2)
 
@@ -149,7 +149,7 @@ def _compiled(name: str, ours: np.ndarray) -> str:
 
 
 def _added(name: str) -> str:
-    shares = np.array([[share or 0.0 for share in one.compliance] for one in analyze(load(name)).shares])
+    shares = np.nan_to_num([part.compliance_share for part in analyze(load(name)).attribution])
     sums = shares.sum(axis=0)
     return difference(float(abs(sums[sums > 0] - 1.0).max()), SAME)
 

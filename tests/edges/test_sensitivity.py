@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
 from kinetostat.cli import main
@@ -102,9 +103,9 @@ def test_rigid_and_free_parts_are_left_out_with_a_note():
 def test_an_index_that_is_zero_has_derivatives_but_no_percentage():
     rigid = load(MACHINE, ["stiffness.passive_links=rigid"])
     for one in sensitivity(rigid, ["compliance_y", "compliance_z"]).parameters:
-        assert one.percents[0] is None
+        assert np.isnan(one.percents[0])
         assert one.derivatives[0] == 0.0
-        assert one.percents[1] is not None
+        assert np.isfinite(one.percents[1])
 
 
 def test_rounding_of_a_rigid_direction_is_no_index(tmp_path, capsys):
@@ -119,7 +120,7 @@ def test_rounding_of_a_rigid_direction_is_no_index(tmp_path, capsys):
     assert found["indices"]["compliance_x"]["value"] == pytest.approx(compliance, rel=1e-12)
     assert max(abs(row["percent_per_percent"]["compliance_z"]) for row in found["parameters"]) < 100.0
     coupled = sensitivity(load("hexapod-cubic"), ["compliance_rx_y", "stiffness_x_y", "compliance_x"])
-    assert coupled.indices[:2] == (0.0, 0.0)
+    assert coupled.indices[:2].tolist() == [0.0, 0.0]
     assert coupled.indices[2] > 0.0
     assert main(["sensitivity", str(path), "--quantity", "compliance", "--quantity", "stiffness"]) == 0
     printed = capsys.readouterr().out
