@@ -152,7 +152,7 @@ def test_any_quantity_over_poses_of_a_file(tmp_path):
     assert ("C_x", "worst") not in by_name
     assert answer.poses == ((3, 3), (3, 3))
     assert [panel.get_ylabel().split(" (")[0] for panel in comparison_figure(answer).axes] == [
-        "displacement", "displacement about axes", "displacement along axes", "frequency", "moving mass",
+        "displacement", "displacement about axes", "displacement along axes", "frequency 1", "moving mass",
     ]  # fmt: skip
 
 
@@ -240,6 +240,11 @@ def test_what_it_refuses(arguments, said, capsys):
 
 def test_bars_start_at_zero_and_what_is_not_known_is_said():
     """A logarithmic axis has no 0 for bars to stand on: it has marks."""
+    designs = ["hexapod:tool.mass=12 kg", "hexapod:tool.mass=14 kg"]
+    lone = comparison_figure(compare(designs, quantities=["frequency_1", "compliance_x", "compliance_y"]))
+    labels = {panel.get_ylabel().split(" (")[0]: [t.get_text() for t in panel.get_xticklabels()] for panel in lone.axes}
+    assert labels["frequency 1"] == [""]
+    assert labels["compliance along axes"] == ["x", "y"]
     figure = comparison_figure(compare(["hexapod", "hexapod:tool.mass=12 kg", "tripteron"]))
     panels = {panel.get_ylabel().split(" (")[0]: panel for panel in figure.axes}
     assert panels["compliance along axes"].get_yscale() == "log"

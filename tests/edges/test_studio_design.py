@@ -180,6 +180,11 @@ def test_constraints_and_poses_are_written_and_kept_as_in_a_file():
             {"quantity": "compliance_z", "at_most": "0.5 um/N"}
         ]
         assert study.poses.over == ["x=-1 cm:1 cm:3", "z=67 cm:69 cm:2"]
+        await page.choose("study-within", True)
+        assert (await saved(page)).poses.within == "workspace"
+        await page.choose("study-within", False)
+        study = await saved(page)
+        assert study.poses.within is None
         await page.upload("sent.toml", study_toml(study).encode(), "study-upload")
         assert page.one("constraint 0 side").value == "at_most"
         assert page.one("constraint 0 bound").value == "0.5 um/N"
@@ -191,6 +196,10 @@ def test_constraints_and_poses_are_written_and_kept_as_in_a_file():
         await page.choose("study-poses", "")
         study = await saved(page)
         assert (study.constraints, study.poses.over) == ([], None)
+        listed = study_toml(study) + '\n[[poses.list]]\nx = "1 mm"\n\n[[poses.list]]\nx = "2 mm"\n'
+        await page.upload("listed.toml", listed.encode(), "study-upload")
+        assert page.one("study-listed").text.startswith("The study lists 2 poses one by one")
+        assert len((await saved(page)).poses.listed) == 2
 
     on_page(steps)
 

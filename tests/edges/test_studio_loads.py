@@ -1,5 +1,7 @@
 """The studio's switch to the machine under its loads: what is drawn, said and offered then, without a browser."""
 
+from pathlib import Path
+
 import pytest
 from studio_page import on_page
 from test_state_of_load import CABLES
@@ -79,6 +81,20 @@ def test_cables_that_only_tension_holds_are_shown_with_their_tensions():
         await page.send("control load.min_tension", "write", "none")
         assert "Slack, so that they carry nothing: c, d." in page.one("message").text
         assert page.one("under-load").content.count('class="bar-value">slack<') == 2
+
+    on_page(steps)
+
+
+def test_springs_are_grouped_as_the_terminal_groups_them():
+    """Thirty springs of six legs under weight have a line for each kind; a free machine shows its actuators."""
+    telescope = (Path(__file__).parents[1] / "cases" / "telescope-weight.toml").read_text("utf-8")
+
+    async def steps(page):
+        await page.upload("telescope.toml", telescope.encode())
+        await page.front("Loads")
+        content = page.one("under-load").content
+        assert "×6" in content.partition("Springs")[2]
+        assert "leg 3" not in content.partition(">Springs<")[2]
 
     on_page(steps)
 

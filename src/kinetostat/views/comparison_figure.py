@@ -85,7 +85,10 @@ def _panels(comparison: Comparison) -> list[tuple[str, Bars]]:
 
 
 def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
-    """Bars under the title of their panel: entries of a matrix about and along axes, members of a group together."""
+    """Bars under the title of their panel: entries of a matrix about and along axes, members of a group together.
+
+    A number that stands alone, such as the first frequency, has its whole name in the title.
+    """
     panels: dict[str, Bars] = {}
     for name, bar, dot in pairs:
         stem, _, member = name.rpartition("_") if "_" in name else name.rpartition(" ")
@@ -95,7 +98,11 @@ def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
         if known and member in COMPONENTS:
             title = f"{title} {'about' if member.startswith('r') else 'along'} axes"
         panels.setdefault(title, []).append((label, bar, dot))
-    return list(panels.items())
+    lone = {title: bars[0][0] for title, bars in panels.items() if len(bars) == 1 and bars[0][0].isdigit()}
+    return [
+        (f"{title} {lone[title]}", [("", *bars[0][1:])]) if title in lone else (title, bars)
+        for title, bars in panels.items()
+    ]
 
 
 def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> None:

@@ -1,6 +1,6 @@
 """The design tab: a study on the left, searches, their results and favourites on the right, the machine between them.
 
-`Workshop` holds what outlives the page. Favourites are machines with a note, of which two to five are compared.
+`Workshop` holds what outlives the page. Favourites are machines with a note, of which two or more are compared.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from nicegui import ui
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison import Design, compare
+from kinetostat.studies.comparison import MOST_DESIGNS, Design, compare
 from kinetostat.studio.design.draft import Draft
 from kinetostat.studio.design.run_panel import RunPanel
 from kinetostat.studio.design.runs import Runs
@@ -95,8 +95,8 @@ class DesignTab:
         self.runs.follow(run)
 
 
-LEAST, MOST = 2, 5
-"""Designs that are compared at a time."""
+LEAST = 2
+"""Designs that are compared at a time, at least; `MOST_DESIGNS` at most, as in the command."""
 PRESENT = 0
 """The number of the present machine in the list; favourites begin at 1."""
 PRESENT_NAME = "present machine"
@@ -134,7 +134,7 @@ class FavouritesPanel:
             for box in (self.quantities, self.over):
                 box.props(f"dense outlined stack-label maxlength={LONGEST_NOTE}").classes("field grow")
         with ui.element("div").classes("design-foot"):
-            ui.label("Tick two to five machines to compare them.").classes("note grow")
+            ui.label(f"Tick two to {MOST_DESIGNS} machines to compare them.").classes("note grow")
             self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)
             self.compare.props(MAIN_BUTTON).mark("favourite-compare")
         with ui.dialog() as self.window, ui.element("div").classes("comparison-window"):
@@ -179,7 +179,7 @@ class FavouritesPanel:
         self._count()
 
     def _count(self) -> None:
-        self.compare.set_enabled(LEAST <= len(self._chosen) <= MOST)
+        self.compare.set_enabled(LEAST <= len(self._chosen) <= MOST_DESIGNS)
 
     def _keep(self) -> None:
         try:

@@ -104,8 +104,7 @@ class Draft:
 
     def hidden_parts(self) -> list[str]:
         """Short descriptions of what the study has but the form does not show."""
-        parts = [_count_in_words(len(self.poses["list"]), "pose")] if "list" in self.poses else []
-        parts += ["poses in the workspace"] if "within" in self.poses else []
+        parts = ["conditions of the workspace"] if self.poses.get("where") else []
         tolerances = sum("tolerance" in table for table in self.variables)
         return parts + ([_count_in_words(tolerances, "tolerance")] if tolerances else [])
 

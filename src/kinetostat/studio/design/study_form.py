@@ -40,6 +40,7 @@ METHODS = {1: ["genetic", "gradient", "hybrid"], 2: ["nsga2"]}
 BOUNDS = {"at_least": "at least", "at_most": "at most"}
 POSES = "x=-2 cm:2 cm:5, y=-2 cm:2 cm:5"
 ABOUT_POSES = "from, to and number of each coordinate; empty for the pose of the machine alone; the worst pose counts"
+ABOUT_WITHIN = "of the ranges, only poses that lie in the workspace of the machine as its file says"
 GOALS = {"minimize": "minimise", "maximize": "maximise"}
 
 
@@ -288,6 +289,17 @@ class StudyForm:
         box = ui.input("ranges", value=", ".join(self.draft.poses.get("over", [])), placeholder=POSES)
         box.props("dense outlined stack-label").classes("field").mark("study-poses").tooltip(ABOUT_POSES)
         box.on_value_change(self._write_ranges)
+        within = ui.checkbox("only those in the workspace", value="within" in self.draft.poses)
+        within.props("dense").mark("study-within").tooltip(ABOUT_WITHIN).on_value_change(self._write_within)
+        if listed := self.draft.poses.get("list"):
+            text = f"The study lists {len(listed)} poses one by one, which are edited in its file."
+            ui.label(f"{text} Ranges take their place.").classes("note").mark("study-listed")
+
+    def _write_within(self, event: Change) -> None:
+        if event.value:
+            self.draft.poses["within"] = "workspace"
+        else:
+            self.draft.poses.pop("within", None)
 
     def _write_ranges(self, event: Change) -> None:
         ranges = [part.strip() for part in str(event.value).split(",") if part.strip()]

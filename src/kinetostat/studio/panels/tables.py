@@ -22,8 +22,8 @@ from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
-from kinetostat.views.analysis_tables import entry_unit, matrix_units
-from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
+from kinetostat.views.analysis_tables import actuator_table, entry_unit, matrix_units
+from kinetostat.views.loaded_tables import leg_loads, springs_of, stability_of, tangent_table
 from kinetostat.views.report.content import as_table
 from kinetostat.views.tables import headline, requirement_lines
 
@@ -94,7 +94,8 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
 
 def matrix_text(analysis: Analysis, kind: str) -> str:
     """C or K in all digits, cells separated by tabs; only its diagonal where the matrix is not finite."""
-    rows = _rows(analysis, kind) or [[entry] for entry in _diagonal(analysis, kind)]
+    matrix = _rows(analysis, kind)
+    rows = [[entry] for entry in _diagonal(analysis, kind)] if matrix is None else matrix.tolist()
     return "\n".join("\t".join(repr(entry) for entry in row) for row in rows)
 
 
@@ -157,7 +158,12 @@ def _pose(analysis: Analysis) -> str:
 def _centres(analysis: Analysis) -> str:
     centres = analysis.indices.centres if analysis.indices else {}
     rows = [
-        [name, ", ".join(engineering(float(c), "m", analysis.machine.display) for c in point) if point else DASH]
+        [
+            name,
+            ", ".join(engineering(float(c), "m", analysis.machine.display) for c in point)
+            if point is not None
+            else DASH,
+        ]
         for name, point in centres.items()
     ]
     title = f"Centres, measured from the {analysis.machine.reference}"
@@ -181,7 +187,7 @@ class LoadsPanel(Panel):
 
 
 def load_text(analysis: Analysis) -> str:
-    """Deflection and spring loads as tables; without a load, how to set one."""
+    """Deflection and loads of actuators as tables, as `analyze` prints them; without a load, how to set one."""
     load, display = analysis.load, analysis.machine.display
     if load is None:
         return paragraph("The tool carries no load. Set a force or a moment in the panel Load.")
@@ -189,26 +195,24 @@ def load_text(analysis: Analysis) -> str:
         [name, *_load_cells(wrench, motion, name.startswith("r"), display)]
         for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
     ]
-    springs = [
-        [spring.name, *_load_cells(spring.load, spring.deformation, spring.turning, display)] for spring in load.springs
-    ]
+    actuators = as_table(actuator_table(load, display), "")
     return (
         heading("Tool point")
         + table("tool point", ["", "load", "deflection"], tool)
-        + heading("Actuators and springs")
-        + table("actuators and springs", ["", "load", "deformation"], springs)
+        + heading("Actuators")
+        + table("actuators", actuators.heads, actuators.rows)
     )
 
 
 def loaded_text(state: LoadedState) -> str:
-    """The state of rest: its verdict, a bar for each leg, displacement, springs, and how stiff it is now."""
+    """The state of rest: its verdict, a bar for each leg, displacement, springs (many: their kinds), stiffness now."""
     display, units = state.machine.display, ["rad" if name.startswith("r") else "m" for name in state.components]
     linear = [None] * len(units) if state.linear is None else state.linear.tolist()
     moved = [
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
     ]
-    springs = as_table(spring_table(state, display), "")
+    springs = as_table(springs_of(state, display), "")
     return (
         paragraph(f"{state.message} {stability_of(state)}", "lead")
         + heading("Which legs carry")
