@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import kinetostat
-from kinetostat import InputError, drives, evaluate, load, save, servo
+from kinetostat import InputError, drives, evaluate, load, modes, save, servo
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
 from kinetostat.vibration.servo import ServoLoop
 from kinetostat.views.servo import SERVO, servo_figures
+from kinetostat.views.vibration import VIBRATION
 
 MASS, INERTIA, ROTOR, LEAD = 12.0, (0.3, 0.4, 0.5), 2e-5, 0.01
 PLATFORM = ["tool.mass=12 kg", "tool.inertia=[0.3, 0.4, 0.5, 0, 0, 0]", "damping.per_mass=1e-12", "roll=0.1", "x=0.01"]
@@ -92,6 +93,29 @@ def test_poles_are_where_the_platform_moves_without_a_force(name):
         assert values[-1] < 1e-6 * values[0]
         checked += 1
     assert checked >= 12 + 12  # platform and motors
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_the_response_of_modes_has_the_damping_of_gains_where_loops_are_closed(name):
+    machine, frequencies = hexapod(*LOOPS[name]), [0.3, 40.0, 170.0]
+    answer = modes(machine, along=[1.0, 2.0, 0.0], closed_loops=True)
+    for frequency, closed in zip(frequencies, answer.receptance(frequencies), strict=True):
+        expected = np.linalg.inv(platform_stiffness(answer, 2.0j * np.pi * frequency))
+        np.testing.assert_allclose(closed, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
+    softest = answer.softest(answer.direction)
+    curve = answer.along(answer.direction, np.geomspace(0.1, 5000.0, 4000).tolist()).real
+    assert softest.real == pytest.approx(curve.min(), rel=1e-4)
+    assert softest.real <= curve.min() * (1.0 - 1e-6)
+    assert "loops closed" in dict(VIBRATION.sentences(answer))["Loops"]
+    still = modes(hexapod("drives.rotor_inertia=0", "drives.rotor_damping=0"))
+    assert [mode.frequency for mode in answer.modes] == pytest.approx([mode.frequency for mode in still.modes])
+
+
+def test_modes_say_what_closed_loops_lack():
+    with pytest.raises(InputError, match=r"servo\.position_gain of .* is 0"):
+        modes(load("hexapod", [*PLATFORM, *DRIVE]), closed_loops=True)
+    unstable = modes(hexapod("servo.position_gain=5000", "servo.velocity_gain=0.5"), closed_loops=True)
+    assert ("unstable" in dict(VIBRATION.sentences(unstable))["Loops"]) is not servo(unstable.machine).stable
 
 
 def test_static_stiffness_with_an_integral_part_is_that_of_the_transmission():

@@ -13,13 +13,9 @@ from dataclasses import field, replace
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
-from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.drive_limits import driven_springs
-from kinetostat.machine.actuators import name_of
-from kinetostat.machine.drives import numbers_of_drive, with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
@@ -27,14 +23,12 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
-from kinetostat.vibration.servo import ClosedLoops, ServoLoop, slowest_decay
+from kinetostat.vibration.servo import ClosedLoops, slowest_decay
 
 CURVE_RANGE = (0.001, 5.0)
 """Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still."""
 CURVE_POINTS = 1200
 """Number of points of each curve."""
-UNSTABLE_REAL_PART = 1e-9
-"""Real part of a pole, as a share of its size, above which the motion grows; below it is round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,68 +117,26 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
     """
     state = state_of(machine)
     direction = tuple(unit_direction(along, "along")) if along else ()
-    loops = _loops(state)
-    still = with_every_drive(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
-    vibration = modes(still)
-    if vibration.solution is None or vibration.damping is None or not vibration.solution.ringing:
+    vibration = modes(state, closed_loops=True)
+    if vibration.loops is None:
         return Servo(state, vibration.status, vibration.message)
-    return replace(_answer(state, vibration, loops), direction=direction)
+    return replace(_answer(vibration, vibration.loops), direction=direction)
 
 
-def _loops(state: MachineState) -> dict[str, ServoLoop]:
-    """The loop of each drive, by the name of its actuator."""
-    machine, loops = state.machine, {}
-    for spring in driven_springs(state.configuration):
-        gains, drive = (numbers_of_drive(machine, table, spring) for table in ("servo", "drives"))
-        for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
-            if not getattr(gains, name):
-                raise InputError(
-                    f"servo.{name} of {machine.name} is 0, so that the motor of {name_of(spring)} is not held; write "
-                    f"{name} = {example}, say, in the table [servo]."
-                )
-        if not drive.rotor_inertia:
-            raise InputError(
-                f"drives.rotor_inertia of {machine.name} is 0, and a loop without inertia has no dynamics; write "
-                'rotor_inertia = "2e-5 kg*m**2", say, in the table [drives].'
-            )
-        stiffness = float(spring.stiffness)
-        if math.isinf(stiffness):
-            raise InputError(
-                f"{spring.name} of {machine.name} is rigid; its stiffness is that of the transmission between motor "
-                "and joint, which a servo loop needs: give it one."
-            )
-        square = float(rotor_turns(spring, drive)) ** 2
-        loops[spring.of] = ServoLoop(
-            transmission=stiffness,
-            inertia=square * drive.rotor_inertia,
-            friction=square * drive.rotor_damping,
-            velocity_gain=square * gains.velocity_gain,
-            position_gain=gains.position_gain,
-            integral_time=gains.integral_time,
-            at_load=gains.position_at_load,
-        )
-    return loops
-
-
-def _answer(state: MachineState, vibration: Vibration, named: dict[str, ServoLoop]) -> Servo:
-    """The answer for a machine whose modes with motors that stand still are known; `named`: loops by actuator."""
-    solution, damping = vibration.solution, vibration.damping
-    if solution is None or damping is None:
-        raise ValueError("a vibration without modes has no loops")
-    closed = ClosedLoops(solution, damping, tuple(named[drive.name] for drive in solution.drives))
-    parts = list(state.machine.family.components)
-    still = solution.tool @ solution.tool.T
+def _answer(vibration: Vibration, closed: ClosedLoops) -> Servo:
+    """The answer for a machine whose modes with motors that stand still are known."""
+    parts = list(vibration.machine.family.components)
+    still = closed.modes.tool @ closed.modes.tool.T
     poles = closed.poles()
-    stable = bool((poles.real <= UNSTABLE_REAL_PART * np.abs(poles)).all())
     answer = Servo(
-        state,
+        vibration.state,
         Status.OK,
         "",
         closed,
         _free_stiffness(still, still, parts),
         _free_stiffness(closed.receptance(np.zeros(1))[0].real, still, parts),
         poles=poles,
-        stable=stable,
+        stable=closed.stable,
         assumed=vibration.assumed,
     )
     given = answer.frequencies

@@ -48,6 +48,7 @@ from kinetostat.vibration.receptance import (
     receptance,
     softest_of,
 )
+from kinetostat.vibration.servo import ClosedLoops, servo_loops, with_standing_motors
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
 
 SMALL = 1e-6
@@ -126,6 +127,7 @@ class Vibration(ImmutableAnswer):
         cutting_pressure: cutting force per area of the chip, N/m²; None where nothing says it.
         lowest, highest: ends of the range of the response, Hz; None for about the first six modes.
         tool: coupled to the machine, so that responses are those of its tip; None where there is none.
+        loops: servo loops of its drives, if they are closed: modes are then those of motors that stand still.
     """
 
     state: MachineState
@@ -144,6 +146,7 @@ class Vibration(ImmutableAnswer):
     lowest: float | None = None
     highest: float | None = None
     tool: FreeTool | None = None
+    loops: ClosedLoops | None = None
 
     @property
     def machine(self) -> Machine:
@@ -157,7 +160,7 @@ class Vibration(ImmutableAnswer):
     def receptance(self, frequencies: Sequence[float]) -> Complex:
         """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
 
-        With a coupled tool it is that of its tip.
+        With a coupled tool it is that of its tip; with closed loops it is that of drives which these hold.
 
         Args:
             frequencies: Hz.
@@ -170,7 +173,7 @@ class Vibration(ImmutableAnswer):
             if not abs(frequency) <= HIGHEST:
                 raise InputError(f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST:g}.")
         given = np.asarray(frequencies, dtype=float).reshape(-1)
-        whole = receptance(solution, damping, given)
+        whole = receptance(solution, damping, given) if self.loops is None else self.loops.receptance(given)
         if self.tool is None:
             return whole
         first, last = self.tool.frequencies[[0, -1]]
@@ -203,7 +206,7 @@ class Vibration(ImmutableAnswer):
         """
         solution, damping = self._solution()
         way = np.array(unit_direction(direction, "direction"))
-        if self.tool is None:
+        if self.tool is None and self.loops is None:
             return least_real_part(solution, damping, way)
         return softest_of(lambda given: along(self.receptance(given.tolist()), way), self.search_frequencies)
 
@@ -212,6 +215,13 @@ class Vibration(ImmutableAnswer):
         """Frequencies at which chatter is looked for, Hz: close together about each mode, within those of a tool."""
         solution, damping = self._solution()
         tried = tried_frequencies(solution.frequencies, damping.ratios(solution))
+        if self.loops is not None:
+            poles = self.loops.poles()
+            swinging = poles[poles.imag > 0.0]
+            order = np.argsort(np.abs(swinging))
+            sizes = np.abs(swinging[order])
+            of_loops = tried_frequencies(sizes / (2.0 * math.pi), np.abs(swinging[order].real) / sizes)
+            tried = np.unique(np.concatenate([tried, of_loops]))
         if self.tool is None:
             return tried
         every = np.unique(np.concatenate([tried, self.tool.search_frequencies]))
@@ -231,6 +241,7 @@ def modes(
     lowest: float | str | None = None,
     highest: float | str | None = None,
     tool_receptance: str | Path | None = None,
+    closed_loops: bool = False,
 ) -> Vibration:
     """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
 
@@ -242,10 +253,13 @@ def modes(
         lowest, highest: ends of the range of the response, Hz or with a unit; about the first six modes if None.
         tool_receptance: CSV file with the receptance of a free tool and holder, which are then coupled to the tool
             point; modes stay those of the machine.
+        closed_loops: whether the response is that with the servo loops of [servo] closed; modes are then those with
+            motors that stand still.
 
     Raises:
         InputError: nothing says a mass, rotors have an inertia and nothing says how far they turn, a direction is zero,
-            a pressure has no direction, the range is empty, or the file of the tool has a mistake.
+            a pressure has no direction, the range is empty, the file of the tool has a mistake, or loops lack a gain,
+            an inertia or a stiffness of the transmission.
     """
     state, tool = state_of(machine), read_tool(tool_receptance) if tool_receptance is not None else None
     cutting = state.machine.tables["cutting"]
@@ -264,8 +278,15 @@ def modes(
         raise InputError(f"lowest is {low:g} Hz, not below highest, {high:g} Hz; exchange them.")
     if pressure is not None and not direction:
         raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
+    loops = servo_loops(state) if closed_loops else {}
+    answer = _modes_in(state_of(with_standing_motors(state.machine)) if closed_loops else state)
+    closed, solution = None, answer.solution
+    if closed_loops and solution is not None and answer.damping is not None and solution.ringing:
+        closed = ClosedLoops(solution, answer.damping, tuple(loops[drive.name] for drive in solution.drives))
     return replace(
-        _modes_in(state),
+        answer,
+        state=state,
+        loops=closed,
         direction=direction,
         cutting_pressure=pressure or cutting.pressure or None,
         lowest=low,

@@ -12,11 +12,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
+from kinetostat.equilibrium.drives import rotor_turns
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
+from kinetostat.kinetostatics.drive_limits import driven_springs
+from kinetostat.machine.actuators import name_of
+from kinetostat.machine.drives import numbers_of_drive, with_every_drive
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import Damper, receptance
 from kinetostat.vibration.state_space import state_space
 
+UNSTABLE_REAL_PART = 1e-9
+"""Real part of a pole, as a share of its size, above which the motion grows; below it is round-off."""
 STATES_OF_DRIVE = 3
 """States of a drive: position of its motor, speed of its motor, and the integral of the position error."""
 
@@ -76,6 +85,50 @@ class ServoLoop:
         return float(self.stiffness(np.zeros(1))[0].real)
 
 
+def servo_loops(state: MachineState) -> dict[str, ServoLoop]:
+    """The loop of each drive, by the name of its actuator.
+
+    Raises:
+        InputError: a gain is zero, a rotor has no inertia, or a transmission is rigid.
+    """
+    machine, loops = state.machine, {}
+    for spring in driven_springs(state.configuration):
+        gains, drive = (numbers_of_drive(machine, table, spring) for table in ("servo", "drives"))
+        for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
+            if not getattr(gains, name):
+                raise InputError(
+                    f"servo.{name} of {machine.name} is 0, so that the motor of {name_of(spring)} is not held; write "
+                    f"{name} = {example}, say, in the table [servo]."
+                )
+        if not drive.rotor_inertia:
+            raise InputError(
+                f"drives.rotor_inertia of {machine.name} is 0, and a loop without inertia has no dynamics; write "
+                'rotor_inertia = "2e-5 kg*m**2", say, in the table [drives].'
+            )
+        stiffness = float(spring.stiffness)
+        if math.isinf(stiffness):
+            raise InputError(
+                f"{spring.name} of {machine.name} is rigid; its stiffness is that of the transmission between motor "
+                "and joint, which a servo loop needs: give it one."
+            )
+        square = float(rotor_turns(spring, drive)) ** 2
+        loops[spring.of] = ServoLoop(
+            transmission=stiffness,
+            inertia=square * drive.rotor_inertia,
+            friction=square * drive.rotor_damping,
+            velocity_gain=square * gains.velocity_gain,
+            position_gain=gains.position_gain,
+            integral_time=gains.integral_time,
+            at_load=gains.position_at_load,
+        )
+    return loops
+
+
+def with_standing_motors(machine: Machine) -> Machine:
+    """The machine whose motors stand still: rotors have no inertia, so that springs of drives are transmissions."""
+    return with_every_drive(machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
+
+
 @dataclass(frozen=True)
 class ClosedLoops:
     """A machine with its servo loops.
@@ -113,6 +166,12 @@ class ClosedLoops:
         system = unit[:, :, None] * np.eye(len(self.loops)) + weight[:, :, None] * drives
         solved = np.linalg.solve(system, weight[:, :, None] * np.swapaxes(across, 1, 2))
         return np.asarray(tool - across @ solved)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles decay."""
+        poles = self.poles()
+        return bool((poles.real <= UNSTABLE_REAL_PART * np.abs(poles)).all())
 
     def poles(self) -> Complex:
         """Eigenvalues of the closed loops, rad/s [states]; one with a positive real part is a motion that grows.

@@ -47,6 +47,14 @@ def damping_of(answer: Vibration) -> str:
     return f"{' to '.join(ends)} % of critical, by the table [damping]."
 
 
+def loops_of(answer: Vibration) -> str:
+    """Say that servo loops are closed, and whether they hold; empty where they are not closed."""
+    if answer.loops is None:
+        return ""
+    text = "The response of the tool is that with the servo loops closed; modes are those of motors that stand still."
+    return text if answer.loops.stable else f"{text} The loops are unstable: kinetostat servo says what grows."
+
+
 def tool_of(tool: FreeTool | None, display: Display) -> str:
     """Say over which frequencies and in which components a tool is coupled to the machine; empty without one."""
     if tool is None:
@@ -144,6 +152,7 @@ def _lines(answer: Vibration) -> Lines:
     ]
     more = [
         ("Loads", loads_of(answer)),
+        ("Loops", loops_of(answer)),
         ("Tool", tool_of(answer.tool, answer.machine.display)),
         ("Cutting", cut_of(answer)),
     ]
@@ -204,6 +213,7 @@ VIBRATION = Description(
         Field("moving_mass"),
         Field("without_known_mass", lambda answer: list(answer.uncounted)),
         Field("damping_assumed", "assumed"),
+        Field("closed_loops", lambda answer: answer.loops is not None),
         Records("modes", "mode", MODE, _named_modes),
         Field(
             "receptance_real",
@@ -264,6 +274,7 @@ MODES_QUESTION = Question(
             "file",
             "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
         ),
+        Option("closed_loops", "flag", "the response of the tool with the servo loops of the table [servo] closed"),
     ),
     loaded="vibrations about the state of rest under the loads, with tensions and weights",
     output="modes.csv, response.nc and the figures",

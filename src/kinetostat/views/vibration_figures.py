@@ -51,7 +51,9 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
     scale = machine.display.scale("m/N")
     ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
     ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
-    about = "grey lines: natural frequencies, numbered from the lowest; circles: least real part, which limits a cut"
+    still = "" if answer.loops is None else " with motors that stand still"
+    about = f"grey lines: natural frequencies{still}, numbered from the lowest; circles: least real part, "
+    about += "which limits a cut"
     with new_figure((7.6, 5.6), title.format(machine.name), setting_of(machine, []), about) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0), height_ratios=(1.25, 1.0, 1.0))
         size = figure.add_subplot(grid[0, 0])
