@@ -28,7 +28,8 @@ from kinetostat.engine.kernel import (
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
-from kinetostat.equilibrium.numbers import loaded_numbers
+from kinetostat.equilibrium.limit import snapped
+from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers
 from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
@@ -179,6 +180,10 @@ def _solve_in_parts(
     results[:, status != Status.OK] = np.nan
 
 
+FURTHER: dict[str, RestNumber] = {"frequency": frequencies, "snapped": snapped}
+"""Numbers at rest that are computed only where they are asked for."""
+
+
 def _response_with_states(
     machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], count: int
 ) -> Response:
@@ -202,7 +207,7 @@ def _response_with_states(
     plan = plan_for(machine, quantities, columns)
     response = response_in_motion(state.machine, response, state.joints, plan, quantities)
     if at_rest := rest_numbers(machine, quantities):
-        further = {"frequency": frequencies} if "frequency" in at_rest else None
+        further = {name: compute for name, compute in FURTHER.items() if name in at_rest}
         loaded, at_rest_status = loaded_numbers(state, further)
         status = np.where(np.isin(response.status, (Status.NO_REST,)), response.status, at_rest_status)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
@@ -362,7 +367,7 @@ _reducible = lru_cache(PROGRAMS_KEPT)(reducible)
 def have_programs(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
     """Whether programs can compute all that these quantities need, wherever parameters at these leaf paths are."""
     wanted, needed = [QUANTITIES[name] for name in quantities], rest_numbers(machine, quantities)
-    if any(quantity.cut or quantity.cables for quantity in wanted):
+    if "snapped" in needed or any(quantity.cut or quantity.cables for quantity in wanted):
         return False
     machine_cut = _cut(machine, paths) if needed else None
     at_rest = not needed or machine_cut is not None

@@ -42,6 +42,23 @@ class LoadLimit:
     stability: Stability
     least: bool = False
 
+    @property
+    def is_passed(self) -> bool:
+        """Whether a machine that is stable under all of its loads has snapped over on the way to them."""
+        return self.share < 1.0 and not self.least
+
+
+def snapped(balance: Balance) -> Array:
+    """Tell which states of rest are reached only by snapping over while the loads grow: 1, or 0 [n].
+
+    Each mechanism is followed by itself, which takes some hundredths of a second where it snaps over.
+
+    Args:
+        balance: the equations of states of rest under all loads.
+    """
+    limits = (limit_of(balance.mechanism.at(np.array([row]))) for row in range(len(balance.left)))
+    return np.array([float(limit is not None and limit.is_passed) for limit in limits])
+
 
 def limit_of(mechanism: Mechanism) -> LoadLimit | None:
     """Follow a mechanism at one pose under growing loads.

@@ -323,11 +323,12 @@ def _of_loaded_state() -> list[MapQuantity]:
             MapQuantity(f"tangent_free_stiffness_{name}", stiff, soft, free, (name,), "more", loaded="compliance"),
         ]
     entries += _frequencies("loaded_frequency", "frequency")
-    factor, slack = partial(_under_load, what="factor"), partial(_under_load, what="slack")
+    factor, slack, snapped = (partial(_under_load, what=what) for what in ("factor", "slack", "snapped"))
     return [
         *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
         MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded="factor"),
         MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded="slack", whole=True),
+        MapQuantity("snapped", "1", "snapped over", snapped, better="less", loaded="snapped", whole=True),
     ]
 
 

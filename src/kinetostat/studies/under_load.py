@@ -87,6 +87,7 @@ class LoadedState(ImmutableAnswer):
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most in that motion.
         struts: compression of each strut whose E I is known, and Euler's load at which it buckles.
+        snapped: whether the springs are stable, but the machine has snapped over to this state while the loads grew.
         residual: largest residual of the equations, as a share of what the load and the legs carry.
         links: links of all legs, with the exact motions of their ends.
         requirements: verdicts on the requirements of the machine's file, if these were judged.
@@ -107,6 +108,7 @@ class LoadedState(ImmutableAnswer):
     mode: Array = field(default_factory=lambda: np.zeros(0))
     mode_legs: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
+    snapped: bool = False
     residual: float = 0.0
     links: tuple[DeflectedLink, ...] = ()
     requirements: tuple[Any, ...] = ()
@@ -260,6 +262,7 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
         mode=(stability.mode * units)[parts],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
+        snapped=stability.stable and state.limit is not None and state.limit.is_passed,
         residual=float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
         links=loaded_links(equations, response.configuration.legs, response.reference),
     )
@@ -361,7 +364,7 @@ def _about_stability(stability: Stability, limit: LoadLimit | None) -> list[str]
     if not stability.stable:
         stands = how_it_gives_way(limit)
         return [f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"]
-    if limit is None or limit.share == 1.0 or limit.least:
+    if limit is None or not limit.is_passed:
         return []
     return [f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}"]
 

@@ -243,6 +243,7 @@ LOADED = Description(
         Field("mode"),
         Field("mode_legs"),
         Field("struts", lambda state: [{**asdict(strut), "factor": strut.factor} for strut in state.struts]),
+        Field("snapped"),
         Field("residual"),
         Field("requirements"),
     ),

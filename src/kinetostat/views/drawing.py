@@ -19,6 +19,8 @@ from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_t
 THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 VIEW_MARGIN = 0.12
 """Room beside a machine, as a share of its size."""
+MOST_TICKS = 4
+"""Intervals of an axis at most: views are for shapes, and half of the time of drawing one goes into its numbers."""
 MILLIMETRES = 1e3
 LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
@@ -57,6 +59,7 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
     for (name, across, up), panel in panels.items():
         draw(panel, across, up)
         panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
+        panel.locator_params(nbins=MOST_TICKS)
         for axis, interval in ((across, panel.dataLim.intervalx), (up, panel.dataLim.intervaly)):
             ends.setdefault(axis, []).extend(interval)
     # One scale for all views, so that what stands side by side can be compared; a machine in a point has none.

@@ -286,7 +286,7 @@ QUANTITIES = (
     "greatest_tension, tension_reserve, capacity and wrench_closure (of cables); of the machine at rest under its "
     "loads: "
     'displacement (the default where [load] says state = "loaded"), tangent_stiffness, tangent_free_stiffness, '
-    "load_factor, slack_springs, loaded_frequency; repeatable"
+    "load_factor, slack_springs, snapped (1 where the machine has snapped over), loaded_frequency; repeatable"
 )
 """Help on the quantities of sweeps, maps and sensitivities."""
 DISPLACED = "the machine at rest under its loads: its displacement, if no quantity is named"
