@@ -90,6 +90,7 @@ KINDS = {
         Kind("thermal expansion", "m/(m·K)", "12 um/(m*K)"),
         Kind("speed", "m/s", "0.5 m/s"),
         Kind("acceleration", "m/s**2", "9.81 m/s**2"),
+        Kind("angular acceleration", "rad/s**2", "50 rad/s**2"),
         Kind("jerk", "m/s**3", "100 m/s**3"),
         Kind("direction", "", "1.0"),
         Kind("ratio", "m/m", "20 um/m"),
@@ -122,16 +123,17 @@ USUAL = {
     "Hz": {"Hz": 1.0},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3},
     "m/s**2": {"m/s**2": 1.0},
+    "rad/s**2": {"rad/s**2": 1.0},
     "K": {"K": 1.0},
     "m/(m*K)": {"m/(m*K)": 1.0, "um/(m*K)": 1e-6},
     "m/m": {"m/m": 1.0, "mm/m": 1e-3, "um/m": 1e-6, "%": 0.01, "ppm": 1e-6},
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""
-TURNS_COUNT = ("angle", "rate", "frequency")
+TURNS_COUNT = ("angle", "rate", "frequency", "angular acceleration")
 """Kinds whose angle cannot be left out: 1 Hz is 2 pi rad/s. Others may be written without theirs, a torsional stiffness
 in N*m; but none is written with an angle that it has not: a lead of "10 mm/turn" is not a length of 10 mm / (2 pi)."""
-WITHOUT_ANGLE = {"rate": "1/s"}
+WITHOUT_ANGLE = {"rate": "1/s", "angular acceleration": "1/s**2"}
 """Unit in which such a kind may be written without its angle all the same, because SI does so."""
 RIGID = "rigid"
 """Word of a file for an infinite stiffness."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.workspace_verdicts import parse_condition
 from refusals import refused
 
@@ -30,6 +31,11 @@ def test_conditions_are_read_in_their_units(text, quantity, comparison, value):
     found = parse_condition(text, COMPONENTS)
     assert (found.quantity, found.comparison) == (quantity, comparison)
     assert found.value == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize("quantity", [q for q in QUANTITIES.values() if q.unit != "1"], ids=lambda q: q.name)
+def test_every_quantity_is_compared_in_its_unit(quantity):
+    assert parse_condition(f"{quantity.name} > 3 {quantity.unit}", COMPONENTS).value == pytest.approx(3.0)
 
 
 REFUSED = [

@@ -61,7 +61,10 @@ CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffne
 LONGEST_CONDITION = 200
 
 _CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
-COMPARED_KINDS = ("length", "angle", "force", "moment", "mass", "frequency", "speed", "rate")
+COMPARED_KINDS = (
+    *("length", "angle", "force", "moment", "mass", "frequency"),
+    *("speed", "rate", "acceleration", "angular acceleration"),
+)
 """Kinds of quantities beside stiffnesses and compliances, of which several have one unit."""
 _BY_UNIT = {
     kind.unit: kind.name

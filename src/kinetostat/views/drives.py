@@ -198,14 +198,14 @@ def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
     scale = answer.machine.display.scale("N·m" if rotary else "N")
     factor = PER_MINUTE if rotary else 1.0
     timeless = times[-1] == times[0]
-    style = {"linewidth": 1.2} if timeless else {"linewidth": 0.7, "alpha": 0.6}
+    width, opacity = (1.2, 1.0) if timeless else (0.7, 0.6)
     for k, drive in enumerate(answer.drives):
         if drive.rotary is not rotary:
             continue
         colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
         speed, peak = np.abs(curves.motor_speed[k]) * factor, int(np.argmax(torque))
         line = _most_at_speeds(speed, torque) if timeless else (speed, torque)
-        panel.plot(*line, color=colour, **style)
+        panel.plot(*line, color=colour, linewidth=width, alpha=opacity)
         panel.plot(
             speed[peak], torque[peak], "x", color=colour, markersize=6, markeredgewidth=1.5, zorder=3, clip_on=False
         )
