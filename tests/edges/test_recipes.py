@@ -77,6 +77,7 @@ def test_a_recipe_followed_word_by_word_works(title, tmp_path):
     tree, there, said = tmp_path / "tree", tmp_path / "there", ""
     beside = shutil.ignore_patterns("*.pyc.*")  # what other processes are writing; what they have compiled comes along
     shutil.copytree(ROOT / "src", tree / "src", ignore=beside)
+    shutil.copytree(ROOT / "tests", tree / "tests", ignore=shutil.ignore_patterns("*.pyc*"))
     there.mkdir()
     steps = recipe(title)
     assert any(block.words == ("recipe",) for block in steps), "a recipe ends with a command that shows its result"
