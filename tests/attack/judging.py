@@ -22,6 +22,7 @@ from laws import Case, broken_law, response_of
 from tables import GOOD_ENTRIES, MACHINE
 
 from kinetostat.cli import main
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.exchange import urdf_import
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import as_toml, build, load
@@ -101,24 +102,24 @@ def unclear(message: str) -> str | None:
     return None if message.rstrip()[-1:] in (".", "?", ")", "`") else f"a refusal that does not end: {message!r}"
 
 
-def _judge_loaded(machine: Machine) -> None:
+def _judge_loaded(state: MachineState) -> None:
     """Look for a state of rest that is not one."""
-    state = under_load(machine)
-    if state.has_rest and not all(map(math.isfinite, state.displacement)):
-        raise AssertionError(f"at rest at {state.displacement}")
+    answer = under_load(state)
+    if answer.has_rest and not all(map(math.isfinite, answer.displacement)):
+        raise AssertionError(f"at rest at {answer.displacement}")
 
 
-def _judge_vibration(machine: Machine) -> None:
+def _judge_vibration(state: MachineState) -> None:
     """Look for a frequency or a share of energy that is none."""
-    for mode in modes(machine).modes:
+    for mode in modes(state).modes:
         numbers = [mode.frequency, mode.ratio, *mode.strain.values(), *mode.kinetic.values()]
         if not all(math.isfinite(number) for number in numbers) or mode.frequency < 0.0:
             raise AssertionError(f"a mode of {mode.frequency} Hz: {numbers}")
 
 
-def _judge_budget(machine: Machine) -> None:
+def _judge_budget(state: MachineState) -> None:
     """Look for an error of the tool that is none."""
-    answer = budget(machine, samples=FEW, exact=FEW)
+    answer = budget(state, samples=FEW, exact=FEW)
     if not np.isfinite(answer.spread.usual[answer.settled]).all() or np.isnan(answer.shares).any():
         raise AssertionError(f"errors of {answer.spread.usual}, shares {answer.shares}")
 
@@ -153,12 +154,13 @@ def grown_case(rng: Random, answered: Counter[str]) -> str | None:
 
 
 def wrong_answer(machine: Machine) -> str | None:
-    """What is wrong with the analysis of a machine."""
-    analysis = analyze(machine)
+    """What is wrong with what is said of a machine; its state is solved for once, as a report does."""
+    state = state_of(machine)
+    analysis = analyze(state)
     # Gravity without a mass, bounds of tensions without cables, no mass, no tolerances.
     for judge in (_judge_loaded, _judge_vibration, _judge_budget):
         try:
-            judge(machine)
+            judge(state)
         except InputError as error:
             if unclear(str(error)):
                 return unclear(str(error))

@@ -19,6 +19,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import Evaluation, evaluate, responses
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
@@ -81,14 +82,19 @@ class Case:
     rng: Random
 
     @cached_property
+    def state(self) -> MachineState:
+        """Of the machine, of which all questions are asked."""
+        return state_of(self.machine)
+
+    @cached_property
     def analysis(self) -> Analysis:
         """Of the machine at its pose: it takes ten times as long as the response alone."""
-        return analyze(self.machine)
+        return analyze(self.state)
 
     @cached_property
     def loaded(self) -> LoadedState | None:
         """The machine at rest; None where it has no loads, or no mass for its gravity."""
-        return state_of(self.machine)
+        return loaded_state_of(self.state)
 
     @property
     def placement(self) -> tuple[Array, Array]:
@@ -105,7 +111,7 @@ def response_of(machine: Machine) -> Response:
     return respond(machine, solve_joints(machine) if machine.family.chains else None)
 
 
-def state_of(machine: Machine) -> LoadedState | None:
+def loaded_state_of(machine: Machine | MachineState) -> LoadedState | None:
     """The machine at rest; None where that is refused."""
     try:
         return under_load(machine)
@@ -218,17 +224,17 @@ def other_units(case: Case) -> str | None:
     """A machine in other units of length and force is the same."""
     metre, newton = 10.0 ** case.rng.choice((-1, 1, 2)), 10.0 ** case.rng.choice((-2, 0, 3))
     other = build(in_other_units(case.document, metre, newton), "in other units")
-    units = np.repeat([1.0, metre], 3)
+    units, state = np.repeat([1.0, metre], 3), state_of(other)
     transport = np.diag(units) / math.sqrt(metre * newton)
-    state = _same_rest(case, other, np.diag(units), "in other units")
-    return compared(case, other, transport, "in other units") or state or _same_modes(case, other)
+    rest = _same_rest(case, state, np.diag(units), "in other units")
+    return compared(case, other, transport, "in other units") or rest or _same_modes(case, state)
 
 
-def _same_rest(case: Case, other: Machine, transport: Array, what: str) -> str | None:
+def _same_rest(case: Case, other: Machine | MachineState, transport: Array, what: str) -> str | None:
     """Compare the states of rest of one machine written in two ways."""
     if case.loaded is None:
         return None
-    again = state_of(other)
+    again = loaded_state_of(other)
     if again is None or again.rest is not case.loaded.rest:
         return f"{what}: under load {again and again.rest.word} instead of {case.loaded.rest.word}"
     if len(case.loaded.displacement) < 6:
@@ -240,10 +246,10 @@ def _same_rest(case: Case, other: Machine, transport: Array, what: str) -> str |
     return f"{what}: displacements under load differ by {apart:.1g}" if apart > LOADED + IN_A_ROW * turns else None
 
 
-def _same_modes(case: Case, other: Machine) -> str | None:
+def _same_modes(case: Case, other: MachineState) -> str | None:
     """Seconds are the same in all units."""
     try:
-        ours, theirs = modes(case.machine), modes(other)
+        ours, theirs = modes(case.state), modes(other)
     except InputError:
         return None
     pairs = zip([m.frequency for m in ours.modes][:3], [m.frequency for m in theirs.modes][:3], strict=False)
@@ -409,7 +415,7 @@ def at_rest(case: Case) -> str | None:
     ends = []
     for sign in (-1.0, 1.0):
         path = f"load.force.{axis}"
-        ends.append(state_of(with_values(case.machine, {path: values(case.machine)[path] + sign * PUSH * size})))
+        ends.append(loaded_state_of(with_values(case.machine, {path: values(case.machine)[path] + sign * PUSH * size})))
     if any(end is None or end.rest is not Rest.OK for end in ends) or any(end.slack_legs for end in ends):
         return None
     slope = (np.array(ends[1].displacement[3:]) - np.array(ends[0].displacement[3:])) / (2.0 * PUSH * size)
@@ -477,7 +483,7 @@ def unloaded_rest(case: Case) -> str | None:
     nothing = {
         path: 0.0 for path in values(case.machine) if path.startswith(("load.force", "load.moment", "load.gravity"))
     }
-    state = state_of(with_values(case.machine, nothing))
+    state = loaded_state_of(with_values(case.machine, nothing))
     if state is None:
         return None
     if state.rest is not Rest.OK or state.compliance is None:
