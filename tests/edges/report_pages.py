@@ -10,6 +10,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 
 from kinetostat.cli import main
+from kinetostat.views.rendering import light
 from kinetostat.views.report import pictures
 
 MACHINE = "zhang-gosselin-4dof"
@@ -25,8 +26,15 @@ def reported(path, subject, *words):
 
 
 def small_pictures(patch):
-    """Draw the machine small, because that is what takes longest."""
+    """Draw the machine small and by few lamps, because that is what takes longest."""
     patch.setattr(pictures, "PICTURE_SIZE", (160, 112))
+    few_lamps(patch)
+
+
+def few_lamps(patch):
+    """Light pictures by few lamps, each of which draws the whole machine; `test_picture` looks at light and shadow."""
+    patch.setattr(light, "SUNS", 1)
+    patch.setattr(light, "SKIES", 3)
 
 
 def no_pictures(patch):

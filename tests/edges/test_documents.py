@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 from jobs import TRUTHS
-from report_pages import small_pictures
+from report_pages import no_layout, small_pictures
 
 from cad import starts
 from kinetostat.cli import main
@@ -173,6 +173,7 @@ def placed(document, path, table):
 def reader(tmp_path, monkeypatch, request):
     """A reader in an empty folder. Figures are drawn once, a studio does not listen; reports have small pictures.
 
+    Parts of figures stay where they are first put, as no page quotes them: `test_every_answer` lays all of them out.
     Reports are validated by PyNite: Exudyn takes more than a minute for the hexapod of README. `test_validation` asks
     both engines about that machine.
     """
@@ -180,6 +181,7 @@ def reader(tmp_path, monkeypatch, request):
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
     monkeypatch.setattr(serving, "serve", lambda *_: None)
     small_pictures(monkeypatch)
+    no_layout(monkeypatch)
     monkeypatch.setattr(writing, "validate", lambda machine, engine: validate(machine, engine or "pynite"))
     return Reader(tmp_path, request.config.getoption("--rewrite-pages"))
 

@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from report_pages import no_layout
+from report_pages import few_lamps, no_layout
 from scipy.spatial.transform import Rotation
 
 import kinetostat as k
@@ -62,6 +62,7 @@ UNDRAWN = {"analyze", "analyze out of reach", "forward", "command", "command at 
 @pytest.mark.parametrize("name", ANSWERS)
 def test_an_answer_has_every_surface(machine, name, tmp_path, monkeypatch):
     monkeypatch.setattr(notebook, "PICTURE_PIXELS", (160, 120))
+    few_lamps(monkeypatch)
     answer = ANSWERS[name](machine)
     assert len(repr(answer)) < 200 or name.startswith("evaluate")
     with monkeypatch.context() as patch:
