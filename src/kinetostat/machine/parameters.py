@@ -150,6 +150,17 @@ def _parameters(tables: tuple[tuple[str, type], ...]) -> tuple[Parameter, ...]:
     return tuple(known)
 
 
+@lru_cache(1024)
+def _scalars_of(table: str, fields: type) -> tuple[tuple[str, bool, tuple[str, ...]], ...]:
+    """Return each field of a table: its name, whether it holds one scalar, and the paths of its scalars.
+
+    Every state, law and search reads all scalars of its machine again and again; to write their paths each time would
+    take most of it.
+    """
+    known = quantities(fields).items()
+    return tuple((name, q.count is None, tuple(leaves(f"{table}.{name}", q))) for name, q in known)
+
+
 def find(family: HasFields, text: str) -> Parameter:
     """The parameter people mean: its path, its name in tables or datasets, or the end of its path if no other ends so.
 
@@ -196,10 +207,12 @@ def values(machine: HasNumbers) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
     scalars: dict[str, Scalar] = {}
     for table, fields in machine.family.every_table.items():
-        for name, quantity in quantities(fields).items():
-            given = getattr(machine.tables[table], name)
-            entries = (given,) if quantity.count is None else given
-            scalars.update(zip(leaves(f"{table}.{name}", quantity), entries, strict=True))
+        numbers = machine.tables[table]
+        for name, single, paths in _scalars_of(table, fields):
+            if single:
+                scalars[paths[0]] = getattr(numbers, name)
+            else:
+                scalars.update(zip(paths, getattr(numbers, name), strict=True))
     return scalars
 
 
@@ -208,10 +221,8 @@ def with_values(machine: AnyMachine, changes: Mapping[str, Any]) -> AnyMachine:
     new = {**values(machine), **{path: column(value) for path, value in changes.items()}}
     tables = {}
     for table, fields in machine.family.every_table.items():
-        made = {}
-        for name, quantity in quantities(fields).items():
-            entries = tuple(new[path] for path in leaves(f"{table}.{name}", quantity))
-            made[name] = entries[0] if quantity.count is None else entries
+        placed = _scalars_of(table, fields)
+        made = {name: new[p[0]] if single else tuple([new[path] for path in p]) for name, single, p in placed}
         tables[table] = fields(**made)
     new_machine: Any = machine
     return replace(new_machine, tables=tables)
