@@ -28,7 +28,7 @@ from kinetostat.engine.kernel import (
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
-from kinetostat.equilibrium.limit import snapped
+from kinetostat.equilibrium.limit import snap_flags
 from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers
 from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
@@ -180,7 +180,7 @@ def _solve_in_parts(
     results[:, status != Status.OK] = np.nan
 
 
-FURTHER: dict[str, RestNumber] = {"frequency": frequencies, "snapped": snapped}
+FURTHER: dict[str, RestNumber] = {"frequency": frequencies, "snapped": snap_flags}
 """Numbers at rest that are computed only where they are asked for."""
 
 

@@ -48,7 +48,7 @@ class LoadLimit:
         return self.share < 1.0 and not self.least
 
 
-def snapped(balance: Balance) -> Array:
+def snap_flags(balance: Balance) -> Array:
     """Tell which states of rest are reached only by snapping over while the loads grow: 1, or 0 [n].
 
     Each mechanism is followed by itself, which takes some hundredths of a second where it snaps over.

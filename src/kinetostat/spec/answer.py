@@ -14,7 +14,7 @@ MOST_COPIED = 1000
 
 
 class ImmutableAnswer(Immutable):
-    """What is fixed, and hands out small arrays as copies.
+    """An object that cannot be changed, and hands out small arrays as copies.
 
     Some libraries refuse arrays that are read-only (SciPy's `Rotation.from_rotvec`). What is written into a copy
     changes nothing here. A large array is not copied, and is read-only.
