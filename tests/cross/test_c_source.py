@@ -31,8 +31,9 @@ from printed_machines import MACHINES, entries_by_python, machine_of, poses_of, 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
 QUICKLY = "-O0"
 """Formulas have hundreds of thousands of characters, and compile eight times as fast without optimisation."""
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
-"""The C compilers of this machine."""
+COMPILER = next((name for name in ("gcc", "clang") if shutil.which(name)), "cc")
+"""The C compiler of this machine, where one will do."""
+CHECKS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 LOADED = ["load.force=[2, -3, -10]"]
 NUMBERS = np.ctypeslib.ndpointer(dtype=float, flags="C_CONTIGUOUS")
 
@@ -43,7 +44,7 @@ class Functions:
     def __init__(self, machine, folder, inputs=None, outputs=None):
         self.source = export(machine, folder / "pkm.c", inputs=inputs, outputs=outputs)[0]
         library = folder / "pkm.so"
-        command = [COMPILERS[0], *WARNINGS, QUICKLY, "-shared", "-fPIC", str(self.source), "-o", str(library), "-lm"]
+        command = [COMPILER, *WARNINGS, QUICKLY, "-shared", "-fPIC", str(self.source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         self._library = ctypes.CDLL(str(library))
 
@@ -184,30 +185,66 @@ def test_quantities_and_their_derivatives_are_those_of_the_engine(tmp_path):
     )
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize(
-    ("name", "settings", "outputs"),
-    [
+@pytest.fixture(scope="module", params=["gcc", "clang"])
+def compiler(request):
+    """A C compiler of this machine."""
+    if not shutil.which(request.param):
+        pytest.skip(f"{request.param} is not installed")
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def checking_compiler(compiler, tmp_path_factory):
+    """A C compiler that can link its sanitizers, whose library is a package of its own for some."""
+    source = tmp_path_factory.mktemp("checks") / "empty.c"
+    source.write_text("int main(void) { return 0; }\n")
+    command = [compiler, *CHECKS, str(source), "-o", str(source.with_suffix(""))]
+    if subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip(f"the library of {compiler}'s sanitizers is not installed")
+    return compiler
+
+
+def _run_written_test(files, compiler, options):
+    """Compile the test that an export has written, and run it."""
+    source, _, test, _ = map(str, files)
+    program = f"{source}.checked"
+    command = [compiler, *WARNINGS, *options, test, source, "-o", program, "-lm"]
+    subprocess.run(command, check=True, capture_output=True, text=True)
+    ran = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "0 differences" in ran.stdout
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
         ("hexapod", LOADED, "compliance_x,displacement_z"),
         ("hexapod-hardware", [], "stiffness_z"),
         ("planar-3rrr", [], "singularity_margin"),
         ("zhang-gosselin-4dof", LOADED, "compliance_rx,frequency_1"),
         ("hexapod", ["stiffness.actuator=rigid"], "stiffness_z"),
     ],
+    ids=lambda row: " ".join([row[0], *row[1]]),
 )
-def test_the_written_test_passes_under_sanitizers(compiler, name, settings, outputs, tmp_path):
-    machine = load(name, settings)
-    files = export(machine, tmp_path / "a.machine-1.c", outputs=outputs.split(","))
-    source, header, test, _ = files
-    assert header.name == "a.machine-1.h"
-    checks = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    for further in ([QUICKLY, *checks], [QUICKLY, "-DA_MACHINE_1_REAL=float"], ["-O2", "-pedantic"]):
-        program = tmp_path / "checked"
-        command = [compiler, *WARNINGS, *further, str(test), str(source), "-o", str(program), "-lm"]
-        subprocess.run(command, check=True, capture_output=True, text=True)
-        ran = subprocess.run([str(program)], capture_output=True, text=True, check=False)
-        assert ran.returncode == 0, ran.stdout + ran.stderr
-        assert "0 differences" in ran.stdout
+def written(request, tmp_path_factory):
+    """The files of an exported machine."""
+    name, settings, outputs = request.param
+    place = tmp_path_factory.mktemp("written") / "a.machine-1.c"
+    files = export(load(name, settings), place, outputs=outputs.split(","))
+    assert files[1].name == "a.machine-1.h"
+    return files
+
+
+@pytest.mark.parametrize(
+    "options", [["-O2", "-pedantic"], [QUICKLY, "-DA_MACHINE_1_REAL=float"]], ids=["double", "float"]
+)
+def test_the_written_test_passes_without_a_warning(compiler, written, options):
+    _run_written_test(written, compiler, options)
+
+
+@pytest.mark.parametrize("options", [[], ["-DA_MACHINE_1_REAL=float"]], ids=["double", "float"])
+def test_the_written_test_passes_under_sanitizers(checking_compiler, written, options):
+    _run_written_test(written, checking_compiler, [QUICKLY, *CHECKS, *options])
 
 
 def test_the_written_test_fails_where_a_number_is_wrong(tmp_path):
@@ -254,7 +291,7 @@ def test_names_in_a_file_are_never_code(tmp_path):
         assert words.count("/*") == words.count("*/")
         assert "int x;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
         assert "int y;" not in re.sub(r"/\*.*?\*/", "", words, flags=re.DOTALL)
-    subprocess.run([COMPILERS[0], *WARNINGS, "-c", str(source), "-o", str(tmp_path / "pkm.o")], check=True)
+    subprocess.run([COMPILER, *WARNINGS, "-c", str(source), "-o", str(tmp_path / "pkm.o")], check=True)
 
 
 def test_a_hanging_printer_stands_where_it_should_after_the_exported_command(tmp_path):
