@@ -24,7 +24,6 @@ from kinetostat.engine.kernel import closes_inside
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
-from kinetostat.spec.errors import InputError
 from kinetostat.studies.diagnosis import processor
 
 LOADS = ("load.force=[20, -30, -100]", "tool.mass=2 kg")
@@ -100,22 +99,19 @@ def unloaded_row(name: str, machine: Machine, window: Page) -> str:
 
 
 def resting_row(name: str) -> str:
-    """Sizes of a machine that rests under loads; frequencies where they have a program."""
+    """Sizes of a machine that rests under loads."""
     machine = load(name, LOADS)
     with TemporaryDirectory() as folder:
         place = Path(folder)
-        try:
-            counts = operations(machine, place, ["frequency_1"])
-            frequency = f"{counts['quantities_at']}, {counts['quantity_slopes_at']}"
-        except InputError:
-            counts, frequency = operations(machine, place), "no program: its links have mass"
+        counts = operations(machine, place, ["frequency_1"])
+        modes = f" (modes: {counts['springs_at']})" if "springs_at" in counts else ""
         source = (place / "m.c").stat().st_size
         export(machine, place / "m.html")
         cells = [
             f"`{name}`",
             f"{counts['first_steps_at']}, {counts['step_at']}",
             counts["displacement_at"],
-            frequency,
+            f"{counts['quantities_at']}, {counts['quantity_slopes_at']}{modes}",
             f"{source / 1e6:.2f} MB",
             f"{(place / 'm.html').stat().st_size / 1000:.0f} kB",
         ]

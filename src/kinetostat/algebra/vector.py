@@ -201,12 +201,13 @@ def rotation_z(c: Scalar, s: Scalar) -> Rotation:
     return Rotation(Vector(c, s, 0.0), Vector(-s, c, 0.0), Z_AXIS)
 
 
-def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
+def rotation_along(axis: Vector, c: Scalar, s: Scalar, rest: Scalar | None = None) -> Rotation:
     """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues).
 
-    What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x`.
+    What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x`. Of small angles the
+    difference 1 - c has few digits: `rest` is it, where it is known better.
     """
-    rest = 1.0 - c
+    rest = 1.0 - c if rest is None else rest
     columns = []
     for i, (unit, part) in enumerate(zip(AXES, axis.components(), strict=True)):
         column = list((unit * c + axis * (rest * part) + axis.cross(unit) * s).components())

@@ -9,6 +9,7 @@ Source: theory (34).
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -28,6 +29,7 @@ from kinetostat.engine.kernel import (
     program_of,
 )
 from kinetostat.engine.loaded import StatePrograms
+from kinetostat.engine.modes import modes_at_rest
 from kinetostat.engine.points import Points, Population
 from kinetostat.engine.trace import Runnable
 from kinetostat.frozen import dataclass
@@ -39,6 +41,7 @@ from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, IDLE_FREEDOM, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
 from kinetostat.vibration.reduced import reducible
 from kinetostat.vibration.slopes import EQUALS, mode_columns
+from kinetostat.vibration.springwise import mode_counts_of
 
 MACHINE_CODE_FROM = 20_000
 """Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
@@ -226,6 +229,8 @@ class _Routes:
         names = [name for objective in weights for name, _ in objective]
         self._loaded = bool(rest_numbers(machine, names, limited=False))
         self._plan = plan_for(machine, names, [*varying, *self._differentiated])
+        counts = mode_counts_of(machine, names, [*varying, *self._differentiated])
+        self._mode_counts = replace(counts, free=0) if counts and counts.at_rest else None
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
@@ -285,8 +290,15 @@ class _Routes:
         """Coordinates of the states of rest, if any objective is about the machine under load."""
         if not self._loaded:
             return []
-        states = StatePrograms(self._machine, self._form, closed, self._native)
-        return states.rest_coordinates(self._fixed, given, count)
+        states = StatePrograms(self._machine, self._form, closed, self._native).rest_coordinates(
+            self._fixed, given, count
+        )
+        if self._mode_counts is None:
+            return states
+        return [
+            *states,
+            *modes_at_rest(self._machine, self._form, self._fixed, [*given, *states], self._mode_counts, closed),
+        ]
 
     def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
         """The modes that programs cannot find themselves, if any objective is about them."""
@@ -314,9 +326,10 @@ class _Routes:
 
     def _program(self, weights: tuple[Weights, ...], closed: bool) -> Runnable:
         """The program of the objectives and their derivatives, or without weights that of the closing equations."""
-        limited = False
+        limited, stepping, judged = False, False, True
+        known = self._modes, limited, self._plan, stepping, judged, self._mode_counts
         trace, arguments = (
-            (objectives_of, (weights, self._differentiated, closed, self._modes, limited, self._plan))
+            (objectives_of, (weights, self._differentiated, closed, *known))
             if weights
             else (equations_of, (self._differentiated,))
         )

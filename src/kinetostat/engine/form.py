@@ -36,6 +36,7 @@ from kinetostat.motion.rigid import MotionPlan, plan_of
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
 from kinetostat.vibration.slopes import vibrating
+from kinetostat.vibration.springwise import ModeCounts, SpringMotions, motions_without_loads
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,7 @@ def objectives_of(
     plan: MotionPlan | None = None,
     stepping: bool = False,
     judged: bool = True,
+    mode_counts: ModeCounts | None = None,
 ) -> TracedFormula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the code is not OK.
 
@@ -193,6 +195,7 @@ def objectives_of(
         limited: whether the limits of a machine meant under its loads judge its points at rest.
         plan: which motions there are, where quantities need them, see `plan_for`.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
+        mode_counts: how many modes over springs are known, as further columns, where legs that have masses close loops.
         stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
             of its size, so that the program can be repeated until this is small.
         judged: whether the code is the status of the pose. Otherwise it says whether joints are known, and reach,
@@ -209,10 +212,26 @@ def objectives_of(
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
         loaded, status = equations.numbers(there, wanted, response)
-        if "frequency" in wanted:
+        if mode_counts is not None and mode_counts.at_rest:
+            motions = SpringMotions(equations.cut, there)
+            known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
+            coordinates = (*coordinates, *(column for mode in known for column in mode))
+            status = where(motions.sure, status, int(Status.NOT_CONVERGED))
+            if mode_counts.loaded:
+                loaded["frequency"] = lowest_frequencies([motions.square(mode) for mode in known[: mode_counts.loaded]])
+            if mode_counts.factor:
+                loaded["factor"] = motions.factor(known[-1])
+        if "frequency" in wanted and "frequency" not in loaded:
             loaded["frequency"] = frequencies_at(equations.cut, there, bool(paths))
         response = replace(response, loaded=loaded, status=status)
-    if modes:
+    if mode_counts is not None and mode_counts.free:
+        motions = motions_without_loads(given.machine, response, joints)
+        known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
+        coordinates = (*coordinates, *(column for mode in known for column in mode))
+        squares = lowest_frequencies([motions.square(mode) for mode in known])
+        status = where(motions.sure, response.status, int(Status.SINGULAR))
+        response = replace(response, frequencies=squares, status=status)
+    elif modes:
         vibration = vibrating(given.machine, response, joints, modes)
         known = new_inputs(given.graph, vibration.columns)
         coordinates = (*coordinates, *known)

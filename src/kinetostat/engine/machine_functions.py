@@ -28,12 +28,13 @@ from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, MapQuantity
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values
 from kinetostat.machine.written.family import at_home
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.vibration.springwise import ModeCounts, SpringSizes, mode_counts_of, sizes_over_springs
 
 LOADS = frozenset(("force", "moment", "gravity", "preload", "temperature_rise"))
 """Words of leaf paths that load a machine."""
@@ -61,6 +62,7 @@ class MachineFunctions:
         closed: whether programs close the legs themselves.
         placement: formula of actuators, tool point, orientation and points of legs.
         rests: whether its states of rest have programs.
+        mode_counts: modes over springs that the program of the quantities needs to be given; None if none.
     """
 
     machine: Machine
@@ -71,6 +73,7 @@ class MachineFunctions:
     closed: bool
     placement: TracedPlacement
     rests: bool
+    mode_counts: ModeCounts | None
 
     @cached_property
     def specimen(self) -> Specimen:
@@ -96,6 +99,18 @@ class MachineFunctions:
     def states(self) -> int:
         """The number of coordinates of a state of rest."""
         return len(step_of(self.specimen, self.form, self.closed).body.results) - 1
+
+    @cached_property
+    def springs(self) -> SpringSizes:
+        """Sizes of what the modes over springs are made of, where there are such."""
+        return sizes_over_springs(self.machine)
+
+    def needs_modes(self, quantity: MapQuantity) -> bool:
+        """Whether the program of a quantity needs modes over springs."""
+        counts = self.mode_counts or ModeCounts()
+        if quantity.loaded == "factor":
+            return bool(counts.factor)
+        return quantity.modal and bool(counts.loaded if quantity.loaded else counts.free)
 
     @cached_property
     def length(self) -> float:
@@ -144,21 +159,27 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     paths = tuple(dict.fromkeys([*pose, *chosen]))
     acting = any(value or path in paths for path, value in known.items() if LOADS.intersection(path.split(".")))
     rests = acting and cut_machine(machine, paths) is not None
-    needing = [
-        name
-        for name in wanted
-        if not (have_programs(machine, paths, [name]) and (rests or not QUANTITIES[name].loaded))
-    ]
+    needing = [name for name in wanted if not _has_program(machine, paths, name, rests)]
     if needing:
         raise InputError(
-            f"{needing[0]} has no program for {machine.name}: nothing loads it, or it is a load factor or a frequency "
-            "of a machine with legs that are no rods; leave it out of --outputs, or give the machine a load."
+            f"{needing[0]} has no program for {machine.name}: nothing loads it, or its equations cannot be reduced to "
+            "few coordinates; leave it out of --outputs, or give the machine a load."
         )
     if machine.loaded and not rests:  # what no program brings to rest is the free machine in all of them
         machine = replace(machine, loaded=False)
+    counts = mode_counts_of(machine, wanted, paths)
     form = form_with_numbers(machine, paths)
     placement = placement_of(Specimen(at_home(machine, paths)), form, paths, closed)
-    return MachineFunctions(machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests)
+    return MachineFunctions(
+        machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests, counts
+    )
+
+
+def _has_program(machine: Machine, paths: tuple[str, ...], name: str, rests: bool) -> bool:
+    """Whether a quantity has a program, alone or with modes over springs that a loop finds."""
+    if QUANTITIES[name].loaded and not rests:
+        return False
+    return have_programs(machine, paths, [name]) or mode_counts_of(machine, [name], paths) is not None
 
 
 def quantities_at(functions: MachineFunctions, columns: Mapping[str, Array], names: Sequence[str]) -> Array:

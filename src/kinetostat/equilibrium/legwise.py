@@ -20,6 +20,7 @@ from kinetostat.equilibrium.cut import Cut
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.pulls import loads_of_rods, pull_of, wrench_of_rods
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.machine.leg import Spring
 from kinetostat.numerics.motions import Motions, brackets_by, cross, of_scalars, skew_of
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, SURELY_MORE, ZERO_PIVOT
@@ -67,7 +68,11 @@ class CondensedLeg:
     v are those by which the leg's wrench changes: C v - A d = h, and A^T v + S d is what the leg takes of the load.
 
     Attributes:
-        terms: its contribution to the equations at the place.
+        placed: where it is.
+        terms: its contribution to the equations there, or in the free state.
+        elastic, passive: which of its coordinates are those of springs, and which are those of joints.
+        closes, across: P [passive x ways], and W^T [wrenches x ways].
+        follows, felt: P J_s [passive x springs], and W^T J_s [wrenches x springs].
         lines: rows of A: W^T, and what turning wrenches add to it [wrenches x ways].
         roots: rows of a root of C [wrenches x at most as many].
         turning: S [ways x ways].
@@ -89,50 +94,48 @@ class CondensedLeg:
         """
         self._ways, count = mechanism.ways.astype(object), len(mechanism.actuators)
         acting = self._ways @ of_scalars(wrench)[0]
-        here = _terms_at(leg, mechanism, row, acting)
-        self.terms = terms = _terms_at(leg, mechanism, [0.0] * leg.size, 0.0 * acting) if chord else here
+        self.placed, here = _terms_at(leg, mechanism, row, acting)
+        self.terms = terms = _terms_at(leg, mechanism, [0.0] * leg.size, 0.0 * acting)[1] if chord else here
         geometric = terms.geometric[0].astype(object)
         if chord:
             acting, geometric = 0.0 * acting, 0.0 * geometric
         self._driven = terms.driven[0][:, :count].astype(object)
-        self._elastic, self._passive = (
-            [k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1)
-        )
+        self.elastic, self.passive = ([k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1))
         rates, size = self._ways.T @ terms.rates[0].astype(object), len(self._ways.T)
-        springs, left = len(self._elastic), here.left[0].astype(object)
+        springs, left = len(self.elastic), here.left[0].astype(object)
         self.sure: Scalar = True
-        self._closes, self._across = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
-        if self._passive:
-            solution, rest, margin = right_inverse(rates[:, self._passive].T.tolist())
-            self._closes, self._across = array_of(solution, size, len(self._passive)).T, array_of(rest, len(rest), size)
+        self.closes, self.across = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
+        if self.passive:
+            solution, rest, margin = right_inverse(rates[:, self.passive].T.tolist())
+            self.closes, self.across = array_of(solution, size, len(self.passive)).T, array_of(rest, len(rest), size)
             self.sure = margin > SURELY_MORE
         self._gap = self._ways.T @ _gap(platform, here.end)
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
         self._bracket = turning_of(acting, self._ways)
-        self._inner = geometric[np.ix_(self._passive, self._passive)]
-        self._mixed = geometric[np.ix_(self._passive, self._elastic)]
-        self._follows = product(self._closes, rates[:, self._elastic])
-        pushed = product(self._inner, self._follows)
-        part = product(self._follows.T, self._mixed - 0.5 * pushed)
-        stiff = geometric[np.ix_(self._elastic, self._elastic)] - part - part.T
-        for place, number in enumerate(self._elastic):
+        self._inner = geometric[np.ix_(self.passive, self.passive)]
+        self._mixed = geometric[np.ix_(self.passive, self.elastic)]
+        self.follows = product(self.closes, rates[:, self.elastic])
+        pushed = product(self._inner, self.follows)
+        part = product(self.follows.T, self._mixed - 0.5 * pushed)
+        stiff = geometric[np.ix_(self.elastic, self.elastic)] - part - part.T
+        for place, number in enumerate(self.elastic):
             stiff[place, place] = stiff[place, place] + terms.carrying[0, number]
         self._factors = elimination(stiff.tolist())
         self.sure = self.sure & definite(self._factors, stiff.tolist())
         self._coupling = self._mixed - pushed
         self._left, self._held = (
-            left[self._elastic] - product(self._follows.T, left[self._passive]),
-            left[self._passive],
+            left[self.elastic] - product(self.follows.T, left[self.passive]),
+            left[self.passive],
         )
-        self._felt = product(self._across, rates[:, self._elastic])
+        self.felt = product(self.across, rates[:, self.elastic])
         # With E = L D L^T of the springs, products with its inverse are those of rows that L has been taken from.
         felt, coupled, remaining = (
             array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), springs)
-            for rows in (self._felt, self._coupling, self._left[None])
+            for rows in (self.felt, self._coupling, self._left[None])
         )
         shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
         solved, driven = felt * shrink, coupled * shrink
-        self.lines = self._across + product(product(solved, coupled.T), self._closes)
+        self.lines = self.across + product(product(solved, coupled.T), self.closes)
         self.gap = self.lines @ self._gap + product(solved, remaining[0])
         if len(felt) < springs:
             soft = symmetric_product(felt, solved.T).tolist()
@@ -140,8 +143,8 @@ class CondensedLeg:
         else:
             self.roots = felt * np.array([*(sqrt(abs(part)) for part in shrink), None], dtype=object)[:-1]
         stiffening = self._inner - symmetric_product(driven, coupled.T)
-        self.turning = symmetric_product(self._closes.T, product(stiffening, self._closes)) + self._bracket
-        pressed = product(self._closes.T, self._held - product(driven, remaining[0]))
+        self.turning = symmetric_product(self.closes.T, product(stiffening, self.closes)) + self._bracket
+        pressed = product(self.closes.T, self._held - product(driven, remaining[0]))
         self.taken = of_scalars(wrench)[0] + pressed + self.turning @ self._gap
 
     def step(self, twist: Array, change: Array) -> tuple[Row, Row]:
@@ -152,14 +155,14 @@ class CondensedLeg:
             change: changes of the wrenches that it can exert [wrenches].
         """
         moved = twist + self._gap
-        following = product(self._closes, moved)
-        pushed = product(self._felt.T, change) - product(self._coupling.T, following) - self._left
+        following = product(self.closes, moved)
+        pushed = product(self.felt.T, change) - product(self._coupling.T, following) - self._left
         springs = of_scalars(self._factors.solve(pushed.tolist()))[0]
-        passive = following - product(self._follows, springs)
+        passive = following - product(self.follows, springs)
         result = np.zeros(len(springs) + len(passive), dtype=object)
-        result[self._elastic], result[self._passive] = springs, passive
+        result[self.elastic], result[self.passive] = springs, passive
         pressed = self._held + product(self._inner, passive) + product(self._mixed, springs)
-        wrench = product(self._across.T, change) + product(self._closes.T, pressed) + self._bracket @ moved
+        wrench = product(self.across.T, change) + product(self.closes.T, pressed) + self._bracket @ moved
         return result.tolist(), wrench.tolist()
 
     def holding(self, change: Row) -> Array:
@@ -168,12 +171,12 @@ class CondensedLeg:
         return self.terms.holding[0, :count] + self._driven.T @ (self._ways @ of_scalars(change)[0])
 
 
-def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) -> LegTerms:
-    """Contribution of a leg at some coordinates to the equations, while a wrench acts on it [6]."""
+def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) -> tuple[PlacedChain, LegTerms]:
+    """A leg at some coordinates, and its contribution to the equations while a wrench acts on it [6]."""
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
     coordinates = of_scalars(row)
     placed = leg.chain.place(coordinates, amounts)
-    return leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
+    return placed, leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
 
 
 def _gap(platform: Motions, end: Motions) -> Array:
@@ -246,7 +249,13 @@ def solve_condensed(lines: Array, roots: Array, turning: Array, load: Array, gap
 
 
 class LegwiseTangent:
-    """Resistance of a machine with legs that close loops at some coordinates, and Newton's step from there."""
+    """Resistance of a machine with legs that close loops at some coordinates, and Newton's step from there.
+
+    Attributes:
+        legs, pulls: what each leg and each rod adds.
+        lines: the wrenches of rods and of legs, as rows [wrenches x ways].
+        turning: stiffness by loads and pulls of rods that turn [ways x ways].
+    """
 
     def __init__(self, machine: Cut, coordinates: Row, chord: bool = False) -> None:
         """Condense all legs.
@@ -268,26 +277,26 @@ class LegwiseTangent:
         )
         self.platform = placed.end
         free = all(is_zero(coordinate) for coordinate in coordinates)
-        self._pulls = [pull_of(rod, None if free else self.platform) for rod in machine.rods]
+        self.pulls = [pull_of(rod, None if free else self.platform) for rod in machine.rods]
         self.slack: Scalar = 0.0
         self.rank = len(machine.rods) + sum(len(leg.springs) - leg.springs.count(None) for leg in machine.legs)
-        turned = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self._pulls]
-        (load, change), (hold, fall) = platform_load(mechanism, self.platform), wrench_of_rods(self._pulls, turned)
-        force, turning = ways.T @ (load + hold)[0], ways.T @ (fall - change)[0] @ ways
-        if chord:
-            turning = 0.0 * turning
-        self._legs: list[CondensedLeg] = []
+        turned = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
+        (load, change), (hold, fall) = platform_load(mechanism, self.platform), wrench_of_rods(self.pulls, turned)
+        force, self.turning = ways.T @ (load + hold)[0], ways.T @ (fall - change)[0] @ ways
+        turning = 0.0 * self.turning if chord else self.turning
+        self.legs: list[CondensedLeg] = []
         for leg in machine.legs:
             row = coordinates[start : start + leg.size]
             start += leg.size + size
-            self._legs.append(
-                CondensedLeg(leg, mechanism, row, coordinates[start - size : start], self.platform, chord)
-            )
-            force, turning = force - self._legs[-1].taken, turning + self._legs[-1].turning
-        lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self._pulls]
-        rows = [array_of(lines, len(lines), 6) @ ways, *(leg.lines for leg in self._legs)]
-        gaps = np.concatenate([np.full(len(lines), 0.0, dtype=object), *(leg.gap for leg in self._legs)])
-        roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods] + [leg.roots for leg in self._legs]
+            wrench = coordinates[start - size : start]
+            self.legs.append(CondensedLeg(leg, mechanism, row, wrench, self.platform, chord))
+            force, turning = force - self.legs[-1].taken, turning + self.legs[-1].turning
+        lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self.pulls]
+        along = array_of(lines, len(lines), 6) @ ways
+        self.lines = np.concatenate([along, *(leg.across for leg in self.legs)])
+        rows = [along, *(leg.lines for leg in self.legs)]
+        gaps = np.concatenate([np.full(len(lines), 0.0, dtype=object), *(leg.gap for leg in self.legs)])
+        roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods] + [leg.roots for leg in self.legs]
         self._solved = solve_condensed(np.concatenate(rows), block_diagonal(roots), turning, force, gaps)
         self.twist: Row = (ways @ self._solved.twist).tolist()
         self.step, self.motion, self._changes = self._steps(ways.T @ placed.screws[0].T)
@@ -296,8 +305,8 @@ class LegwiseTangent:
         """Steps of all coordinates and wrenches; those that are motions; and those of each leg's wrench."""
         # Slides come first among the coordinates, and last in the twist.
         moving = elimination(rates[::-1].tolist(), symmetric=False).solve(self._solved.twist[::-1].tolist())
-        step, motion, changes, place = [*moving], self._solved.twist.tolist(), [], len(self._pulls)
-        for leg in self._legs:
+        step, motion, changes, place = [*moving], self._solved.twist.tolist(), [], len(self.pulls)
+        for leg in self.legs:
             count = len(leg.gap)
             moved, wrench = leg.step(self._solved.twist, self._solved.changes[place : place + count])
             place += count
@@ -309,15 +318,15 @@ class LegwiseTangent:
     def stable(self) -> Scalar:
         """Whether the tangent stiffness is positive definite by a margin, and all ranks are sure."""
         good = self._solved.stable
-        for leg in self._legs:
+        for leg in self.legs:
             good = good & leg.sure
         return good
 
     def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
         """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""
         force, length = self.mechanism.force[0], self.mechanism.length[0]
-        loads = loads_of_rods(self._rods, self._pulls, self.twist, force)
-        holding = total([leg.holding(change) for leg, change in zip(self._legs, self._changes, strict=True)])
+        loads = loads_of_rods(self._rods, self.pulls, self.twist, force)
+        holding = total([leg.holding(change) for leg, change in zip(self.legs, self._changes, strict=True)])
         done = [spring for spring, _ in loads]
         for spring, load in zip(self.mechanism.driven, holding.tolist(), strict=True):
             if spring not in done:

@@ -55,12 +55,13 @@ class RodPull:
 def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
     """Compute the pull of a rod at a place of the platform, or in the free state if `platform` is None."""
     near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
-    at = far if platform is None else Vector(*platform.point(rod.far)[0])
-    span, rest = at - near, far - near
+    moved = ZERO if platform is None else Vector(*platform.shift(rod.far)[0])
+    at, rest = far + moved, far - near
+    span = at - near
     square, longer = span.dot(span), 0.0
     length = sqrt(square)
     if platform is not None:  # the difference of both lengths, without the round-off of their size
-        longer = (at - far).dot(span + rest) * (1.0 / (length + rest.norm()))
+        longer = moved.dot(span + rest) * (1.0 / (length + rest.norm()))
     stiffness = 1.0 / rod.softness
     tension, slack = (longer + rod.given) * stiffness, 0.0
     if rod.sign:

@@ -31,6 +31,7 @@ from kinetostat.engine.machine_functions import (
     quantities_at,
     sample_points,
 )
+from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
 from kinetostat.engine.trace import Body
@@ -50,6 +51,7 @@ from kinetostat.studies.commanding import actuator_targets
 from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import CLOSED, COMMANDED
 from kinetostat.units import KINDS
+from kinetostat.vibration.springwise import ModeCounts
 
 FILE_NAME = re.compile(r"[\w.-]+$", re.ASCII)
 TEMPLATES = Path(__file__).with_name("c")
@@ -60,6 +62,8 @@ STEPS_OF_COMMAND = 30
 NEARLY_COMMANDED, ASIDE = 1e-6, 1e-4
 """Correction, rad or in units of the machine's length, below which the rates of the loaded tool are computed if it only
 comes near its pose, and the displacement of the coordinates whose differences they are."""
+SWEEPS = 30
+"""Sweeps of Jacobi's rotations at most; ten are enough for hundreds of springs."""
 AGREED = 1e-10
 """Share of the largest number of its kind by which C and Python may differ in the test."""
 
@@ -154,8 +158,14 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     if functions.quantities:
         wanted = [((name, 1.0),) for name in functions.quantities]
         plan = plan_for(functions.machine, functions.quantities, functions.inputs)
-        yield _program(functions, "quantities_at", objectives_of(kind, form, wanted, closed=closed, plan=plan).body)
-        formula = objectives_of(kind, form, wanted, functions.inputs, closed, plan=plan)
+        counts = functions.mode_counts
+        if counts and counts.free:
+            yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
+        if counts and counts.at_rest:
+            yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
+        formula = objectives_of(kind, form, wanted, closed=closed, plan=plan, mode_counts=counts)
+        yield _program(functions, "quantities_at", formula.body)
+        formula = objectives_of(kind, form, wanted, functions.inputs, closed, plan=plan, mode_counts=counts)
         inputs = formula.inputs[: len(functions.inputs)]
         yield _program(functions, "quantity_slopes_at", with_gradients(formula.body, inputs))
 
@@ -190,6 +200,7 @@ def filled_template(functions: MachineFunctions, template: str, words: Mapping[s
         "rest": functions.rests,
         "loaded_forward": functions.square and functions.rests,
         "quantities": bool(functions.quantities),
+        "modes": functions.mode_counts is not None,
         "scale": functions.rests or bool(functions.quantities),
     }
     _, *pieces = re.split(r"/\* section: (\w+) \*/\n", (TEMPLATES / template).read_text("utf-8"))
@@ -217,15 +228,41 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         numbers |= {"STATES": functions.states, "STEPS_AT_REST": MOST_NEWTON_STEPS, "ONE_STEP_AWAY": ONE_STEP_AWAY}
         numbers |= {"COMMANDED": COMMANDED, "STEPS_OF_COMMAND": STEPS_OF_COMMAND}
         numbers |= {"NEARLY_COMMANDED": NEARLY_COMMANDED, "ASIDE": ASIDE}
+    if functions.mode_counts:
+        sizes = functions.springs
+        numbers |= {"WAYS": sizes.ways, "SPRINGS": sizes.springs, "CONDITIONS": sizes.conditions, "SWEEPS": SWEEPS}
     constants += [f"#define {name} {number!r}" for name, number in numbers.items()]
     words = {
         "note": note(functions, "Made by"),
         "constants": "\n".join(constants) + "\n",
         "programs": "\n".join(program.text for program in programs),
-        "rest_first": "double state[STATES];\n    rest_of(at, state);" if functions.needs_state else "",
-        "state": "state, " if functions.needs_state else "",
+        "rest_first": "\n    ".join(_state_lines(functions)),
+        "state": "state, " if functions.needs_state or functions.mode_counts else "",
     }
     return filled_template(functions, "source.c", words).replace("\n    \n", "\n")
+
+
+def _state_lines(functions: MachineFunctions) -> list[str]:
+    """Lines of C that find the state of which quantities are: of rest, then modes in the order of their columns."""
+    counts = functions.mode_counts or ModeCounts()
+    modes = counts.loaded + counts.factor + counts.free
+    if not (functions.needs_state or modes):
+        return []
+    rests = functions.states if functions.needs_state else 0
+    lines = [f"double state[{rests + modes * functions.springs.springs}];" if modes else "double state[STATES];"]
+    lines += ["rest_of(at, state);"] if rests else []
+    lines += ["double parts[PARTS];"] if modes else []
+    place = rests
+    for program, given, groups in (
+        ("springs_at_rest_at", "at, state, parts", ((counts.loaded, 1), (counts.factor, 0))),
+        ("springs_at", "at, parts", ((counts.free, 1),)),
+    ):
+        lines += [f"{program}({given});"] if any(count for count, _ in groups) else []
+        for count, massive in groups:
+            if count:
+                lines.append(f"modes_of(parts, {massive}, {count}, state + {place});")
+                place += count * functions.springs.springs
+    return lines
 
 
 def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:

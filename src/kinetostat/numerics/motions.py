@@ -43,6 +43,17 @@ class Motions:
         """Return points [n x 3] after the displacements."""
         return np.asarray(np.einsum("nij,nj->ni", self.rotation, points) + self.translation)
 
+    def shift(self, points: Array) -> Array:
+        """Return by how much points [n x 3] move, without the round-off of where they are.
+
+        The columns of a rotation are of length 1, so that small entries beside the diagonal tell what it lacks of 1.
+        """
+        turned = self.rotation - IDENTITY
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            aside = self.rotation[:, j, i] * self.rotation[:, j, i] + self.rotation[:, k, i] * self.rotation[:, k, i]
+            turned[:, i, i] = -aside / (1.0 + self.rotation[:, i, i])
+        return np.asarray(np.einsum("nij,nj->ni", turned, points) + self.translation)
+
     def twist(self, twists: Array) -> Array:
         """Return screws fixed in the bodies [n x 6] after the displacements (the adjoint map)."""
         turning = np.einsum("nij,nj->ni", self.rotation, twists[:, :3])
@@ -97,9 +108,12 @@ def along(twists: Array, amounts: Array) -> Motions:
         return Motions(np.eye(3)[None], of_scalars((moving * amount).components()))
     size = turning.norm()
     axis, moving, angle = turning * (1.0 / size), moving * (1.0 / size), size * amount
-    rotation = rotation_along(axis, cos(angle), sin(angle))
-    arm = axis.cross(moving)
-    shift = arm - rotation.apply(arm) + axis * (axis.dot(moving) * angle)
+    # By half of the angle, 1 - cos t has as many digits as t, and so have the shifts by small angles.
+    half = sin(0.5 * angle)
+    sine, rest = 2.0 * half * cos(0.5 * angle), 2.0 * half * half
+    rotation = rotation_along(axis, 1.0 - rest, sine, rest)
+    slid = axis * axis.dot(moving)
+    shift = slid * angle + (moving - slid) * sine + axis.cross(moving) * rest
     columns = [of_scalars(column.components())[0] for column in (rotation.x, rotation.y, rotation.z)]
     return Motions(np.stack(columns, axis=1)[None], of_scalars(shift.components()))
 

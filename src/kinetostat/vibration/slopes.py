@@ -100,12 +100,14 @@ class Vibrating:
         twist, *moved = [of_scalars([next(remaining) for _ in range(size)])[0] for size in self.sizes]
         forces = [mechanism.ways @ [next(remaining) for _ in range(self.sizes[0])] for _ in mechanism.legs]
         platform = mechanism.ways @ twist
-        kinetic = _energy(mechanism.platform, platform_rates(mechanism.platform, still(1)), platform, mechanism.length)
+        kinetic = energy_of(
+            mechanism.platform, platform_rates(mechanism.platform, still(1)), platform, mechanism.length
+        )
         strain, open_by = 0.0, 0.0
         amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
         for leg, motion, force in zip(mechanism.legs, moved, forces, strict=True):
             placed = leg.chain.place(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
-            kinetic = kinetic + _energy(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
+            kinetic = kinetic + energy_of(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
             kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
             ends = placed.screws[0].T @ (leg.chain.follows @ motion)
@@ -113,7 +115,7 @@ class Vibrating:
         return square + ratio * (kinetic - square * strain) + 2.0 * open_by
 
 
-def _energy(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
+def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
     """Twice the kinetic energy of some masses in a motion of their coordinates."""
     moving = [
         replace(part, moving=(part.moving @ motion)[..., None], turning=(part.turning @ motion)[..., None])

@@ -10,6 +10,7 @@ import math
 import zlib
 from base64 import urlsafe_b64encode
 from collections.abc import Sequence
+from dataclasses import asdict, replace
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -31,6 +32,7 @@ from kinetostat.engine.machine_functions import (
     functions_of,
     sample_points,
 )
+from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.printed import NOTATION, pack_graph
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
@@ -43,6 +45,7 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import CLOSED
 from kinetostat.units import KINDS
+from kinetostat.vibration.springwise import ModeCounts
 from kinetostat.views.page import whole_page
 from kinetostat.views.scene.anatomy import anatomy, proportions_of
 from kinetostat.views.scene.leg_solids import rail_ends
@@ -185,8 +188,12 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         "places": placement.body,
         "shares": functions.shares.formula.body,
     }
+    counts = functions.mode_counts or ModeCounts()
     if free:
-        bodies["quantities"] = objectives_of(kind, form, [((name, 1.0),) for name in free], closed=closed).body
+        wanted, known = [((name, 1.0),) for name in free], ModeCounts(free=counts.free) if counts.free else None
+        bodies["quantities"] = objectives_of(kind, form, wanted, closed=closed, mode_counts=known).body
+        if known:
+            bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
     if functions.square:
         body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
         bodies["slopes"] = with_gradients(body, placement.inputs)
@@ -195,7 +202,10 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         wanted = [((name, 1.0),) for name in (*DISPLACEMENTS, *loaded)]
         bodies["first"] = step_of(kind, form, closed, True).body
         bodies["step"] = step_of(kind, form, closed).body
-        bodies["loaded"] = objectives_of(kind, form, wanted, closed=closed).body
+        known = replace(counts, free=0) if counts.at_rest else None
+        bodies["loaded"] = objectives_of(kind, form, wanted, closed=closed, mode_counts=known).body
+        if known:
+            bodies["springsAtRest"] = spring_parts_of(kind, form, closed, at_rest=True).body
     return bodies
 
 
@@ -211,9 +221,10 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         rows.append({"name": label, "si": KINDS[kind].unit, "home": home, "low": home - span, "high": home + span})
     columns = sample_points(functions)
     points = np.array(list(columns.values())).T
+    shown = [(name, QUANTITIES[name]) for name in functions.quantities]
     quantities = [
-        {"name": name, "si": QUANTITIES[name].unit, "loaded": bool(QUANTITIES[name].loaded)}
-        for name in functions.quantities
+        {"name": name, "si": row.unit, "loaded": bool(row.loaded), "slow": functions.needs_modes(row)}
+        for name, row in shown
     ]
     forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
     rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY} if functions.rests else None
@@ -229,6 +240,7 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "length": functions.length,
         "forward": forward if functions.square else None,
         "rest": rest,
+        "springs": asdict(functions.mode_counts) | asdict(functions.springs) if functions.mode_counts else None,
         "samples": [_sample(functions, row.tolist()) for row in points],
         "file": as_toml(machine),
         "fileName": f"{stem}.toml",

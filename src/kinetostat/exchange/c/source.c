@@ -333,6 +333,155 @@ int machine_command(const machine_real in[], machine_real coordinates[])
     }
     return status == MACHINE_OK ? MACHINE_NOT_CONVERGED : status;
 }
+/* section: modes */
+
+enum { TRIANGLE = SPRINGS * (SPRINGS + 1) / 2, PARTS = (3 * WAYS + 2 * CONDITIONS) * SPRINGS + 2 * TRIANGLE };
+typedef double square_of_springs[SPRINGS][SPRINGS];
+
+static void transpose(square_of_springs matrix)
+{
+    for (int i = 0; i < SPRINGS; i++) {
+        for (int j = 0; j < i; j++) {
+            const double kept = matrix[i][j];
+            matrix[i][j] = matrix[j][i];
+            matrix[j][i] = kept;
+        }
+    }
+}
+
+/* A symmetric matrix over the springs without what would open a leg. It is T^T H + H^T T and its upper triangle D. */
+static void over_closed(const double *parts, const double *mixed, const double *upper, square_of_springs matrix)
+{
+    const double *closing = parts + 3 * WAYS * SPRINGS, *back = closing + CONDITIONS * SPRINGS;
+    for (int i = 0; i < SPRINGS; i++) {
+        for (int j = i; j < SPRINGS; j++) {
+            double sum = *upper++;
+            for (int k = 0; mixed && k < WAYS * SPRINGS; k += SPRINGS) {
+                sum += parts[k + i] * mixed[k + j] + mixed[k + i] * parts[k + j];
+            }
+            matrix[i][j] = matrix[j][i] = sum;
+        }
+    }
+    for (int side = 0; side < 2; side++) {
+        for (int i = 0; i < SPRINGS; i++) {
+            for (int c = 0; c < CONDITIONS; c++) {
+                double share = 0.0;
+                for (int j = 0; j < SPRINGS; j++) {
+                    share += matrix[i][j] * back[j * CONDITIONS + c];
+                }
+                for (int j = 0; j < SPRINGS; j++) {
+                    matrix[i][j] -= share * closing[c * SPRINGS + j];
+                }
+            }
+        }
+        transpose(matrix);
+    }
+}
+
+/* Jacobi's rotations: leaves the eigenvalues on the diagonal, and eigenvectors as rows of `axes`. */
+static void rotate_to_axes(square_of_springs matrix, square_of_springs axes)
+{
+    double whole = 0.0;
+    for (int i = 0; i < SPRINGS; i++) {
+        for (int j = 0; j < SPRINGS; j++) {
+            axes[i][j] = i == j;
+            whole += matrix[i][j] * matrix[i][j];
+        }
+    }
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        double beside = 0.0;
+        for (int p = 0; p < SPRINGS; p++) {
+            for (int q = p + 1; q < SPRINGS; q++) {
+                beside += matrix[p][q] * matrix[p][q];
+                if (matrix[p][q] == 0.0) {
+                    continue;
+                }
+                const double apart = matrix[q][q] - matrix[p][p], coupling = matrix[p][q];
+                const double size = fabs(apart) + sqrt(apart * apart + 4.0 * coupling * coupling);
+                const double tangent = (apart < 0.0 ? -2.0 : 2.0) * coupling / size;
+                const double cosine = 1.0 / sqrt(1.0 + tangent * tangent), sine = tangent * cosine;
+                for (int k = 0; k < SPRINGS; k++) {
+                    const double a = matrix[p][k], b = matrix[q][k], c = axes[p][k], d = axes[q][k];
+                    matrix[p][k] = cosine * a - sine * b;
+                    matrix[q][k] = sine * a + cosine * b;
+                    axes[p][k] = cosine * c - sine * d;
+                    axes[q][k] = sine * c + cosine * d;
+                }
+                for (int k = 0; k < SPRINGS; k++) {
+                    const double a = matrix[k][p], b = matrix[k][q];
+                    matrix[k][p] = cosine * a - sine * b;
+                    matrix[k][q] = sine * a + cosine * b;
+                }
+            }
+        }
+        if (!(beside > 1e-32 * whole)) {
+            break;
+        }
+    }
+}
+
+/* Modes of springs in which the least stiffness, or the most mass for it, takes part; NaN where nothing holds them. */
+static void modes_of(const double *parts, int massive, int count, double *modes)
+{
+    square_of_springs stiff, heavy, axes;
+    const double *twists = parts, *pushed = twists + WAYS * SPRINGS, *turned = pushed + WAYS * SPRINGS;
+    const double *masses = parts + PARTS - 2 * TRIANGLE, *stiffness = masses + TRIANGLE;
+    double ones[TRIANGLE];
+    for (int i = 0, entry = 0; i < SPRINGS; i++) {
+        for (int j = i; j < SPRINGS; j++) {
+            ones[entry++] = i == j;
+        }
+    }
+    over_closed(parts, turned, stiffness, stiff);
+    over_closed(parts, massive ? pushed : 0, massive ? masses : ones, heavy);
+    for (int i = 0; i < SPRINGS; i++) {
+        stiff[i][i] += 1.0;
+    }
+    for (int i = 0; i < SPRINGS; i++) {
+        for (int j = 0; j <= i; j++) {
+            for (int k = 0; k < j; k++) {
+                stiff[i][j] -= stiff[i][k] * stiff[j][k];
+            }
+            if (j < i) {
+                stiff[i][j] /= stiff[j][j];
+            }
+        }
+        if (!(stiff[i][i] > 0.0)) {
+            for (int k = 0; k < count * SPRINGS; k++) {
+                modes[k] = NAN;
+            }
+            return;
+        }
+        stiff[i][i] = sqrt(stiff[i][i]);
+    }
+    /* With the factor L of the stiffness: rows times its inverse, twice. */
+    for (int side = 0; side < 2; side++) {
+        for (int i = 0; i < SPRINGS; i++) {
+            for (int j = 0; j < SPRINGS; j++) {
+                for (int k = 0; k < j; k++) {
+                    heavy[i][j] -= heavy[i][k] * stiff[j][k];
+                }
+                heavy[i][j] /= stiff[j][j];
+            }
+        }
+        transpose(heavy);
+    }
+    rotate_to_axes(heavy, axes);
+    for (int n = 0; n < count; n++, modes += SPRINGS) {
+        int most = 0;
+        for (int i = 1; i < SPRINGS; i++) {
+            most = heavy[i][i] > heavy[most][most] ? i : most;
+        }
+        heavy[most][most] = -HUGE_VAL;
+        for (int i = SPRINGS - 1; i >= 0; i--) {
+            modes[i] = axes[most][i];
+            for (int k = i + 1; k < SPRINGS; k++) {
+                modes[i] -= stiff[k][i] * modes[k];
+            }
+            modes[i] /= stiff[i][i];
+        }
+    }
+}
 /* section: quantities */
 
 int machine_quantities(const machine_real in[], machine_real quantities[], machine_real *slopes)

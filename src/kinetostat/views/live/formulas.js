@@ -155,7 +155,9 @@ async function inflated(text) {
 async function functionsOf({ format, data, packed }) {
   if (format !== FORMAT) throw new Error("it is of another version of kinetostat");
   const programs = {}, alone = new Map(), inputs = data.inputs.length;
-  const statesOf = (name) => (data.rest && ["step", "loaded"].includes(name) ? data.rest.states : 0);
+  const { springs } = data;
+  const statesOf = (name) => (data.rest && ["step", "springsAtRest", "loaded"].includes(name) ? data.rest.states : 0)
+    + (springs ? springs.springs * ({ quantities: springs.free, loaded: springs.loaded + springs.factor }[name] ?? 0) : 0);
   const rows = Object.fromEntries(Object.entries(packed).map(([name, program]) => [name, unpacked(program, inputs + statesOf(name))]));
   const make = (name, wanted) => compiled(rows[name], wanted, inputs, statesOf(name));
   await Promise.all(Object.entries(rows).map(async ([name, { results }]) => { programs[name] = await make(name, [...results.slice(0, -1).keys()]); }));
@@ -176,6 +178,87 @@ function restOf(point, rest, programs) {
     programs.step(point, next, state);
   }
   return next;
+}
+
+// What the programs of quantities take after a point: coordinates of the state of rest, then modes over springs.
+function stateOf(name, point, { rest, springs }, programs) {
+  const state = name === "loaded" ? [...restOf(point, rest, programs).subarray(0, rest.states)] : [];
+  for (const [program, count, massive] of springs ? { quantities: [["springs", springs.free, true]],
+    loaded: [["springsAtRest", springs.loaded, true], ["springsAtRest", springs.factor, false]] }[name] : []) {
+    if (!count) continue;
+    const parts = new Float64Array((3 * springs.ways + 2 * springs.conditions) * springs.springs + springs.springs * (springs.springs + 1));
+    programs[program](point, parts, state);
+    for (const mode of modesOf(parts, springs, count, massive)) for (const part of mode) state.push(part);
+  }
+  return state;
+}
+
+// Modes of springs in which the least stiffness, or the most mass for it, takes part; NaN where nothing holds them.
+function modesOf(parts, { ways, springs: n, conditions }, count, massive) {
+  const each = Array.from({ length: n }, (_, i) => i), square = () => each.map(() => new Float64Array(n));
+  const closing = 3 * ways * n, back = closing + conditions * n, triangle = (n * (n + 1)) / 2, masses = parts.length - 2 * triangle;
+  const transpose = (matrix) => { for (const i of each) for (let j = 0; j < i; j++) [matrix[i][j], matrix[j][i]] = [matrix[j][i], matrix[i][j]]; };
+  // A symmetric matrix without what would open a leg: T^T H + H^T T and its upper triangle.
+  const overClosed = (mixed, upper) => {
+    const matrix = square();
+    for (let i = 0, entry = upper; i < n; i++) for (let j = i; j < n; j++, entry++) {
+      let sum = upper < 0 ? Number(i === j) : parts[entry];
+      for (let k = 0; mixed > 0 && k < ways * n; k += n) sum += parts[k + i] * parts[mixed + k + j] + parts[mixed + k + i] * parts[k + j];
+      matrix[i][j] = matrix[j][i] = sum;
+    }
+    for (let side = 0; side < 2; side++) {
+      for (const row of matrix) for (let c = 0; c < conditions; c++) {
+        let share = 0;
+        for (const j of each) share += row[j] * parts[back + j * conditions + c];
+        for (const j of each) row[j] -= share * parts[closing + c * n + j];
+      }
+      transpose(matrix);
+    }
+    return matrix;
+  };
+  const stiff = overClosed(2 * ways * n, masses + triangle), heavy = massive ? overClosed(ways * n, masses) : overClosed(0, -1);
+  for (const i of each) {
+    stiff[i][i] += 1;
+    for (let j = 0; j <= i; j++) {
+      for (let k = 0; k < j; k++) stiff[i][j] -= stiff[i][k] * stiff[j][k];
+      if (j < i) stiff[i][j] /= stiff[j][j];
+    }
+    if (!(stiff[i][i] > 0)) return Array.from({ length: count }, () => new Float64Array(n).fill(NaN));
+    stiff[i][i] = Math.sqrt(stiff[i][i]);
+  }
+  for (let side = 0; side < 2; side++) {
+    for (const row of heavy) for (const j of each) {
+      for (let k = 0; k < j; k++) row[j] -= row[k] * stiff[j][k];
+      row[j] /= stiff[j][j];
+    }
+    transpose(heavy);
+  }
+  const axes = square();
+  let whole = 0;
+  for (const i of each) { axes[i][i] = 1; for (const part of heavy[i]) whole += part * part; }
+  for (let sweep = 0, beside = Infinity; sweep < 30 && beside > 1e-32 * whole; sweep++) {
+    beside = 0;
+    for (let p = 0; p < n; p++) for (let q = p + 1; q < n; q++) {
+      const coupling = heavy[p][q], apart = heavy[q][q] - heavy[p][p];
+      beside += coupling * coupling;
+      if (coupling === 0) continue;
+      const tangent = ((apart < 0 ? -2 : 2) * coupling) / (Math.abs(apart) + Math.sqrt(apart * apart + 4 * coupling * coupling));
+      const cosine = 1 / Math.sqrt(1 + tangent * tangent), sine = tangent * cosine;
+      const turn = (one, a, other, b) => { [one[a], other[b]] = [cosine * one[a] - sine * other[b], sine * one[a] + cosine * other[b]]; };
+      for (const k of each) { turn(heavy[p], k, heavy[q], k); turn(axes[p], k, axes[q], k); }
+      for (const k of each) turn(heavy[k], p, heavy[k], q);
+    }
+  }
+  return Array.from({ length: count }, () => {
+    const most = each.reduce((best, i) => (heavy[i][i] > heavy[best][best] ? i : best), 0), mode = new Float64Array(n);
+    heavy[most][most] = -Infinity;
+    for (let i = n - 1; i >= 0; i--) {
+      mode[i] = axes[most][i];
+      for (let k = i + 1; k < n; k++) mode[i] -= stiff[k][i] * mode[k];
+      mode[i] /= stiff[i][i];
+    }
+    return mode;
+  });
 }
 
 // The pose at which the actuators stand as wanted, from a pose nearby; undefined where Newton's method finds none.

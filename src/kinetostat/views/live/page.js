@@ -34,10 +34,13 @@ function openMachine({ data, programs, result }) {
   const angle = (value) => (Math.abs(value) > 1e6 ? Math.atan2(Math.sin(value), Math.cos(value)) : value);
   const prepared = (values) => values.map((value, k) => (inputs[k].si === "rad" ? angle(value) : value));
   const answer = (values) => programs.answers(prepared(values), answers);
-  const number = (values) => (free.length ? programs.quantities(prepared(values), numbers) : 0);
+  const number = (values) => {
+    const point = prepared(values);
+    return free.length ? programs.quantities(point, numbers, stateOf("quantities", point, data, programs)) : 0;
+  };
   const answerAtRest = (values) => {
     const point = prepared(values);
-    return programs.loaded(point, loaded, restOf(point, rest, programs));
+    return programs.loaded(point, loaded, stateOf("loaded", point, data, programs));
   };
   const place = (values) => { programs.places(prepared(values), places); return places; };
   const placeOf = (matrix, i, j) => {
@@ -191,16 +194,17 @@ function openMachine({ data, programs, result }) {
 
   const picture = pictureOf($("picture"), data, actuators.length);
 
-  // The map: a quantity over two inputs, the others as they are, by the part of its program that gives it alone.
+  // The map: a quantity over two inputs, the others as they are, by the part of its program that gives it alone. Quantities for
+  // which modes are looked for at each point take too long.
   const described = ({ name, si }) => ({ label: spaced(name), unit: si === "1" ? "" : unit(si)[1], factor: unit(si)[0] });
   const mapped = [
     ...["K", "C"].flatMap((name) => data.components.map((k) => {
       const [factor, word] = BLOCKS[name][block(k, k)];
       return { label: `${name} ${NAMES[k]}`, unit: word, factor, of: ["answers", placeOf(name, k, k)] };
     })),
-    ...free.map((quantity, k) => ({ ...described(quantity), of: ["quantities", k] })),
-    ...quantities.filter((quantity) => quantity.loaded).map((quantity, k) => ({ ...described(quantity), of: ["loaded", 6 + k] })),
-  ];
+    ...free.map((quantity, k) => ({ ...described(quantity), of: ["quantities", k], slow: quantity.slow })),
+    ...quantities.filter((quantity) => quantity.loaded).map((quantity, k) => ({ ...described(quantity), of: ["loaded", 6 + k], slow: quantity.slow })),
+  ].filter(({ slow }) => !slow);
   const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const CELLS = 41;
   function paint(share) {
