@@ -65,7 +65,7 @@ class Way(Enum):
     straight cables, which follow from where the platform is.
     """
 
-    ANY_MACHINE = 256
+    ANY_MACHINE = 512
     MODES = 768
     COLUMNS = 4096
     CABLES = 2048
