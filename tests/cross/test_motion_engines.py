@@ -13,7 +13,7 @@ import pytest
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.mjcf import text_of
 from kinetostat.exchange.mjcf_model import build
-from kinetostat.exchange.mjcf_pace import LIGHT
+from kinetostat.exchange.mjcf_pace import LIGHT_SHARE
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.studies.analysis import analyze
@@ -108,7 +108,7 @@ def with_even_struts(text):
             ElementTree.SubElement(middle, "joint", joint)
             follows = {"joint1": middle.get("name"), "joint2": slide.get("name"), "polycoef": "0 0.5 0 0 0"}
             ElementTree.SubElement(closing, "joint", follows)
-            shares = {near: 0.1 * LIGHT, far: 0.1 * LIGHT, tip: 1.0 / 6.0, middle: 4.0 / 6.0}
+            shares = {near: 0.1 * LIGHT_SHARE, far: 0.1 * LIGHT_SHARE, tip: 1.0 / 6.0, middle: 4.0 / 6.0}
             for body, share in shares.items():
                 for inertial in body.findall("inertial"):
                     body.remove(inertial)
@@ -133,7 +133,7 @@ class Engine:
         known = self.model.body_mass[1:].sum()
         for body in range(1, self.model.nbody):
             name = self.model.body(body).name
-            if self.model.body_mass[body] < 2.0 * LIGHT * known:
+            if self.model.body_mass[body] < 2.0 * LIGHT_SHARE * known:
                 self.model.body_mass[body], self.model.body_inertia[body] = 0.0, 0.0
             elif not name.startswith(("platform", "mass")) and not machine.family.members:
                 self.model.body_inertia[body, np.argmin(self.model.body_inertia[body])] = 0.0  # rods do not spin
