@@ -91,18 +91,16 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
         configuration: the configuration of a machine in closed form, over floats or columns.
     """
     senses: list[Scalar] = []
-    for number, leg in enumerate(configuration.legs):
-        for place, spring in enumerate(leg.chain):
-            if not (isinstance(spring, Spring) and spring.actuated):
-                continue
+    for leg in configuration.legs:
+        own = [(place, part) for place, part in enumerate(leg.chain) if isinstance(part, Spring) and part.actuated]
+        # What an actuator of a leg measures depends on this leg and the platform alone.
+        here = actuators_of(replace(configuration, legs=(leg,))) if own else []
+        for number, (place, spring) in enumerate(own):
             ahead, motion = spring.moved(AHEAD)
             behind = [element.displaced(motion) for element in leg.chain[place + 1 :]]
             moved = replace(leg, chain=(*leg.chain[:place], ahead, *behind))
-            legs = (*configuration.legs[:number], moved, *configuration.legs[number + 1 :])
-            there = replace(configuration, platform=motion @ configuration.platform, legs=legs)
-            pairs = zip(actuators_of(configuration), actuators_of(there), strict=True)
-            changes = [np.asarray(b.coordinate, dtype=float) - a.coordinate for a, b in pairs]
-            senses.append(np.sign(changes[len(senses)]))
+            there = actuators_of(replace(configuration, platform=motion @ configuration.platform, legs=(moved,)))
+            senses.append(np.sign(np.asarray(there[number].coordinate, dtype=float) - here[number].coordinate))
     return senses
 
 
