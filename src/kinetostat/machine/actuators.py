@@ -92,10 +92,10 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
     """
     senses: list[Scalar] = []
     for leg in configuration.legs:
-        own = [(place, part) for place, part in enumerate(leg.chain) if isinstance(part, Spring) and part.actuated]
+        driven = [(place, part) for place, part in enumerate(leg.chain) if isinstance(part, Spring) and part.actuated]
         # What an actuator of a leg measures depends on this leg and the platform alone.
-        here = actuators_of(replace(configuration, legs=(leg,))) if own else []
-        for number, (place, spring) in enumerate(own):
+        here = actuators_of(replace(configuration, legs=(leg,))) if driven else []
+        for number, (place, spring) in enumerate(driven):
             ahead, motion = spring.moved(AHEAD)
             behind = [element.displaced(motion) for element in leg.chain[place + 1 :]]
             moved = replace(leg, chain=(*leg.chain[:place], ahead, *behind))
