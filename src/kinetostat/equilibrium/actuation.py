@@ -24,6 +24,7 @@ from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import BALANCED, COMMANDED, UNRESISTED
 
 MOST_CORRECTIONS = 12
+"""Greatest number of Newton's steps towards a command."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def _solution(matrices: Array, right: Array) -> Array:
 
 
 def _tensions(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
-    """The same of any machine, pose by pose."""
+    """Loads of all coordinates of any machine, and where there are any within the bounds, pose by pose."""
     equations, count = balance(mechanism, free_state(mechanism)), len(least)
     chosen = [_tensions_at(equations, i, float(least[i]), float(most[i]), rule.at(np.array([i]))) for i in range(count)]
     nothing = np.zeros(sum(leg.size for leg in mechanism.legs))

@@ -1,8 +1,7 @@
-"""Links of a family that have a mass: what people call them, where their cross-section may stand, where they are.
+"""Links of a family that have a mass: their names, the fields for their cross-section, their lengths and places.
 
-What they weigh together is the business of `loads`; links of machines written leg by leg are in their files.
-
-Points are in the base frame.
+Points are in the base frame. `loads` adds up what links weigh. The links of a machine written leg by leg are in its
+file, and not here.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +19,8 @@ from kinetostat.units import KINDS
 
 Ends = Callable[[], tuple[Station, ...]]
 Placed = tuple[str, str, Scalar, Ends]
-"""A link: its leg, or nothing if it belongs to none, its name, its length (m), and what gives both ends of its axis."""
+"""A link: its leg, empty if it belongs to none; its name; its length, m; and a function that gives the ends of its
+axis."""
 Lengths = Callable[[Sequence[Leg], Vector, Any], list[Placed]]
 """From the legs at a pose, P (base frame, m) and the table `geometry` to each link."""
 
@@ -32,8 +32,8 @@ class LinkKind:
     Attributes:
         name: their field in the tables about links.
         rigidities: fields of [stiffness] in which their cross-section may be written.
-        lengths: gives the length and the place of each of them.
-        count: how many entries those fields have; None where one is for all links.
+        lengths: function that gives the length and the place of each link.
+        count: number of entries of those fields; None where one entry is for all links.
     """
 
     name: str
@@ -50,7 +50,7 @@ LINK_TABLES = {
 }
 """Tables with one number for each kind of links, all of which may be left out: kind of quantity, and what it means."""
 OF_CROSS_SECTIONS = ("linear_density", "bending_rigidity", "expansion")
-"""Those that a cross-section with its material gives."""
+"""Tables whose numbers follow from a cross-section with its material."""
 
 
 def link_tables(kinds: Sequence[LinkKind]) -> dict[str, type]:
@@ -70,8 +70,8 @@ def growth_of(expansion: Scalar, rise: Scalar, links: str) -> Scalar:
 
     Args:
         expansion: 1/K; 0 where it is not known.
-        rise: how much warmer the link is, K.
-        links: names it in the message.
+        rise: temperature of the link above that at which it was built, K.
+        links: name of the links in the message.
 
     Raises:
         InputError: a number says that it is warmer, and nothing says how its material grows.
@@ -99,8 +99,8 @@ def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> t
 
     Args:
         leg: the leg.
-        segment: which piece from the base; None for the whole path.
-        bar: which bar of the parallelogram that the piece is; None where it is none.
+        segment: number of the piece from the base, from 0; None for the whole path.
+        bar: number of the bar, from 0, if the piece is a parallelogram; otherwise None.
     """
     stations, first = leg.stations, leg.chain[0]
     foot = first.joint.point if isinstance(first, Spring) else None
@@ -119,10 +119,10 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
     """Links of the actuated legs, as long as a field of [geometry] says, of all or of each; in pairs where `bars` is 2.
 
     Args:
-        what: they are called.
+        what: name of the links.
         field: the field with their length.
-        segment: which piece of the leg's path from the base they are, counted from 0.
-        bars: side by side.
+        segment: number of their piece of the leg's path from the base, from 0.
+        bars: number of links side by side.
     """
 
     def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:

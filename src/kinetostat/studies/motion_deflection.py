@@ -1,6 +1,7 @@
 """Deflections of the tool along a motion: those of all springs pose by pose, and of the modes that the motion excites.
 
-Motors stand where they should; the tool deflects by the wrench that masses, process and joints ask for there.
+Motors stand where they should. The tool deflects by the wrench at the tool point that the acceleration of masses, the
+process and the friction of joints demand.
 
 Source: theory section 20.
 """
@@ -35,10 +36,10 @@ class ModesAlong:
     """The modes of a machine along a motion, beside what springs do at rest under the same forces.
 
     Attributes:
-        frequency: of the lowest mode with motors that stand still, Hz.
+        frequency: frequency of the lowest mode while motors stand still, Hz.
         modes: frequencies of the modes that the motion excites, Hz; none where springs follow it as at rest.
-        times: at which the tool is looked at, s [steps].
-        surplus: what the tool deflects beyond the deflection at rest [steps x 6], rad and m.
+        times: times at which the deflection is known, s [steps].
+        surplus: deflection of the tool beyond that at rest under the same forces [steps x 6], rad and m.
         after: greatest displacement of the tool point after the end of the motion, m; 0 of one that goes on for ever.
     """
 
@@ -74,10 +75,10 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
     """Follow the modes of a machine at its pose along a motion.
 
     Args:
-        state: of the machine.
-        form: of its equations.
-        motion: begins and ends at rest, or goes on for ever.
-        wrench: at the tool point at each point of it [6 x n], N·m and N.
+        state: the state of the machine.
+        form: the form of its equations of motion.
+        motion: a motion that begins and ends at rest, or goes on for ever.
+        wrench: wrench at the tool point at each point of the motion [6 x n], N·m and N.
 
     Returns:
         None where no mode is known, or the motion takes no time.
@@ -126,10 +127,10 @@ def swings_under(loads: Array, rates: Array, ratios: Array, step: float, before:
     from one time to the next.
 
     Args:
-        loads: p of each [m x n].
-        rates: omega of each, rad/s [m].
-        ratios: zeta of each [m].
-        step: between the times, s.
+        loads: load p of each swing [m x n].
+        rates: angular frequency omega of each, rad/s [m].
+        ratios: damping ratio zeta of each [m].
+        step: time from one load to the next, s.
         before: loads under which all is at rest before the first time [m]; None if the loads go on for ever.
 
     Returns:

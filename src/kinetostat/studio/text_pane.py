@@ -108,10 +108,10 @@ class TextPane:
         self._text = ""
         self._typed: Machine | None = None
         self._place = 0
-        self._readings = Lane(self._read, self._take)
-        self._texts = Lane(self._write, self._put)
+        self._readings = Lane(reading, self._take_reading)
+        self._texts = Lane(self._text_of, self._put)
         self.editor = TextEditor("machine file").mark("text")
-        self.editor.on("edit", self._edit).on("place", self._go)
+        self.editor.on("edit", self._edit).on("place", self._follow_cursor)
         with ui.element("div").classes("text-foot").props('role="status" aria-live="polite"'):
             self.message = ui.html("", sanitize=False).classes("grow").mark("text-message")
             self.back = ui.button("Undo the mistake", on_click=self._discard).props("flat dense no-caps")
@@ -136,7 +136,7 @@ class TextPane:
         for lane in (self._readings, self._texts):
             lane.close()
 
-    def _write(self, _machine: Machine) -> str:
+    def _text_of(self, _machine: Machine) -> str:
         return self._session.as_file()[1].decode()
 
     def _put(self, machine: Machine, text: str) -> None:
@@ -153,10 +153,8 @@ class TextPane:
         self._text = str(event.args)
         self._readings.ask(self._text)
 
-    def _read(self, text: str) -> Reading:
-        return reading(text)
-
-    def _take(self, text: str, result: Reading) -> None:
+    def _take_reading(self, text: str, result: Reading) -> None:
+        """Show a machine that was typed, or the mistake in its text, unless the text has changed meanwhile."""
         if text != self._text:
             return
         self.back.set_visibility(result.machine is None)
@@ -165,12 +163,14 @@ class TextPane:
             self._load(result.machine)
         self._say(result)
 
-    def _go(self, event: GenericEventArguments) -> None:
+    def _follow_cursor(self, event: GenericEventArguments) -> None:
+        """Explain the field in which the cursor is."""
         self._place = int(event.args)
         if not self.back.visible:
             self._say(Reading(self._session.machine))
 
     def _say(self, result: Reading) -> None:
+        """Show a mistake and mark its line, or explain the field in which the cursor is."""
         self.editor.mark_line(result.line)
         if result.machine is None:
             text = f'<p class="text-problem">{escape(result.mistake)} {WRONG}</p>'

@@ -35,8 +35,12 @@ from kinetostat.views.figures import (
 from kinetostat.views.grid import frequent_sets, quantities_of
 from kinetostat.views.question import Drawing
 
-ROW = 0.17
-"""Inches of a line below the map."""
+LEGEND_ROW = 0.17
+"""Height of a line of the legend below a map, inches."""
+NO_RESULT_COLOUR = "#dddddd"
+"""Colour behind poses that have no result."""
+MOST_DOTS = 60
+"""Number of poses up to which each is marked with a dot."""
 
 
 def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
@@ -78,7 +82,7 @@ def carrying_map(carrying: Carrying, title: str) -> Figure:
     across, up = (str(dim) for dim in dataset["status"].dims)
     named = [f"{name}: {100.0 * n / dataset['status'].size:.0f} %" for name, n in frequent_sets(carrying)]
     colours = region_colours(max(len(named), 1))
-    with new_figure((4.6, 4.4 + ROW * len(named)), title) as figure:
+    with new_figure((4.6, 4.4 + LEGEND_ROW * len(named)), title) as figure:
         panel = figure.subplots()
         (x, x_label), (y, y_label) = axis_values(dataset, across), axis_values(dataset, up)
         codes = dataset["carrying"].transpose(up, across).values
@@ -86,18 +90,12 @@ def carrying_map(carrying: Carrying, title: str) -> Figure:
         panel.set(xlabel=x_label, ylabel=y_label)
         set_axis_scales(panel, dataset, across, up)
         if panel.get_aspect() == 1.0:
-            figure.set_figheight(1.5 + ROW * len(named) + 3.6 * float(np.ptp(y) / np.ptp(x)))
+            figure.set_figheight(1.5 + LEGEND_ROW * len(named) + 3.6 * float(np.ptp(y) / np.ptp(x)))
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
         patches += [Patch(color="#eeeeee", label="no result")] if (codes < 0).any() else []
         about = "\n".join(line for line in setting_lines(dataset) if line)
         figure.legend(handles=patches, loc="outside lower center", ncols=1, title=about, title_fontsize=6.5)
     return figure
-
-
-ABSENT = "#dddddd"
-"""Behind poses that have no result."""
-FEW = 60
-"""Poses up to which each is marked with a dot."""
 
 
 def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
@@ -126,19 +124,19 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
             every = (v for name in members for v in answers.values[name])
             scale = answers.machine.display.fitting(unit, every)
             curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
-            _panel(panel, answers, curves, scale.label(plain_name(group_of(members) or members[0])))
+            _draw_panel(panel, answers, curves, scale.label(plain_name(group_of(members) or members[0])))
         for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
             shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
             scale = answers.machine.display.scale(shown[0][0].unit)
-            _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
+            _draw_panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
         panels[-1].set_xlabel("pose")
     return figure
 
 
-def _panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: str) -> None:
+def _draw_panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: str) -> None:
     numbers = np.arange(1, answers.poses.count + 1)
     _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
-    marker = "." if len(numbers) <= FEW else ""
+    marker = "." if len(numbers) <= MOST_DOTS else ""
     for place, (name, values) in enumerate(curves.items()):
         finite = np.where(np.isfinite(values), values, np.nan)
         panel.plot(numbers, finite, marker=marker, label=name, **look_of(place))
@@ -148,13 +146,14 @@ def _panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: s
 
 
 def _shade(panel: Axes, numbers: Integers) -> None:
-    """Shade runs of poses."""
+    """Shade the poses of these numbers; neighbours share one strip."""
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
         if len(run):
-            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=ABSENT, linewidth=0.0)
+            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=NO_RESULT_COLOUR, linewidth=0.0)
 
 
 def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
+    """The lines below the title: numbers that differ from the file, loads left out, and poses without a result."""
     counts = {status: len(numbers) for status, numbers in answers.failures.items()}
     missing = missing_line(counts, answers.poses.count, " (grey)")
     return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing
