@@ -233,9 +233,9 @@ def objectives_of(
         response = replace(response, frequencies=squares, status=status)
     elif modes:
         vibration = vibrating(given.machine, response, joints, modes)
-        known = new_inputs(given.graph, vibration.columns)
-        coordinates = (*coordinates, *known)
-        response = replace(response, frequencies=lowest_frequencies(vibration.squares(known)))
+        unknowns = new_inputs(given.graph, vibration.columns)
+        coordinates = (*coordinates, *unknowns)
+        response = replace(response, frequencies=lowest_frequencies(vibration.squares(unknowns)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     names = [name for weights in objectives for name, _ in weights]

@@ -292,7 +292,9 @@ class RestFill:
             count: number of points.
         """
         rows = np.arange(count)
-        for _ in range(MOST_CHORD_STEPS if self._chord else 0):
+        for _ in range(MOST_CHORD_STEPS):
+            if self._chord is None:
+                break
             states, after = (part[self._count :, :count] for part in memory)
             every = len(rows) == count
             at, here = (states, given) if every else (states.take(rows, axis=1), [part[rows] for part in given])
