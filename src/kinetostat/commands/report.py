@@ -52,11 +52,21 @@ def add_report_commands(commands: "Commands") -> None:
     takes_json(reproduce)
 
 
+NEEDS = """\
+what formats need:
+c, mex, linuxcnc, fmu, page, link: legs with closed forms (three parallel revolutes, or a ball joint at an end).
+klipper, reprapfirmware: coordinates x, y and z in the pose, and a load; klipper a rest at all points as well.
+modes, state-space, mjcf-vibration: something that has a mass.
+nastran, abaqus, ansys: a machine that is rigid in no direction.
+An export that a machine cannot fill says so in a sentence and writes nothing."""
+
+
 def _add_export_command(commands: "Commands") -> None:
     command = add_command(
         commands, "export", _export, "write the machine or its results for other programs",
         "kinetostat export tripteron --to mjcf -o tripteron.xml",
     )  # fmt: skip
+    command.epilog = f"{NEEDS}\n\n{command.epilog}"
     takes_machine(command)
     command.add_argument(
         "--to",

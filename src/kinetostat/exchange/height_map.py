@@ -17,7 +17,7 @@ from kinetostat.engine.points import PointTable
 from kinetostat.exchange.formats import ascii_line
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.parameters import values
+from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid import usual_ranges
@@ -151,8 +151,12 @@ def height_map(analysis: Analysis, over: Sequence[str]) -> HeightMap:
         InputError: nothing loads the machine, other axes than x and y, fewer than three points along one, or no rest.
     """
     machine = analysis.machine
-    if HEIGHT not in values(machine):
-        raise InputError(f"{machine.name} has no coordinate z that a map of heights could correct.")
+    missing = [path.removeprefix(POSE) for path in (ACROSS, UPWARDS, HEIGHT) if path not in values(machine)]
+    if missing:
+        raise InputError(
+            f"The pose of {machine.name} has no {' and no '.join(missing)}, and a map of heights corrects z over x and "
+            "y; kinetostat command computes the corrections of any pose."
+        )
     pairs = chosen_axes(machine, over or usual_ranges(machine, POINTS))
     grid = grid_of(pairs)
     axes = {path: axis.values for axis in grid.axes for path in axis.paths}
@@ -172,7 +176,7 @@ def height_map(analysis: Analysis, over: Sequence[str]) -> HeightMap:
         raised = np.where(answers.status == Status.OK, -sag, np.nan)
     if not np.isfinite(raised).any():
         raise InputError("At no point of these ranges is the machine at rest; choose other ranges with --over.")
-    if not np.any(raised):
+    if not np.nan_to_num(raised).any():
         raise InputError(
             "Nothing loads the machine, so that no height needs a correction; give it a load, for instance "
             "with --set tool.mass=\"2 kg\" --set 'load.gravity=[0, 0, -9.81]'."
