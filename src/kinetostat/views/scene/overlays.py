@@ -77,7 +77,7 @@ def softest_solids(principal: Mapping[str, Principal], point: Vector, sizes: Pro
     """Draw arrows along and about the softest directions of translation and rotation."""
     solids = []
     for block, axes in principal.items():
-        if not axes.compliances.size or axes.compliances[-1] <= 0.0:
+        if not len(axes.compliances) or axes.compliances[-1] <= 0.0:
             continue
         axis = Vector(*axes.directions[-1])
         solids += _direction_solids(f"softest {block}", f"soft {block}", block == "rotation", axis, point, sizes)
