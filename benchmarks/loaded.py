@@ -2,27 +2,31 @@
 
 Both take turns, so that a busy machine slows both; each counts by its best turn, in processor time of all cores.
 Unloaded: diagonals of C and K. Loaded: at rest under gravity, displacement of the tool and tangent stiffness with all
-other motions free, twelve numbers as well.
+other motions free, twelve numbers as well. Instructions are counted by valgrind for the first mass of each machine.
 
     python benchmarks/loaded.py > docs/measured/loaded.md
 """
 
-import os
-import platform
+import sys
 import time
-from datetime import date
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from cases import CASES, TWELVE, Array
+from conditions import conditions
+from instructions import compile_for_valgrind, count, per_pose
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.engine.batch import available_cores, evaluate
+from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
-from kinetostat.studies.diagnosis import processor
+from kinetostat.machine.machine import Machine
 
 LOADED = (*(f"displacement_{c}" for c in COMPONENTS), *(f"tangent_free_stiffness_{c}" for c in COMPONENTS))
 POSES, TURNS = 100_000, 6
+FEW, MORE = 3072, 6144
+"""Poses at which instructions are counted."""
 RUNS = (
     *(("4-dof", mass) for mass in ("1 g", "5 g", "20 g")),
     *(("hexapod", mass) for mass in ("5 kg", "50 kg")),
@@ -30,18 +34,27 @@ RUNS = (
     *(("delta", mass) for mass in ("1 kg", "10 kg")),
 )
 """Machines, and the mass of the tool; the links of the Tripteron weigh as its file says."""
+FIRST_RUNS = [run for number, run in enumerate(RUNS) if run[0] not in dict(RUNS[:number])]
+COUNT = "--count"
 DELTA = {"pose.x": (-0.1, 0.1), "pose.y": (-0.1, 0.1), "pose.z": (-0.8, -0.7)}
 """Ranges of the Delta's poses, m: it has no hand-written kernels, and is no `Case`."""
 
 
 def main() -> None:
-    """Print the table."""
-    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; ", end="")
-    print(f"Python {platform.python_version()}, NumPy {np.__version__}. {POSES:,} random poses, processor time.\n")
-    print("| machine | mass | greatest sag | unloaded | loaded | ratio | first call | displacement alone |")
-    print("|---|---|---|---|---|---|---|---|")
+    """Print the table, or do once what is counted."""
+    if COUNT in sys.argv:
+        compile_for_valgrind()
+        count(counted_tasks())
+        return
+    counts = per_pose([__file__, COUNT], FEW, MORE)
+    print(f"{conditions()} {POSES:,} random poses, processor time.\n")
+    print("| machine | mass | greatest sag | unloaded | loaded | ratio | first call | displacement alone ", end="")
+    print("| instructions per pose: unloaded, loaded | ratio |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for name, mass in RUNS:
-        print(row(name, mass), flush=True)
+        here = [counts.get(_label(name, mass, quantities)) for quantities in (TWELVE, LOADED)]
+        counted_here = f"{here[0]:.0f}, {here[1]:.0f} | {here[1] / here[0]:.1f}" if here[0] and here[1] else " | "
+        print(f"{row(name, mass)} {counted_here} |", flush=True)
 
 
 def timed(name: str) -> tuple[str, str, dict[str, Array]]:
@@ -52,11 +65,33 @@ def timed(name: str) -> tuple[str, str, dict[str, Array]]:
     return "A Delta", name, {path: random.uniform(low, high, POSES) for path, (low, high) in DELTA.items()}
 
 
+def counted_tasks() -> dict[str, Callable[[], object]]:
+    """Unloaded and loaded poses of the first run of each machine, for few poses and for more."""
+    tasks: dict[str, Callable[[], object]] = {}
+    for name, mass in FIRST_RUNS:
+        machine, poses = hanging(name, mass)
+        for number in (FEW, MORE):
+            points = PointTable({path: column[:number] for path, column in poses.items()})
+            for quantities in (TWELVE, LOADED):
+                tasks[f"{_label(name, mass, quantities)}: {number}"] = partial(evaluate, machine, points, quantities)
+    return tasks
+
+
+def hanging(name: str, mass: str) -> tuple[Machine, dict[str, Array]]:
+    """The machine of a run under gravity, with its poses."""
+    _, machine, poses = timed(name)
+    return load(machine, [f"tool.mass={mass}", "load.gravity=[0, 0, -9.81]"]), poses
+
+
+def _label(name: str, mass: str, quantities: Sequence[str]) -> str:
+    return f"{name}, {mass}, {quantities[0]}"
+
+
 def row(name: str, mass: str) -> str:
     """Time a machine under the weight of its platform."""
-    title, machine_name, poses = timed(name)
-    settings = [f"tool.mass={mass}", "load.gravity=[0, 0, -9.81]"]
-    machine, points = load(machine_name, settings), PointTable(poses)
+    title, _, _ = timed(name)
+    machine, poses = hanging(name, mass)
+    points = PointTable(poses)
     best: dict[tuple[str, ...], float] = {}
     started = time.process_time()
     values = evaluate(machine, points, LOADED).values

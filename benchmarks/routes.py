@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cases import SUM, TWELVE, Case
-from kinetostat.engine.batch import available_cores, evaluate
+from kinetostat.engine.batch import available_cores, evaluate, function_of
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import PointTable
 from kinetostat.kinetostatics.response import respond
@@ -28,7 +28,9 @@ NUMPY_CHUNKS = (256, 512, 1024, 2048, 4096, 16384)
 NUMPY_SHARE = 20
 """NumPy is timed over this fraction of the poses."""
 SLAB = 16384
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
+FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
+VALUES_ALONE = "kinetostat, values alone"
+"""The route of a function that computes no status, see `kinetostat.compile`."""
 TWELVE_OUTPUTS, DIAGONAL_OF_C = "diagonals of C and K", "diagonal of C"
 SUM_OF_C, WITH_GRADIENT = "sum of C", "sum of C and gradient by 7"
 
@@ -77,15 +79,21 @@ def routes_of(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
     ]
 
 
-def our_routes(case: Case, poses: dict[str, Array]) -> list[Route]:
-    """evaluate() and evaluate_gradient()."""
+def our_routes(case: Case, poses: dict[str, Array], without: str = "") -> list[Route]:
+    """evaluate() and evaluate_gradient(), without one of their tasks, and a compiled function of values alone."""
     machine, points = load(case.machine), PointTable(poses)
     tasks: dict[str, Callable[[], Sequence[Array]]] = {
         TWELVE_OUTPUTS: lambda: [*evaluate(machine, points, TWELVE).values.values()],
-        SUM_OF_C: lambda: [*evaluate_gradient(machine, points, SUM, ()).values],
-        WITH_GRADIENT: lambda: [*evaluate_gradient(machine, points, SUM, case.design).values],
+        SUM_OF_C: lambda: [*evaluate_gradient(machine, points, SUM, (), repeated=True).values],
+        WITH_GRADIENT: lambda: [*evaluate_gradient(machine, points, SUM, case.design, repeated=True).values],
     }
-    return [_prepared(Route("kinetostat", task, points.size, run)) for task, run in tasks.items()]
+    routes = [_prepared(Route("kinetostat", task, points.size, run)) for task, run in tasks.items() if task != without]
+
+    def alone() -> Sequence[Array]:
+        results, _ = function_of(machine, points.paths, TWELVE, judged=False).at(points)
+        return [*results]
+
+    return [*routes, _prepared(Route(VALUES_ALONE, TWELVE_OUTPUTS, points.size, alone))]
 
 
 def _prepared(route: Route) -> Route:
@@ -124,14 +132,15 @@ def _processor_time_of_children() -> float:
     return times.children_user + times.children_system
 
 
-def cpp_routes(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
-    """The kernels of kernels.cpp, where there is a compiler."""
+def cpp_routes(case: Case, poses: dict[str, Array], folder: Path, processor: str = "native") -> list[Route]:
+    """The kernels of kernels.cpp for a processor, where there is a compiler; their status is reach and rank alone."""
     compiler = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
     if compiler is None:
         return []
     started = _processor_time_of_children()
     library = folder / f"{case.machine}.so"
-    subprocess.run([compiler, *FLAGS, "-o", str(library), str(Path(__file__).with_name("kernels.cpp"))], check=True)
+    source, flags = str(Path(__file__).with_name("kernels.cpp")), [*FLAGS, f"-march={processor}"]
+    subprocess.run([compiler, *flags, "-o", str(library), source], check=True)
     prepared = _processor_time_of_children() - started
     code = ctypes.CDLL(str(library)).kernel
     count = len(next(iter(poses.values())))

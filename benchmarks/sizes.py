@@ -6,18 +6,17 @@ Times are those of the processor, so that a busy machine changes them little; ea
 """
 
 import os
-import platform
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from datetime import date
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from kinetostat.engine.batch import available_cores, evaluate, function_of
+from conditions import conditions
+from kinetostat.engine.batch import evaluate, function_of
 from kinetostat.engine.kernel import program_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.program_files import VARIABLE
@@ -25,7 +24,6 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.studies.compiled import compile as function_from
-from kinetostat.studies.diagnosis import processor
 
 MACHINES = ("zhang-gosselin-4dof", "hexapod", "tripteron", "hexapod-hardware")
 QUANTITIES = tuple(f"stiffness_{name}" for name in ("rx", "ry", "rz", "x", "y", "z"))
@@ -46,8 +44,7 @@ print(time.process_time() - started)
 
 def main() -> None:
     """Print both tables."""
-    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; ", end="")
-    print(f"Python {platform.python_version()}, NumPy {np.__version__}. Six quantities each; times of the processor.\n")
+    print(f"{conditions()} Six quantities each; times of the processor.\n")
     with TemporaryDirectory() as folder:
         os.environ[VARIABLE] = f"{folder}/programs"
         programs = [program_row(name) for name in MACHINES]

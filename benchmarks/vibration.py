@@ -5,20 +5,17 @@ All take turns, so that a busy machine slows all of them; each counts by its bes
     python benchmarks/vibration.py > docs/measured/vibration.md
 """
 
-import os
-import platform
 import time
 from collections.abc import Sequence
-from datetime import date
 
 import numpy as np
 
 from cases import CASES, TWELVE
-from kinetostat.engine.batch import available_cores, evaluate
+from conditions import conditions
+from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.diagnosis import processor
 
 SIX = tuple(f"frequency_{number}" for number in range(1, 7))
 BODY = ("tool.mass=0.5 kg", "tool.inertia=[0.003, 0.003, 0.005, 0, 0, 0]")
@@ -35,8 +32,7 @@ RUNS = (
 
 def main() -> None:
     """Print the table."""
-    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; ", end="")
-    print(f"Python {platform.python_version()}, NumPy {np.__version__}.\n")
+    print(f"{conditions()}\n")
     print("| machine | massive | poses | frequencies, poses/s | of the rate of C and K | per second of one core |")
     print("|---|---|---|---|---|---|")
     for name, settings, count in RUNS:

@@ -291,10 +291,10 @@ class RestFill:
             memory: the first part holds the states, and in its last row the squares of the sizes of their last steps.
             count: number of points.
         """
+        if self._chord is None:
+            return
         rows = np.arange(count)
         for _ in range(MOST_CHORD_STEPS):
-            if self._chord is None:
-                break
             states, after = (part[self._count :, :count] for part in memory)
             every = len(rows) == count
             at, here = (states, given) if every else (states.take(rows, axis=1), [part[rows] for part in given])
