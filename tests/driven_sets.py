@@ -13,7 +13,6 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.motion.rates import PoseRates
-from kinetostat.studies.dynamics import dynamics
 from machines import cable, written
 
 EQUAL = 1e-9
@@ -161,14 +160,13 @@ def massive(machine):
     return with_values(machine, {path: value for path, value in given.items() if path in known})
 
 
-def greatest_gain(state, gains):
+def greatest_gain(equations, gains):
     """By a linear programme over the forces of the drives: how fast the coordinates may gain speed along gains.
 
     The equations of motion over the coordinates of the pose know no faces and no screws of legs.
     """
-    equations = dynamics(state)
     held = equations.forces([0.0] * len(gains), [0.0] * len(gains))["process"] @ equations.jacobian
-    drives = state.free.drives
+    drives = equations.state.free.drives
     bounds = [
         (d.lower, d.upper) if s < 0.0 else (-d.upper, -d.lower) for d, s in zip(drives, equations.senses, strict=True)
     ]
@@ -177,9 +175,9 @@ def greatest_gain(state, gains):
     return solved.x[-1] if solved.status == 0 else np.inf if solved.status == 3 else -np.inf
 
 
-def twist_of(state, gains):
+def twist_of(equations, gains):
     """The acceleration of the tool point from rest by those of the coordinates of the pose [6], rad/s² and m/s²."""
-    here = dynamics(state)._machine_here
+    here = equations._machine_here
     still = dict.fromkeys(here.names, 0.0)
     twist = here.along(PoseRates(dict(zip(here.names, gains, strict=True)), still)).platform.twist
     size = float(here.rigid.length)

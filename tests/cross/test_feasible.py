@@ -24,12 +24,12 @@ from driven_sets import (
 )
 from kinetostat import load
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.engine.moving import rigid_form
 from kinetostat.equilibrium.state import actuator_loads_at_rest, state_of
 from kinetostat.kinetostatics.feasible import BLOCKS, greatest_ball, greatest_speed
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.motion.operators import loads_by_acceleration
+from kinetostat.studies.dynamics import dynamics
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -44,8 +44,8 @@ def test_faces_bound_what_a_linear_programme_finds(name, count):
         assert by_faces(response.faces, direction) == pytest.approx(expected, rel=EQUAL), direction
 
 
-def with_accelerations(state):
-    return replace(state.free, acceleration_loads=loads_by_acceleration(rigid_form(state).at(state)))
+def with_accelerations(equations):
+    return replace(equations.state.free, acceleration_loads=loads_by_acceleration(equations._machine_here))
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -53,11 +53,12 @@ def with_accelerations(state):
 def test_accelerations_are_those_of_a_linear_programme_over_the_drives(name, count):
     machine, rng = massive(MACHINES[name]()), np.random.default_rng(2)
     for state in states(machine, count):
-        response = with_accelerations(state)
+        equations = dynamics(state)
+        response = with_accelerations(equations)
         size = sum(path.startswith("pose.") for path in values(machine))
         gains = rng.normal(size=size)
-        reach = by_faces(response.acceleration_faces, twist_of(state, gains))
-        assert reach == pytest.approx(greatest_gain(state, gains), rel=EQUAL)
+        reach = by_faces(response.acceleration_faces, twist_of(equations, gains))
+        assert reach == pytest.approx(greatest_gain(equations, gains), rel=EQUAL)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -65,13 +66,14 @@ def test_quantities_of_accelerations_are_the_least_of_linear_programmes(name):
     """Along single components, both ways, and in whichever direction of a thousand, and the worst of all."""
     machine, rng = massive(MACHINES[name]()), np.random.default_rng(3)
     for state in states(machine, 2):
-        response = with_accelerations(state)
+        equations = dynamics(state)
+        response = with_accelerations(equations)
         size = sum(path.startswith("pose.") for path in values(machine))
-        motions = np.array([twist_of(state, row) for row in np.eye(size)]).T
+        motions = np.array([twist_of(equations, row) for row in np.eye(size)]).T
         for number, component in enumerate(COMPONENTS):
             gains, *_ = np.linalg.lstsq(motions, np.eye(6)[number], rcond=None)
             possible = np.abs(motions @ gains - np.eye(6)[number]).max() < 1e-9
-            reach = min(greatest_gain(state, sign * gains) for sign in (1.0, -1.0)) if possible else 0.0
+            reach = min(greatest_gain(equations, sign * gains) for sign in (1.0, -1.0)) if possible else 0.0
             value = QUANTITIES[f"greatest_acceleration_{component}"].value(response)
             assert value == pytest.approx(reach, rel=EQUAL)
         for name_, part in (("least_acceleration", slice(3, 6)), ("least_angular_acceleration", slice(0, 3))):
@@ -85,7 +87,7 @@ def test_quantities_of_accelerations_are_the_least_of_linear_programmes(name):
                 continue
             drawn = allowed @ np.linalg.pinv(moved) @ moved @ rng.normal(size=(allowed.shape[1], 8))
             for gains in drawn.T:
-                assert greatest_gain(state, gains / np.linalg.norm(motions[part] @ gains)) >= radius * (1.0 - EQUAL)
+                assert greatest_gain(equations, gains / np.linalg.norm(motions[part] @ gains)) >= radius * (1.0 - EQUAL)
             normals = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)
             felt = normals[:, part] @ moved @ np.linalg.pinv(moved)
             room = np.array([float(face.room) for face in response.acceleration_faces])
@@ -94,7 +96,7 @@ def test_quantities_of_accelerations_are_the_least_of_linear_programmes(name):
             face = response.acceleration_faces[worst]
             sign = 1.0 if face.upper < -face.lower else -1.0
             gains = allowed @ np.linalg.pinv(moved) @ (sign * felt[worst] / sizes[worst])
-            assert greatest_gain(state, gains) == pytest.approx(radius, rel=EQUAL)
+            assert greatest_gain(equations, gains) == pytest.approx(radius, rel=EQUAL)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -182,7 +184,8 @@ def test_compiled_accelerations_and_their_slopes_are_those_of_poses(name):
     numbers, slopes = function(heights), function.jacobian(heights)
     for place, height in enumerate(heights):
         near = [state_of(with_values(machine, {"pose.z": float(height + step)})) for step in (-1e-6, 0.0, 1e-6)]
-        rows = np.array([[float(QUANTITIES[q].value(with_accelerations(state))) for q in quantities] for state in near])
+        responses = [with_accelerations(dynamics(state)) for state in near]
+        rows = np.array([[float(QUANTITIES[q].value(response)) for q in quantities] for response in responses])
         np.testing.assert_allclose(numbers[:, place], rows[1], rtol=1e-10)
         np.testing.assert_allclose(
             np.ravel(slopes[:, ..., place]), (rows[2] - rows[0]) / 2e-6, rtol=1e-5, atol=1e-6 * np.abs(rows).max()
