@@ -303,7 +303,8 @@ def _library(texts: dict[str, str], stem: str) -> dict[str, bytes]:
     sources = {Path(name).name: text for name, text in texts.items() if name.startswith("sources/")}
     library = f"{prefix_of(stem)}{suffix}"
     files = [name for name in sources if name.endswith(".c")]
-    command = [compiler, "-std=c99", "-O2", "-shared", "-fPIC", "-o", library, *files, "-lm"]
+    # Straight formulas run as fast after -O1 as after -O2, and long ones compile in six tenths of the time.
+    command = [compiler, "-std=c99", "-O1", "-shared", "-fPIC", "-o", library, *files, "-lm"]
     try:
         with tempfile.TemporaryDirectory() as folder:
             for name, text in sources.items():
