@@ -5,6 +5,7 @@ No formula lives here.
 
 import math
 from collections.abc import Mapping
+from dataclasses import field
 
 import numpy as np
 
@@ -46,11 +47,21 @@ class Path:
         pose: coordinates of the pose by name, m or rad [n].
         rates: of these, per second [n].
         accelerations: of these, per second squared [n].
+        loads: forces and moments on the platform that the motion says, by leaf path, N or N·m [n]; others are those of
+            the machine.
     """
 
     pose: Mapping[str, Array]
     rates: Mapping[str, Array]
     accelerations: Mapping[str, Array]
+    loads: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """All parameters of the machine that vary along it, by leaf path, SI."""
+        return {POSE + name: np.asarray(rows, dtype=float) for name, rows in self.pose.items()} | {
+            path: np.asarray(rows, dtype=float) for path, rows in self.loads.items()
+        }
 
     @property
     def size(self) -> int:
@@ -59,7 +70,7 @@ class Path:
 
     def at(self, rows: Integers) -> "Path":
         """Some of its points, by number."""
-        parts = (self.pose, self.rates, self.accelerations)
+        parts = (self.pose, self.rates, self.accelerations, self.loads)
         return Path(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
 
 
@@ -92,7 +103,7 @@ def motion_of(
 
     Args:
         kind: of the machine.
-        form: how its parameters enter; its pose varies.
+        form: how its parameters enter; its pose varies, and loads may.
         plan: which motions there are.
         links: how many links have a mass that does not follow the pose; 0 for masses as they are at each pose.
         joints_too: whether loads of joints and reflected inertia come after the numbers of the drives.
@@ -101,7 +112,7 @@ def motion_of(
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
     configuration = given.machine.configure(joints.coordinates if joints else ())
-    names = [path.removeprefix(POSE) for path in form.varying]
+    names = [path.removeprefix(POSE) for path in form.varying if path.startswith(POSE)]
     size = len(names)
     moving = new_inputs(given.graph, 2 * size + links)
     direction = PoseRates(
@@ -173,7 +184,7 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
 
 def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
     with np.errstate(all="ignore"):
-        state = states_at(form.machine, {POSE + name: values for name, values in path.pose.items()}, path.size)
+        state = states_at(form.machine, path.columns, path.size)
         here = form.at(state)
         rates, accelerations = (
             {name: column(np.asarray(values, dtype=float)) for name, values in part.items()}
@@ -202,13 +213,12 @@ def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
 
 
 def _run(form: RigidForm, path: Path, joints: bool, closed: bool) -> tuple[Array, Codes]:
-    machine, names = form.machine, list(path.pose)
-    varying = {POSE + name: np.asarray(path.pose[name], dtype=float) for name in names}
+    machine, varying = form.machine, path.columns
     shape, fixed = form_of(machine, list(varying))
     program = program_of(Recipe(motion_of, Specimen(machine), shape, (form.plan, len(form.masses), joints, closed)))
     given = program_columns(machine, shape, varying, path.size, closed)
     given += [
-        np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in names
+        np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in path.pose
     ]
     given += [np.full(path.size, mass) for mass in form.masses]
     results, status = np.empty((program.rows, path.size)), np.empty(path.size, dtype=np.int8)

@@ -120,6 +120,13 @@ def numbered_entry(text: str) -> str:
     return f"{field}.{names.index(entry)}" if entry in names else text
 
 
+def named_entry(path: str) -> str:
+    """Return a path with the name of an entry of a vector or a tensor: "load.force.x" of "load.force.0"."""
+    field, _, entry = path.rpartition(".")
+    last = field.rpartition(".")[2]
+    return f"{field}.{entry_name(last, int(entry))}" if entry.isdecimal() and names_entries(last) else path
+
+
 POSE = "pose."
 
 

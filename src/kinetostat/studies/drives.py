@@ -26,7 +26,6 @@ from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.drives import numbers_of_drive
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
 from kinetostat.spec.answer import ImmutableAnswer
@@ -190,9 +189,10 @@ def drives(
 
     Args:
         machine: with masses, friction, and lead or ratio of its drives.
-        motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines. None
-            for a speed and an acceleration of the platform point at the pose of the machine, in the worst directions;
-            without these, for the motion of the file's requirements.
+        motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines; forces on
+            the platform may be columns, such as force.x [N]. None for a speed and an acceleration of the platform
+            point at the pose of the machine, in the worst directions; without these, for the motion of the file's
+            requirements.
         points: of the motion that are looked at, about.
         speed, acceleration: without a motion: of the platform point, m/s and m/s² or texts with a unit.
 
@@ -225,13 +225,12 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
     Raises:
         InputError: nothing of the machine has a mass, friction or a load.
     """
-    if not _weighs(state, form):
+    if not (any(np.any(rows) for rows in moved.path.loads.values()) or _weighs(state, form)):
         raise InputError(
             f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
             'drives; give it one, e.g. --set tool.mass="5 kg".'
         )
-    columns = {POSE + name: np.asarray(rows, dtype=float) for name, rows in moved.path.pose.items()}
-    codes = evaluate(state.machine, PointTable(columns), ["singularity_margin"]).status
+    codes = evaluate(state.machine, PointTable(moved.path.columns), ["singularity_margin"]).status
     lost = np.flatnonzero(~np.isin(codes, PASSABLE))
     if lost.size:
         status = Status(int(codes[lost[0]]))
@@ -305,7 +304,7 @@ def _coordinates(state: MachineState, motion: Motion) -> Array:
     every = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
     chosen = [number for number, spring in enumerate(every) if any(spring is other for other in driven)]
     with np.errstate(all="ignore"):
-        there = states_at(machine, {POSE + name: column for name, column in motion.path.pose.items()}, count)
+        there = states_at(machine, motion.path.columns, count)
         if there.joints is None:
             actuators = actuators_of(there.configuration)
         else:

@@ -18,7 +18,6 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.vibration import modes
@@ -55,7 +54,7 @@ def deflections(machine: Machine, motion: Motion, forces: PathForces) -> Array:
     result = np.full((motion.path.size, 6), np.nan)
     for start in range(0, motion.path.size, NUMPY_SLAB):
         part = slice(start, min(start + NUMPY_SLAB, motion.path.size))
-        columns = {POSE + name: rows[part] for name, rows in motion.path.pose.items()}
+        columns = {path: rows[part] for path, rows in motion.path.columns.items()}
         with np.errstate(all="ignore"):
             response = states_at(machine, columns, part.stop - start).free
             rows = [

@@ -6,10 +6,12 @@ sines about the pose of the machine. Nothing is computed about the machine here.
 Source: theory (96)-(98).
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -21,12 +23,12 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
-from kinetostat.machine.parameters import POSE, values
+from kinetostat.machine.parameters import POSE, named_entry, values
 from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
-from kinetostat.studies.moves import along_profile, curve_between, profile
+from kinetostat.studies.moves import along_profile, curve_between, moment_at, profile
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
 
 TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
@@ -40,6 +42,8 @@ SHAPES = ("line", "through", "arc")
 """Words of the column `shape`: a straight line to the pose, a point through which the next arc leads, an arc to it."""
 SMOOTH = 5
 """Degree of the spline through poses at times: with it, accelerations have no corner."""
+_LOAD = re.compile(r"load\.(.+\.)?(force|moment)\.\d")
+"""Paths of components of forces and moments on the platform, those of named loads among them."""
 AROUND_SINES = 256
 """Points in a period of the fastest sine, at least."""
 MOST_PERIODS = 200
@@ -68,6 +72,12 @@ class Motion:
     def duration(self) -> float:
         """From its first point to its last, s."""
         return float(self.times[-1] - self.times[0])
+
+    @property
+    def loads(self) -> dict[str, dict[str, Any]]:
+        """Forces and moments that it says, by name, with their units, as JSON has columns of poses."""
+        units = {path: "N" if ".force." in path else "N·m" for path in self.path.loads}
+        return {named_entry(path): {"units": units[path], "values": self.path.loads[path]} for path in units}
 
 
 AROUND = 32
@@ -137,7 +147,8 @@ def _spread(size: int) -> Array:
 def read_motion(machine: Machine, path: Path, points: int = 400, text: str | None = None) -> Motion:
     """Read a motion from a CSV file, whose head says the unit of each column.
 
-    Beside fields of the pose, all notations of orientation among them, there may be
+    Beside fields of the pose, all notations of orientation among them, and forces and moments on the platform, which
+    change evenly from line to line over time, there may be
 
     - `time`: the pose is reached then; a spline of degree five leads through all of them;
     - `feed`, and if wanted `acceleration`, `jerk` and `shape`: each pose is the end of a move that begins and ends at
@@ -166,10 +177,10 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         amounts = {
             name: column_values(column, QUANTITIES[name], where) for name, column in special.items() if name != SHAPE
         }
-        coordinates = _coordinates(machine, list(given.values()), where)
+        coordinates, loads = _coordinates_and_loads(machine, list(given.values()), where)
         if TIME in amounts:
             _refuse(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
-            return _through_poses(coordinates, amounts[TIME], points)
+            return _through_poses(coordinates, loads, amounts[TIME], points)
         if FEED not in amounts:
             raise InputError(
                 "it has neither times nor a feed rate; add a column such as time [s] or feed [mm/s] beside the pose."
@@ -177,7 +188,7 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         if ACCELERATION not in amounts:
             raise InputError("it has a feed rate but no acceleration; add a column such as acceleration [m/s**2].")
         shapes = _shapes(special.get(SHAPE), len(numbers))
-        return _moves(machine, coordinates, amounts, shapes, points)
+        return _moves(machine, coordinates, loads, amounts, shapes, points)
     except InputError as error:
         raise InputError(f'"{path}": {error}') from None
 
@@ -229,26 +240,32 @@ def _refuse(given: Mapping[str, GivenColumn], names: Sequence[str], what: str) -
             raise InputError(f"{what} has no column {name}; remove it.")
 
 
-def _coordinates(machine: Machine, columns: Sequence[GivenColumn], where: Where) -> dict[str, Array]:
-    """All coordinates of the pose by name, at each line."""
+def _coordinates_and_loads(
+    machine: Machine, columns: Sequence[GivenColumn], where: Where
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """All coordinates of the pose by name, and the forces and moments that are given by leaf path, at each line."""
     poses = read_columns(machine, columns, where)
+    loads = {path: rows for path, rows in poses.leaves.items() if _LOAD.fullmatch(path)}
     for path in poses.leaves:
-        if not path.startswith(POSE):
-            raise InputError(f"{path} does not move; a motion has coordinates of the pose alone.")
+        if not path.startswith(POSE) and path not in loads:
+            raise InputError(
+                f"{path} does not move; a motion has coordinates of the pose, and forces and moments such as force.x."
+            )
     here = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
     if any(part_of(column.name)[0] for column in columns):  # angles of quaternions and matrices may jump by a turn
         leaves = {
             path: np.unwrap(rows) if path.removeprefix(POSE) in ANGLES else rows for path, rows in poses.leaves.items()
         }
         poses = replace(poses, values=tuple(leaves[field.leaves[0]] for field in poses.fields))
-    return {
+    coordinates = {
         path.removeprefix(POSE): np.array(poses.leaves.get(path, np.full(poses.count, value)), dtype=float)
         for path, value in here.items()
     }
+    return coordinates, loads
 
 
-def _through_poses(coordinates: Mapping[str, Array], times: Array, points: int) -> Motion:
-    """The spline through poses at times, theory (96); periodic where it ends at its first pose."""
+def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array], times: Array, points: int) -> Motion:
+    """The spline through poses at times, theory (96); periodic where it ends at its first pose and loads."""
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(times) < 2 or late.size:
         after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
@@ -263,13 +280,14 @@ def _through_poses(coordinates: Mapping[str, Array], times: Array, points: int) 
     fine = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], points + 1)]))
     rows = [np.asarray(spline(fine, nu=order)) for order in range(3)]
     kind = f"{len(times)} poses over {times[-1] - times[0]:.4g} s"
-    return Motion(kind, fine, _path(list(unwound), rows), closed)
+    path = _path(list(unwound), rows, {name: np.interp(fine, times, column) for name, column in loads.items()})
+    return Motion(kind, fine, path, closed and all(column[0] == column[-1] for column in loads.values()))
 
 
-def _path(names: Sequence[str], rows: Sequence[Array]) -> MovedPath:
-    """Coordinates, rates and accelerations [n x coordinates] by name."""
+def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array]) -> MovedPath:
+    """Coordinates, rates and accelerations [n x coordinates] by name, with loads."""
     parts = [dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows]
-    return MovedPath(*parts)
+    return MovedPath(*parts, loads)
 
 
 def _shapes(column: GivenColumn | None, count: int) -> list[str]:
@@ -290,9 +308,14 @@ def _shapes(column: GivenColumn | None, count: int) -> list[str]:
 
 
 def _moves(
-    machine: Machine, coordinates: Mapping[str, Array], amounts: Mapping[str, Array], shapes: Sequence[str], points: int
+    machine: Machine,
+    coordinates: Mapping[str, Array],
+    loads: Mapping[str, Array],
+    amounts: Mapping[str, Array],
+    shapes: Sequence[str],
+    points: int,
 ) -> Motion:
-    """Moves one after the other, each from rest to rest, theory (97) and (98)."""
+    """Moves one after the other, each from rest to rest, theory (97) and (98); loads jump where a pose is twice."""
     names = list(coordinates)
     table = np.stack([coordinates[name] for name in names], axis=1)
     places = [number for number, name in enumerate(names) if name in ("x", "y", "z")]
@@ -300,17 +323,14 @@ def _moves(
     if len(ends) < 2:
         raise InputError("it has only one pose; give the pose where the motion begins and those to which it moves.")
     lengths = float(machine.configure().length) if machine.family.chains is None else float(machine.chains().length)
-    curves = [
-        curve_between(table, start, end, places, lengths, shapes[end] == "arc")
-        for start, end in pairwise(ends)
-        if np.abs(table[end] - table[start]).max() > 0.0
-    ]
+    moved = [(start, end) for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
+    curves = [curve_between(table, start, end, places, lengths, shapes[end] == "arc") for start, end in moved]
     if not curves:
         raise InputError("all of its poses are alike, so that nothing moves; change a coordinate from line to line.")
-    rows_of = [end for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
     each = max(2, points // max(1, 4 * len(curves)))
     times, rows, clock = [], [[], [], []], 0.0  # type: ignore[var-annotated]
-    for curve, row in zip(curves, rows_of, strict=True):
+    carried: dict[str, list[Array]] = {name: [] for name in loads}
+    for curve, (start, row) in zip(curves, moved, strict=True):
         jerk = float(amounts[JERK][row]) if JERK in amounts else np.inf
         steps = profile(curve.length, float(amounts[FEED][row]), float(amounts[ACCELERATION][row]), jerk)
         time, run = along_profile(steps, each)
@@ -318,12 +338,22 @@ def _moves(
         parts = place, slope * run[1][:, None], bend * run[1][:, None] ** 2 + slope * run[2][:, None]
         for part, more in zip(rows, parts, strict=True):
             part.append(more)
+        knots = [start, *range(start + 1, row), row]  # with the point through which an arc leads
+        if loads and len(knots) > 2 and curve.middle is None:
+            raise InputError(
+                "the point through which an arc leads is in line with its ends, so that no moment belongs to the "
+                "forces there; write that arc as a line."
+            )
+        moments = [0.0, *(moment_at(steps, curve.middle) for _ in knots[1:-1] if curve.middle), float(time[-1])]
+        for name, column in loads.items():
+            carried[name].append(np.interp(time, moments, column[knots]))
         times.append(clock + time)
         clock += float(time[-1])
+    joined = [np.concatenate(part) for part in rows], {name: np.concatenate(parts) for name, parts in carried.items()}
     kind = (
         f"{_number_of(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
     )
-    return Motion(kind, np.concatenate(times), _path(names, [np.concatenate(part) for part in rows]))
+    return Motion(kind, np.concatenate(times), _path(names, *joined))
 
 
 def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
@@ -331,7 +361,8 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
     for name in given:
         if name not in (FIELD, "amplitude", "frequency", "phase"):
             raise InputError(
-                f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase."
+                f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase. "
+                "Forces that vary are columns of a motion with times or a feed rate."
             )
     for name in ("amplitude", "frequency"):
         if name not in given:

@@ -8,6 +8,8 @@ Source: theory (97) and (98).
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial import Polynomial
+from scipy.optimize import brentq
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
@@ -26,6 +28,7 @@ class Curve:
         arc: centre, two vectors of the size of its radius, and its angle, of the coordinates at `places`; None of a
             line.
         places: which coordinates are those of P.
+        middle: length at which an arc passes the point through which it leads; None of a line.
     """
 
     start: Array
@@ -33,6 +36,7 @@ class Curve:
     length: float
     places: tuple[int, ...]
     arc: tuple[Array, Array, Array, float] | None = None
+    middle: float | None = None
 
     def at(self, lengths: Array) -> tuple[Array, Array, Array]:
         """Coordinates with their first and second derivatives by the length [n x coordinates]."""
@@ -67,15 +71,17 @@ def curve_between(table: Array, start: int, end: int, places: Sequence[int], siz
     first, last = table[start], table[end]
     chord = last[places] - first[places]
     length = float(np.linalg.norm(chord))
-    arc = _arc(first[places], table[end - 1][places], last[places]) if round_ else None
-    if arc is not None:
-        length = float(np.linalg.norm(arc[1]) * arc[3])
+    arc, middle = None, None
+    if round_ and (circle := _arc(first[places], table[end - 1][places], last[places])):
+        arc, turned_at_middle = circle
+        radius = float(np.linalg.norm(arc[1]))
+        length, middle = radius * arc[3], radius * turned_at_middle
     turned = float(np.linalg.norm(np.delete(last - first, places)))
-    return Curve(first, last, length or turned * size, tuple(places), arc)
+    return Curve(first, last, length or turned * size, tuple(places), arc, middle)
 
 
-def _arc(start: Array, middle: Array, end: Array) -> tuple[Array, Array, Array, float] | None:
-    """The circle through three points from the first to the last by way of the second; None where it is straight."""
+def _arc(start: Array, middle: Array, end: Array) -> tuple[tuple[Array, Array, Array, float], float] | None:
+    """The circle through three points from the first to the last, and the angle of the second; None where straight."""
     along, across = middle - start, end - start
     sizes = along @ along, across @ across
     both = along @ across
@@ -91,8 +97,8 @@ def _arc(start: Array, middle: Array, end: Array) -> tuple[Array, Array, Array, 
     second = side / np.linalg.norm(side) * radius
     turns = [np.arctan2((p - centre) @ second, (p - centre) @ first) % (2.0 * np.pi) for p in (middle, end)]
     if turns[0] > turns[1]:
-        second, turns[1] = -second, 2.0 * np.pi - turns[1]
-    return centre, first, second, float(turns[1])
+        second, turns = -second, [2.0 * np.pi - turn for turn in turns]
+    return (centre, first, second, float(turns[1])), float(turns[0])
 
 
 def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> list[tuple[float, float, float]]:
@@ -136,3 +142,22 @@ def along_profile(
         times.append(clock + time)
         clock, at, speed = clock + duration, float(lengths[-1][-1]), float(speeds[-1][-1])
     return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(gains))
+
+
+def moment_at(phases: Sequence[tuple[float, float, float]], length: float) -> float:
+    """The time at which a move has come so far, s.
+
+    Args:
+        phases: of the move, see `profile`.
+        length: between 0 and that of its path, m.
+    """
+    clock = at = speed = 0.0
+    for duration, first, last in phases:
+        if duration <= 0.0:
+            continue
+        way = Polynomial([at - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
+        if way(duration) >= 0.0:
+            return clock + float(brentq(way, 0.0, duration, xtol=1e-15))
+        at, speed = float(way(duration)) + length, float(way.deriv()(duration))
+        clock += duration
+    return clock

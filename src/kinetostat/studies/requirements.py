@@ -152,7 +152,7 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
         speeds = fit.hardest[0] == "speed"
         curve = loads.curves.motor_speed if speeds else loads.curves.motor_torque
         point = int(np.abs(curve[row]).argmax())
-        pose = {POSE + field: float(rows[point]) for field, rows in motion.path.pose.items()}
+        pose = {path: float(rows[point]) for path, rows in motion.path.columns.items()}
         words = f"the motion uses {motors.share_in_words(fit)}, most at {fit.drive}."
     return Verdict(
         name, f"fits {motor}", "share of the motor's limits", "1", 1.0, motion.path.size, f"along {motion.kind}",

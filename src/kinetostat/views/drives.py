@@ -13,7 +13,6 @@ from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine, setting_of
-from kinetostat.machine.parameters import POSE
 from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
 from kinetostat.studies.motion_deflection import ModesAlong
@@ -50,6 +49,8 @@ def _lines(answer: DriveLoads) -> Lines:
         )
         yield "Worst way", f"{name} does most at the speed {rates} m/s with the acceleration {gains} m/s²."
         return
+    if names := ", ".join(answer.motion.loads):
+        yield "Loads", f"The motion says {names}, in the place of what the file has there."
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
     given, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
     whole = number(max(given + back, 0.0))
@@ -170,8 +171,8 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
 
 def note_motion(figure: Figure, answer: DriveLoads, *further: str) -> None:
     """Write below a figure where its machine is but for what moves, and along which motion it goes."""
-    moving = [POSE + name for name in answer.motion.path.pose]
-    note_setting(figure, setting_of(answer.machine, moving), answer.motion.kind, *further)
+    moving, names = setting_of(answer.machine, answer.motion.path.columns), ", ".join(answer.motion.loads)
+    note_setting(figure, moving, answer.motion.kind + (f", with {names}" if names else ""), *further)
 
 
 def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
@@ -295,6 +296,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
         return None
     curves, columns = _curves(answer), {"time [s]": answer.motion.times}
     columns |= answer.motion.path.pose
+    columns |= {f"{name} [{load['units']}]": load["values"] for name, load in answer.motion.loads.items()}
     for k, drive in enumerate(answer.drives):
         length = "m" if drive.slides else "rad"
         rows_of = (
@@ -335,6 +337,15 @@ DRIVES = Description(
         *FIRST_FIELDS,
         Field("motion", "motion.kind"),
         Field("duration", "motion.duration", "s"),
+        Field("loads", lambda a: a.motion.loads or None, forms=("json",), optional=True),
+        Field(
+            "loads_over_time",
+            lambda a: np.stack([a.motion.times, *a.motion.path.loads.values()])[1:, : 0 if a.curves is None else None],
+            "",
+            "forces and moments that the motion says, N or N·m",
+            ("load_component", "time"),
+            ("nc",),
+        ),
         Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst[0]]), "s"),
         Field("worst_drive", lambda a: None if a.worst is None else a.worst[1]),
         Field("frequency", _of_modes("frequency"), "Hz", "lowest natural frequency with motors that stand still"),
@@ -398,6 +409,7 @@ DRIVES = Description(
     figures=_figures,
     axes=(
         Axis("time", lambda a: np.zeros(0) if a.curves is None else a.motion.times, "s"),
+        Axis("load_component", lambda a: np.array(list(a.motion.loads), dtype=str)),
         Axis("component", lambda _a: np.array(["rx", "ry", "rz", "x", "y", "z"])),
     ),
     answered=lambda answer: bool(answer.drives),
@@ -413,8 +425,8 @@ DRIVES_QUESTION = Question(
         Option(
             "motion",
             "file",
-            "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md); default: the "
-            "motion of the file's requirements",
+            "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md); forces "
+            "may be columns, such as force.x [N]; default: the motion of the file's requirements",
             metavar="MOTION",
             first=True,
         ),

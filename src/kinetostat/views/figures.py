@@ -25,7 +25,7 @@ from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
-from kinetostat.machine.parameters import entry_name, names_entries
+from kinetostat.machine.parameters import named_entry
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import failures, field_of
 from kinetostat.studies.storage import replacing
@@ -311,11 +311,8 @@ def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
 
 def _plain(path: str) -> str:
     """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
-    section, _, field = path.partition(".")
-    parts = field.split(".")
-    if parts[-1].isdecimal() and parts[-2:-1] and names_entries(parts[-2]):
-        parts[-1] = entry_name(parts[-2], int(parts[-1]))
-    words = " ".join(parts).replace("_", " ")
+    section, _, field = named_entry(path).partition(".")
+    words = field.replace(".", " ").replace("_", " ")
     return words if section == "pose" else f"{section}: {words}"
 
 
