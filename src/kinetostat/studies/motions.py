@@ -286,8 +286,8 @@ def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array],
 
 def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array]) -> MovedPath:
     """Coordinates, rates and accelerations [n x coordinates] by name, with loads."""
-    parts = [dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows]
-    return MovedPath(*parts, loads)
+    pose, rates, gains = (dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows)
+    return MovedPath(pose, rates, gains, loads)
 
 
 def _shapes(column: GivenColumn | None, count: int) -> list[str]:
