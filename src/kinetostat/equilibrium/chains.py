@@ -313,7 +313,9 @@ def elastic_leg(
     count, masses, size = len(units.length), row.masses(), len(row.springs)
     twists = np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6))
     chain = Chain(twists, tuple(row.coordinate), tuple(row.given), size)
-    idle = np.zeros((count, size, size)) if units.count is None else _idle(chain, row.springs)
+    idle = np.zeros((count, size, size))
+    if units.count is not None:
+        idle = idle_motions(np.swapaxes(twists, 1, 2) @ chain.follows, row.springs)
     return ElasticLeg(
         leg.name,
         chain,
@@ -398,16 +400,23 @@ def _is_along(axis: Vector, span: Array, units: Units) -> bool:
     return bool(np.all(sizes[np.isfinite(sizes)] < PARALLEL_AXES))
 
 
-def _idle(chain: Chain, springs: Sequence[Spring | None]) -> Array:
-    """Motions of the passive coordinates that leave the leg's end where it is, to first order [n x c x c]."""
+def idle_motions(rates: Array, springs: Sequence[Spring | None]) -> Array:
+    """Motions of the passive coordinates that leave the leg's end where it is, to first order [n x c x c].
+
+    They are those of a state: where loads have moved a leg, a strut spins about another line than in the free state.
+
+    Args:
+        rates: twist of the leg's end per unit of each coordinate [n x 6 x c].
+        springs: the spring of each coordinate; None of a passive one.
+    """
     passive = [i for i, spring in enumerate(springs) if spring is None]
-    count = len(chain.twists)
+    count = len(rates)
     result = np.zeros((count, len(springs), len(springs)))
     if not passive:
         return result
     # Where a pose has no place, nothing is idle.
-    twists = np.where(np.isfinite(chain.twists), chain.twists, 0.0)
-    _, sizes, rows = np.linalg.svd(np.swapaxes(twists, 1, 2) @ chain.follows[:, passive], full_matrices=True)
+    moving = np.where(np.isfinite(rates), rates, 0.0)[:, :, passive]
+    _, sizes, rows = np.linalg.svd(moving, full_matrices=True)
     weights = np.zeros((count, len(passive)))
     weights[:, : sizes.shape[1]] = sizes
     kept = rows * (weights < DEPENDENT)[:, :, None]

@@ -17,6 +17,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance
+from kinetostat.equilibrium.chains import idle_motions
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
@@ -259,7 +260,8 @@ def motions_left_out(equations: Balance, mass: Array) -> Array:
     for leg, terms, (first, last) in pairs:
         inside, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
         leaving = (inside <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
-        apart = _without_momentum(leg.idle, mass[:, first:last, first:last])
+        idle = idle_motions(terms.rates, leg.springs) if leg.idle.any() else leg.idle
+        apart = _without_momentum(idle, mass[:, first:last, first:last])
         blocks[:, first - starts[0] : last - starts[0], first:last] = apart + leaving
     return blocks
 
