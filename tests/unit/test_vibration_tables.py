@@ -1,11 +1,16 @@
 """What is said of vibrations: sentences that no choice of equal modes changes, tables in which nothing is lost."""
 
+import subprocess
+import sys
+
 import pytest
+import xarray as xr
 
 from kinetostat.machine.loading import changed, load
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.vibration import modes
+from kinetostat.views.answers import plot
 from kinetostat.views.figures import curves, look_of
 from kinetostat.views.vibration import MOST_PARTS, cut_of, mode_table, share_table, strain_of
 from kinetostat.views.vibration_figures import response_figure
@@ -84,3 +89,40 @@ def test_entries_of_vectors_and_tensors_have_names_for_people():
     assert with_leg(machine, "tool.centre_of_mass.2") == "tool.centre_of_mass.2 (z)"
     assert with_leg(machine, "geometry.base_angles.5") == "geometry.base_angles.5 (leg 6)"
     assert with_leg(machine, "tool.mass") == "tool.mass"
+
+
+def test_shapes_of_all_modes_stand_side_by_side_each_under_its_frequency():
+    answer = modes(changed(load("hexapod"), LIGHT_LEGS))
+    figure = plot(answer, "shapes")
+    texts = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
+    for number, mode in enumerate(answer.modes[:6], 1):
+        shown = answer.machine.display.show(mode.frequency, "Hz")
+        across, up = texts[f"{number}: {shown} (tool: {mode.direction})"]
+        for low, high, place in zip(*figure.axes[0].viewLim.get_points(), (across, up), strict=True):
+            assert low < place < high
+    headings = [place for text, place in texts.items() if "Hz" in text]
+    assert len(headings) == len({*headings}) == 6
+    assert not [line for line in figure.axes[0].lines if not figure.axes[0].viewLim.contains(*line.get_xydata()[0])]
+
+
+def test_a_planar_machine_shows_its_shapes_in_plan_with_two_axes():
+    figure = plot(modes(changed(load("planar-3rpr"), {"tool.mass": 2.0})), "shapes")
+    assert {text.get_text() for text in figure.axes[0].texts} >= {"x", "y"}
+    assert "z" not in {text.get_text() for text in figure.axes[0].texts}
+
+
+def test_modes_are_drawn_and_written_as_netcdf_without_xarray(tmp_path):
+    words = ["modes", "hexapod", "--set", "tool.mass=12 kg", "-o", str(tmp_path)]
+    code = f"import sys; from kinetostat.cli import main; main({words!r}); sys.exit('xarray' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {"modes.csv", "response.nc", "response.png", "shapes.png", "kinetostat.sha256"}
+    with xr.open_dataset(tmp_path / "response.nc", engine="h5netcdf") as data:
+        answer = modes(changed(load("hexapod"), {"tool.mass": 12.0}))
+        given = data["frequency"].values
+        complex_ones = data["receptance_real"].values + 1j * data["receptance_imaginary"].values
+        assert complex_ones == pytest.approx(answer.receptance(given), rel=1e-12)
+        assert data["frequency_hz"].values == pytest.approx([mode.frequency for mode in answer.modes])
+        assert [*data["direction"].values] == [mode.direction for mode in answer.modes]
+        assert [*data["moved"].values] == [*answer.components]
+        assert data["frequency"].attrs["units"] == "Hz"

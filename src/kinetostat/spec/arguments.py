@@ -212,6 +212,8 @@ def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
             return None  # a text alone stands for a list of it
         if not _is_row(value, len(inside) if origin is tuple else None, origin is Collection):
             return here
+        if float in _parts(inside[0]) and all(type(entry) is float for entry in value):
+            return None  # thousands of numbers are not looked at one by one
         return _first(_misfit(entry, inside[0], f"{name}[{place}]") for place, entry in enumerate(value))
     if origin is not None:
         if not isinstance(value, Mapping):

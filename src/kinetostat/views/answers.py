@@ -126,7 +126,7 @@ def plot(answer: object, which: str | None = None) -> "Figure":
 
 
 Writer = Callable[[Path], None]
-FORMS = {"json": "json_of", "csv": "csv_of", "nc": "dataset_of"}
+FORMS = {"json": "json_of", "csv": "csv_of", "nc": "netcdf_of"}
 """Function of `data_forms` that makes each form of an answer."""
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 

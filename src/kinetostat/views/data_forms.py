@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
 from kinetostat.spec.renamed import RENAMED, with_former_keys
 from kinetostat.views.question import Description, Field, Records
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def as_answer(data: dict[str, Any]) -> dict[str, Any]:
@@ -147,14 +144,16 @@ def _cells(part: Field, item: Any, entries: Sequence[str] | None) -> list[Any]:
     return [no_formula(cell) if isinstance(cell, str) else cell for cell in cells]
 
 
-def dataset_of(description: Description, answer: Any) -> "xr.Dataset":
-    """An answer as a dataset: arrays over their axes, and the records, one along an axis of their own.
+def netcdf_of(description: Description, answer: Any) -> bytes:
+    """An answer as NetCDF-4: arrays over their axes, and the records, one along an axis of their own.
 
-    Axes are those of the description, and of records their numbers from 1 and the names of mappings.
+    Axes are those of the description, and of records their numbers from 1 and the names of mappings. The file is as
+    xarray would write it, which takes three times as long to import as to write.
     """
-    import xarray as xr  # takes long to load
+    import h5netcdf  # takes long to load
+    import h5py
 
-    coordinates = {
+    coordinates: dict[str, Any] = {
         axis.name: (axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _about(axis))
         for axis in description.axes
     }
@@ -166,8 +165,20 @@ def dataset_of(description: Description, answer: Any) -> "xr.Dataset":
             _add_records(part, part.of(answer), variables, coordinates)
         elif part.axes:
             variables[part.name] = (part.axes, part.of(answer), _about(part))
-    about = {"machine": answer.machine.name, "reference": answer.machine.reference}
-    return xr.Dataset(variables, coordinates, about)
+    memory = io.BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        file.attrs.update(machine=answer.machine.name, reference=answer.machine.reference)
+        for name, (axes, entries, about) in (variables | coordinates).items():
+            values, axes = np.asarray(entries), (axes,) if isinstance(axes, str) else axes
+            for axis, size in zip(axes, values.shape, strict=True):
+                if axis not in file.dimensions:
+                    file.dimensions[axis] = size
+            kind, missing = values.dtype.kind, np.nan if values.dtype.kind == "f" else None
+            dtype = {"U": h5py.string_dtype(), "b": np.dtype("i1")}.get(kind, values.dtype)
+            variable = file.create_variable(name, tuple(axes), dtype, fillvalue=missing)
+            variable[...] = values.astype(object) if kind == "U" else values.astype(dtype)
+            variable.attrs.update(about | ({"dtype": "bool"} if kind == "b" else {}))
+    return memory.getvalue()
 
 
 def _add_records(

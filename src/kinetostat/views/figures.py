@@ -7,11 +7,10 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
@@ -25,13 +24,19 @@ from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
-from kinetostat.machine.parameters import named_entry
-from kinetostat.studies.datasets import LOADS_LEFT_OUT
-from kinetostat.studies.grid import failures, field_of
+from kinetostat.late import LateModule
 from kinetostat.studies.storage import replacing
-from kinetostat.views.grid import display_of
 from kinetostat.views.lettering import letter
 from kinetostat.views.levels import levels_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from kinetostat.studies import datasets, grid
+    from kinetostat.views import grid as grid_view
+else:  # figures of other answers need no xarray, which takes as long to import as a figure takes to draw
+    datasets, grid = LateModule("kinetostat.studies.datasets"), LateModule("kinetostat.studies.grid")
+    grid_view = LateModule("kinetostat.views.grid")
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -100,7 +105,7 @@ def new_figure(size: tuple[float, float], title: str | None = None, *notes: str)
         fix_layout(figure)
 
 
-def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+def contour_maps(dataset: "xr.Dataset", names: Sequence[str], title: str) -> Figure:
     """One panel per quantity over the two dimensions of the dataset, contours labelled with their values.
 
     Args:
@@ -113,11 +118,11 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     rows = -(-len(names) // columns)
     with new_figure((2.75 * columns + 0.3, 2.45 * rows + 0.4), title, *setting_lines(dataset)) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
-        x, x_label = axis_values(dataset, str(across))
-        y, y_label = axis_values(dataset, str(up))
+        x, x_label = grid_view.axis_values(dataset, str(across))
+        y, y_label = grid_view.axis_values(dataset, str(up))
         lines = []
         for place, (panel, name) in enumerate(zip(panels, names, strict=False)):
-            scale = display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
+            scale = grid_view.display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
             panel_of = _count_panel if _is_count(dataset[name]) else _contour_panel
             lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
             _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
@@ -130,7 +135,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     return figure
 
 
-def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+def curves(dataset: "xr.Dataset", names: Sequence[str], title: str) -> Figure:
     """Quantities over the one dimension of the dataset, one panel for each unit; logarithmic where the range is.
 
     Args:
@@ -295,28 +300,14 @@ def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> s
     return f"no result{shown} at {sum(words.values()):,} of {poses:,} poses ({why})" if words else ""
 
 
-def setting_lines(dataset: xr.Dataset) -> tuple[str, str, str]:
+def setting_lines(dataset: "xr.Dataset") -> tuple[str, str, str]:
     """Frame and pose of a grid, loads that do not count, and how many of its poses have no result."""
-    missing = missing_line(failures(dataset), dataset["status"].size)
+    missing = missing_line(grid.failures(dataset), dataset["status"].size)
     where = "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text)
-    return where, dataset.attrs.get(LOADS_LEFT_OUT, ""), missing
+    return where, dataset.attrs.get(datasets.LOADS_LEFT_OUT, ""), missing
 
 
-def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
-    """Values of a coordinate as an axis shows them, and its label with the unit."""
-    coordinate = dataset[name]
-    scale = display_of(dataset).scale(coordinate.attrs["units"])
-    return coordinate.values * scale.factor, scale.label(_plain(field_of(coordinate)))
-
-
-def _plain(path: str) -> str:
-    """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
-    section, _, field = named_entry(path).partition(".")
-    words = field.replace(".", " ").replace("_", " ")
-    return words if section == "pose" else f"{section}: {words}"
-
-
-def set_axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> None:
+def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) -> None:
     """Equal scales for two lengths of similar range, logarithmic ones where the grid is."""
     lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
     spans = [np.ptp(dataset[name].values) for name in (across, up)]
@@ -328,7 +319,7 @@ def set_axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> N
         panel.set_yscale("log")
 
 
-def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
+def _contour_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale: Scale) -> list[QuadContourSet]:
     """Fill a panel with bands of colour; return its lines, whose values can be written once the layout is fixed."""
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
@@ -358,13 +349,13 @@ def _label_outside(panel: Axes, below: str, beside: str) -> None:
     panel.tick_params(labelbottom=bool(below), labelleft=bool(beside))
 
 
-def _is_count(data: xr.DataArray) -> bool:
+def _is_count(data: "xr.DataArray") -> bool:
     """Whether a quantity counts, and takes so few values that each can have a colour."""
     name = str(data.name)
     return name in QUANTITIES and QUANTITIES[name].whole and np.unique(data.values).size <= MOST_COUNTS
 
 
-def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
+def _count_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale: Scale) -> list[QuadContourSet]:
     """Fill a panel with a colour for each whole number; between two poses there is no line to draw."""
     values = np.unique(data.values[np.isfinite(data.values)])
     if values.size < 2:
@@ -425,12 +416,12 @@ def _note(panel: Axes, text: str) -> None:
     panel.text(0.5, 0.5, text, transform=panel.transAxes, ha="center", va="center", fontsize=7.5)
 
 
-def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[str]) -> None:
-    x, x_label = axis_values(dataset, across)
+def _curve_panel(panel: Axes, dataset: "xr.Dataset", across: str, names: Sequence[str]) -> None:
+    x, x_label = grid_view.axis_values(dataset, across)
     logarithmic = bool(dataset[across].attrs["log"])
     values = np.concatenate([dataset[name].values for name in names])
     unit = dataset[names[0]].attrs["units"]
-    scale = display_of(dataset).fitting(unit, values)
+    scale = grid_view.display_of(dataset).fitting(unit, values)
     for place, name in enumerate(names):
         panel.plot(x, dataset[name].values * scale.factor, label=dataset[name].attrs["symbol"], **look_of(place))
     if logarithmic:

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from kinetostat.arrays import Array
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import shown
+from kinetostat.machine.parameters import named_entry, shown
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.carrying import Carrying, carrying_legs
 from kinetostat.studies.datasets import LOADS_LEFT_OUT as LEFT_OUT_ATTRIBUTE
@@ -51,6 +52,20 @@ TWO_OF_A_MAP = "map needs two --over ranges or more; for one parameter use `kine
 def display_of(dataset: xr.Dataset) -> Display:
     """Return the units in which a dataset of this version wants to be read."""
     return Display(dataset.attrs.get("display", ""))
+
+
+def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
+    """Values of a coordinate as an axis shows them, and its label with the unit."""
+    coordinate = dataset[name]
+    scale = display_of(dataset).scale(coordinate.attrs["units"])
+    return coordinate.values * scale.factor, scale.label(_plain(field_of(coordinate)))
+
+
+def _plain(path: str) -> str:
+    """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
+    section, _, field = named_entry(path).partition(".")
+    words = field.replace(".", " ").replace("_", " ")
+    return words if section == "pose" else f"{section}: {words}"
 
 
 def machine_of(dataset: xr.Dataset) -> Machine:

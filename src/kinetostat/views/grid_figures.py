@@ -21,7 +21,6 @@ from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import (
-    axis_values,
     contour_maps,
     curves,
     fill_regions,
@@ -32,7 +31,7 @@ from kinetostat.views.figures import (
     set_axis_scales,
     setting_lines,
 )
-from kinetostat.views.grid import frequent_sets, quantities_of
+from kinetostat.views.grid import axis_values, frequent_sets, quantities_of
 from kinetostat.views.question import Drawing
 
 LEGEND_ROW = 0.17

@@ -1,8 +1,8 @@
 """Pictures of a machine under load: its shape over the unloaded one, and the curve while the load grows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -15,7 +15,7 @@ from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
-from kinetostat.views.drawing import flat, loop, views_of
+from kinetostat.views.drawing import Loop, flat, loop, views_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, new_figure, set_title
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
@@ -32,6 +32,9 @@ BENDS = 12
 """Pieces of which a bent link is drawn."""
 MOST_SPRINGS = 12
 """Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
+
+Projection: TypeAlias = Callable[[Loop], tuple[list[float], list[float]]]
+"""Gives the coordinates of points in a picture, across and up."""
 
 
 def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Figure:
@@ -80,28 +83,27 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
     """
     machine, response = state.machine, state.state.free
     moved, named = motions_of(state, response), ("without loads", "at rest under load")
-    return moved_figure(machine, response, moved, title.format(machine.name), named, state.slack_legs)
+    draw, factor = moved_machine(machine, response, moved, state.slack_legs)
+    with mpl.rc_context(STYLE):
+        figure = views_of(
+            response.configuration, lambda panel, across, up: draw(panel, lambda points: flat(points, across, up))
+        )
+        moved_legend(figure, named, f"{setting_of(machine, [])}\n{drawn_larger(factor)}", bool(state.slack_legs))
+        set_title(figure, title.format(machine.name))
+        fix_layout(figure)
+    return figure
 
 
-def moved_figure(
-    machine: Machine,
-    response: Response,
-    moved: Deflection,
-    title: str,
-    named: tuple[str, str],
-    slack_legs: Sequence[str] = (),
-    size: str = "",
-) -> Figure:
-    """Draw a machine with exaggerated motions over the machine where it was, in front, side and plan.
+def moved_machine(
+    machine: Machine, response: Response, moved: Deflection, slack_legs: Sequence[str] = ()
+) -> tuple[Callable[[Axes, Projection], None], float]:
+    """Return how to draw a machine with exaggerated motions over the machine where it was, and the exaggeration.
 
     Args:
         machine: at its pose.
         response: of it.
         moved: motions of tool and links from there.
-        title: over the figure.
-        named: what the machine is called where it was, and as it has moved.
         slack_legs: names of those whose links are dashed.
-        size: says how large the motions are; by how much they are exaggerated if empty.
     """
     configuration = response.configuration
     factor = exaggeration_of(response, moved, proportions_of(machine, configuration).diagonal)
@@ -109,32 +111,31 @@ def moved_figure(
     motion = exaggerated_displacement(moved.motion, point, factor)
     heads = loop([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
 
-    def draw(panel: Axes, across: str, up: str) -> None:
+    def draw(panel: Axes, project: Projection) -> None:
         for leg in configuration.legs:
-            panel.plot(*flat(list(leg.path), across, up), color=UNLOADED, linewidth=1.6, solid_capstyle="round")
+            panel.plot(*project(list(leg.path)), color=UNLOADED, linewidth=1.6, solid_capstyle="round")
         for points, colour in ((heads, UNLOADED), ([motion.apply(head) for head in heads], LOADED)):
-            panel.fill(*flat(points, across, up), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
+            panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
         for link in moved.links:
             bent = [link.point(i / BENDS, factor) for i in range(BENDS + 1)]
             slack = link.leg in slack_legs
             dash, wide = ("--", 0.9) if slack else ("-", 1.6)
-            panel.plot(*flat(bent, across, up), dash, color=SLACK if slack else LOADED, linewidth=wide)
+            panel.plot(*project(bent), dash, color=SLACK if slack else LOADED, linewidth=wide)
         for tip, colour in ((point, UNLOADED), (motion.apply(point), LOADED)):
-            panel.plot(*flat([tip], across, up), "+", color=colour, markersize=7, markeredgewidth=1.2)
+            panel.plot(*project([tip]), "+", color=colour, markersize=7, markeredgewidth=1.2)
 
-    with mpl.rc_context(STYLE):
-        figure = views_of(configuration, draw)
-        styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED, "-"), (named[1], LOADED, "-")]
-        styles += [("slack", SLACK, "--")] if slack_legs else []
-        legend = figure.legend(
-            handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
-            loc="outside lower center", ncols=len(styles), title_fontsize=6.5,
-            title=f"{setting_of(machine, [])}\n{size or drawn_larger(factor)}",
-        )  # fmt: skip
-        legend.get_title().set(multialignment="center", color="#555555")
-        set_title(figure, title)
-        fix_layout(figure)
-    return figure
+    return draw, factor
+
+
+def moved_legend(figure: Figure, named: tuple[str, str], setting: str, slack: bool = False) -> None:
+    """Say below a figure what grey and blue machines are, and where; `named` has the one that has moved last."""
+    styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED, "-"), (named[1], LOADED, "-")]
+    styles += [("slack", SLACK, "--")] if slack else []
+    legend = figure.legend(
+        handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
+        loc="outside lower center", ncols=len(styles), title_fontsize=6.5, title=setting,
+    )  # fmt: skip
+    legend.get_title().set(multialignment="center", color="#555555")
 
 
 def bars_figure(state: LoadedState) -> Figure:

@@ -7,20 +7,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
+from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.machine.machine import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
-from kinetostat.views.figures import COLOURS, DASHES, new_figure
-from kinetostat.views.loaded_figures import moved_figure
+from kinetostat.views.drawing import Loop
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, new_figure
+from kinetostat.views.loaded_figures import moved_legend, moved_machine
 from kinetostat.views.question import Drawing
+from kinetostat.views.rendering.camera import VIEWPOINTS, axes_towards
+from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.vibration import axis_of
 
-IN_REPORTS = 3
-"""Modes of which reports draw the shape."""
+MOST_COLUMNS = 3
+"""Of the shapes of modes, side by side."""
+AXES_IN_DIAGONAL = 10.0
+"""Lengths of an axis of the base that is drawn, in the diagonal of the machine, about."""
+ROOM = 0.1
+"""Around each of them, as a share of the diagonal of the machine: its motion is drawn nearly so large."""
 LEAST_GAP = 0.025
 """Least distance between the numbers of two modes, as a share of the width of a panel."""
 ANY_SIZE = "a mode has a shape, and no size: the motion is as large as can be seen"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+ORIGIN = Vector(0.0, 0.0, 0.0)
 
 
 def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
@@ -28,15 +37,11 @@ def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
     if not answer.modes:
         return {}
     response = "Motion of the tool per force along it: size, phase, real part and Nyquist curve."
-    shapes = {
-        f"mode-{k + 1}": Drawing(
-            f"Shape of mode {k + 1}, {answer.machine.display.show(mode.frequency, 'Hz')}.",
-            partial(shape_figure, answer, k),
-            minor=k >= IN_REPORTS or mode.shape is None,
-        )
-        for k, mode in enumerate(answer.modes[:DRAWN])
-    }
-    return {"response": Drawing(response, partial(response_figure, answer)), **shapes}
+    drawings = {"response": Drawing(response, partial(response_figure, answer))}
+    if any(mode.shape is not None for mode in answer.modes[:DRAWN]):
+        shapes = "Shapes of the first modes over the machine at rest."
+        drawings["shapes"] = Drawing(shapes, partial(shapes_figure, answer))
+    return drawings
 
 
 def response_figure(answer: Vibration, title: str = "{}: motion of the tool per force") -> Figure:
@@ -81,6 +86,7 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
             panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             panel.label_outer()
         real.set_xlabel("frequency (Hz)")
+        size.yaxis.set_major_formatter("{x:g}")  # powers of ten would ask for a parser of mathematics
         size.set_ylabel(scale.label("receptance"))
         phase.set_ylabel("phase (deg)")
         real.set_ylabel(scale.label("real part"))
@@ -102,19 +108,53 @@ def _number_modes(panel: Axes, answer: Vibration, given: Array) -> None:
             free = mode.frequency * room
 
 
-def shape_figure(answer: Vibration, number: int, title: str = "{}: mode {} at {}") -> Figure:
-    """Draw the shape of a mode over the machine at rest, in front, side and plan.
+def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figure:
+    """Draw the shapes of the first modes over the machine at rest, seen from in front above; a planar one in plan.
+
+    All stand side by side in one panel without numbers: a panel each takes twice the time.
 
     Args:
         answer: with its modes.
-        number: of the mode, from 0.
-        title: over the figure, with braces for the machine, the number from 1 and the frequency.
-
-    Raises:
-        IndexError: there is no such mode.
+        title: over the figure, with braces for the name of the machine.
     """
-    machine, mode = answer.machine, answer.modes[number]
-    if mode.shape is None:
-        raise IndexError(number)
-    heading = title.format(machine.name, number + 1, machine.display.show(mode.frequency, "Hz"))
-    return moved_figure(machine, answer.state.free, mode.shape, heading, ("at rest", "in the mode"), size=ANY_SIZE)
+    machine, response = answer.machine, answer.state.free
+    configuration, display = response.configuration, machine.display
+    planar = configuration.plane is not None
+    right, down, _ = axes_towards([-part for part in VIEWPOINTS["top" if planar else "iso"]])
+    diagonal = proportions_of(machine, configuration).diagonal
+    axis = float(f"{diagonal / AXES_IN_DIAGONAL:.0e}")
+
+    def project(points: Loop, place: tuple[float, float] = (0.0, 0.0)) -> tuple[list[float], list[float]]:
+        across, up = (np.array([point.components() for point in points]).reshape(-1, 3) @ np.stack([right, -down]).T).T
+        return (across + place[0]).tolist(), (up + place[1]).tolist()
+
+    points = [machine.tool_point(configuration.platform), *(point for leg in configuration.legs for point in leg.path)]
+    low, high = (np.array([bound(part) for part in project(points)]) for bound in (min, max))
+    width, height = (
+        high - low + np.array([2.0, 3.5]) * ROOM * diagonal
+    )  # a mode moves to all sides; a line stands above
+    shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN], 1) if mode.shape is not None]
+    columns = min(MOST_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    across = 0.4 + 2.4 * columns
+    with new_figure((across, 0.9 + across * rows * height / (columns * width)), title.format(machine.name)) as figure:
+        panel = figure.add_subplot(aspect="equal")
+        for number, mode, shape in shown:
+            row, column = divmod(number - shown[0][0], columns)
+            place = (column * width, -row * height)
+            moved_machine(machine, response, shape)[0](panel, partial(project, place=place))
+            heading = f"{number}: {display.show(mode.frequency, 'Hz')} (tool: {mode.direction})"
+            middle = (0.5 * (low[0] + high[0]) + place[0], high[1] + place[1] + 1.5 * ROOM * diagonal)
+            panel.annotate(heading, middle, ha="center", va="bottom", size=STYLE["axes.titlesize"])
+        corner = tuple(low - np.array([0.5, 0.4]) * ROOM * diagonal)
+        for name in "xy" if planar else "xyz":
+            way = Vector(*AXES[name]) * axis
+            panel.plot(*project([ORIGIN, way], corner), color="#444444", linewidth=0.8)
+            (end,) = zip(*project([way * 1.3], corner), strict=True)
+            panel.annotate(name, end, ha="center", va="center", size=7)
+        left, top = low[0] - ROOM * diagonal, high[1] + 2.5 * ROOM * diagonal
+        panel.set(xlim=(left, left + columns * width), ylim=(top - rows * height, top))
+        panel.set_axis_off()
+        setting = f"{setting_of(machine, [])}; axes as long as {display.show(axis, 'm')}\n{ANY_SIZE}"
+        moved_legend(figure, ("at rest", "in the mode"), setting)
+    return figure

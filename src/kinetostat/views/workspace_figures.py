@@ -33,8 +33,8 @@ from kinetostat.studies.workspace_verdicts import (
     phrase,
     surface,
 )
-from kinetostat.views.figures import COLOURS, Drawings, axis_values, fill_regions, new_figure, set_axis_scales, slim_bar
-from kinetostat.views.grid import display_of
+from kinetostat.views.figures import COLOURS, Drawings, fill_regions, new_figure, set_axis_scales, slim_bar
+from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.levels import WIDE_RATIO, usual_range
 from kinetostat.views.question import Drawing
 

@@ -28,8 +28,8 @@ from kinetostat.views.analysis_tables import (
     shares_table,
     stiffness_table,
 )
-from kinetostat.views.figures import axis_values, contour_maps, curves
-from kinetostat.views.grid import display_of
+from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.report.content import (
     Block,
     Figure,
