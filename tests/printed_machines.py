@@ -19,13 +19,15 @@ def printable():
     return [name for name, m in machines.items() if m.family.chains is None or closes_inside(m)]
 
 
+LOADED = ["load.state=loaded", "load.force.2=-400 N", "limits.actuator_force=1 kN"]
 EXACT = {
     "hexapod, rigid": ("hexapod", ["stiffness.actuator=rigid"]),
     "hexapod, one rigid and one free": ("hexapod", ["stiffness.actuator.0=rigid", "stiffness.actuator.3=0"]),
     "delta, one rigid": ("delta", ["stiffness.actuator.1=rigid"]),
     "zhang-gosselin-4dof, rigid links": ("zhang-gosselin-4dof", ["stiffness.passive_links.1=rigid"]),
+    "hexapod, meant under load": ("hexapod", LOADED),
 }
-"""Machines with springs that are exactly rigid or free, by what a test calls them."""
+"""Machines with exactly rigid or free springs, and one whose limits judge its loads, by what a test calls them."""
 MACHINES = {name: (name, []) for name in printable()} | EXACT
 
 

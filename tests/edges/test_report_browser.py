@@ -78,3 +78,6 @@ def test_it_is_dark_where_people_like_it_dark_and_light_on_paper(page):
 def test_a_narrow_page_does_not_scroll_sideways(page):
     page.tab.set_viewport_size({"width": 400, "height": 640})
     page.tab.wait_for_function("document.documentElement.scrollWidth <= 400")
+    tables = "[...document.querySelectorAll('table')].filter(table => table.caption?.innerText.includes('All values'))"
+    (width,) = page.tab.evaluate(f"{tables}.map(table => table.getBoundingClientRect().right)")
+    assert width <= 400, "the data sheet is read without pushing it"

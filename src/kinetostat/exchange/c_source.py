@@ -140,7 +140,8 @@ class PrintedProgram:
 def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     """Print the formulas that the functions of a machine need."""
     kind, form, closed = functions.specimen, functions.form, functions.closed
-    entries = objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed)
+    # Limits of loads need a state of rest, which only functions of what is under load are given.
+    entries = objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed, limited=False)
     yield _program(functions, "entries_at", entries.body)
     placement, count = functions.placement, len(functions.actuators)
     body, inputs = placement.formula.body, placement.formula.inputs
@@ -163,9 +164,10 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
             yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
         if counts and counts.at_rest:
             yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
-        formula = objectives_of(kind, form, wanted, closed=closed, plan=plan, mode_counts=counts)
+        known = {"closed": closed, "limited": functions.needs_state, "plan": plan, "mode_counts": counts}
+        formula = objectives_of(kind, form, wanted, **known)
         yield _program(functions, "quantities_at", formula.body)
-        formula = objectives_of(kind, form, wanted, functions.inputs, closed, plan=plan, mode_counts=counts)
+        formula = objectives_of(kind, form, wanted, functions.inputs, **known)
         inputs = formula.inputs[: len(functions.inputs)]
         yield _program(functions, "quantity_slopes_at", with_gradients(formula.body, inputs))
 

@@ -58,7 +58,7 @@ def _lines(answer: Elevation) -> Lines:
         yield "As built", f"95 % of all machines are off by at most {size}; kinetostat budget says by what."
     yield from correction_lines(answer.corrections)
     if answer.corrections.before:
-        yield "", "gravity_angle is 90 deg - elevation."
+        yield "Angle", "gravity_angle is 90 deg - elevation."
 
 
 def _elevation_text(answer: Elevation, place: int) -> str:
@@ -241,7 +241,8 @@ def _finish(panel: Axes, answer: Elevation, label: str, factor: float, reverses:
         for each in answer.reversals:
             panel.axvline(each.elevation * factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
     if any(line.get_label() and not str(line.get_label()).startswith("_") for line in panel.get_lines()):
-        panel.legend(ncols=2, fontsize=6.5, frameon=True, framealpha=0.85, edgecolor="none")
+        # Six drives are six curves all over the panel: a legend inside would cover some of them.
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=6.5, borderaxespad=0.2)
 
 
 ELEVATION = Description(

@@ -184,14 +184,15 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     placement = functions.placement.formula
     driven = placement.body.results[: len(functions.actuators)]
     bodies = {
-        "answers": objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed).body,
+        # What is free of loads takes no state; limits of loads judge the program of the state of rest.
+        "answers": objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed, limited=False).body,
         "places": placement.body,
         "shares": functions.shares.formula.body,
     }
     counts = functions.mode_counts or ModeCounts()
     if free:
         wanted, known = [((name, 1.0),) for name in free], ModeCounts(free=counts.free) if counts.free else None
-        bodies["quantities"] = objectives_of(kind, form, wanted, closed=closed, mode_counts=known).body
+        bodies["quantities"] = objectives_of(kind, form, wanted, closed=closed, limited=False, mode_counts=known).body
         if known:
             bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
     if functions.square:
