@@ -196,7 +196,7 @@ def test_quantities_and_their_derivatives_are_those_of_the_engine(tmp_path):
         ),
         ("delta", ["linear_density.arms=1", "linear_density.bars=0.3", "load.force=[20, -30, -100]"]),
         ("tripteron", ["load.force=[20, -30, -100]"]),
-        ("hexapod-rus", ["linear_density.rods=2", "load.force=[20, -30, -3000]"]),  # its rods spin where loads move them
+        ("hexapod-rus", ["linear_density.rods=2", "load.force=[20, -30, -3000]"]),  # rods spin
     ],
 )
 def test_massive_legs_that_close_loops_have_frequencies_and_load_factors(name, settings, tmp_path):
