@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kinetostat.engine.moving import Path
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
@@ -261,3 +262,12 @@ def test_a_report_asks_for_the_motion_that_it_is_given(tmp_path):
     assert json_of(DRIVES, asked) == json_of(DRIVES, drives(machine, tmp_path / "motion.csv"))
     assert gather(machine, without=REPORT_PARTS).of("drives") is None
     assert ReportOptions(motion="motion.csv").words() == ["--motion", "motion.csv"]
+
+
+def test_a_limit_does_not_hide_that_the_machine_is_singular(tmp_path):
+    """The first leg of the Tripteron is folded at x = y = 0: no force of its drives moves the tool there."""
+    rows = "time [s],x [mm],y [mm],z [mm]\n0,0,0,500\n1,20,0,500\n"
+    answer = answer_of(tmp_path, rows, *MASS, "limits.travel_from=-1 cm", name="tripteron")
+    assert not answer.drives
+    assert answer.status is Status.SINGULAR
+    assert "cannot be followed" in answer.message
