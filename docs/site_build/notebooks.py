@@ -4,7 +4,9 @@ python docs/site_build/notebooks.py
 """
 
 import json
+import os
 import re
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,6 +16,10 @@ TUTORIALS = ROOT / "docs" / "tutorials"
 NOTEBOOKS = ("paper-machine", "read-a-map", "optimise", "calibrate")
 FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$\n?", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:|#)((?:\.\./)*)([^)]+)\)")
+CURSOR = re.compile(r"\x1b\[\?25[lh]")
+"""Hides and shows the cursor of a terminal."""
+ERASED = re.compile(r"[^\n]*\n\r?\x1b\[1A\x1b\[2K|[^\n]*\x1b\[2?K")
+"""Lines that a terminal has erased again."""
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
@@ -62,12 +68,29 @@ def answered(name: str) -> str:
     import nbformat
 
     cells: Any = nbformat.reads(written(name), as_version=4)
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # `kinetostat` of this Python
     with TemporaryDirectory() as folder:
         nbclient.NotebookClient(cells, timeout=None, resources={"metadata": {"path": folder}}).execute()
     for cell in cells.cells:
         cell.metadata = {}  # times of the run
+        if "outputs" in cell:
+            cell.outputs = _settled(cell.outputs)
     cells.metadata = {"kernelspec": KERNEL}
     return str(nbformat.writes(cells)) + "\n"
+
+
+def _settled(outputs: list[Any]) -> list[Any]:
+    """Answers of a cell as a terminal shows them at the end: what a progress bar wrote and erased is gone."""
+    kept: list[Any] = []
+    for output in outputs:
+        if kept and output.output_type == kept[-1].output_type == "stream" and output.name == kept[-1].name:
+            kept[-1].text += output.text
+        else:
+            kept.append(output)
+    for output in kept:
+        if output.output_type == "stream":
+            output.text = ERASED.sub("", CURSOR.sub("", output.text.replace("\r\n", "\n")))
+    return [output for output in kept if output.get("text", "shown")]
 
 
 if __name__ == "__main__":

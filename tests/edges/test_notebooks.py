@@ -45,6 +45,8 @@ def code_of(notebook):
 def test_a_notebook_is_stored_with_its_answers(path):
     notebook = nbformat.read(path, as_version=4)
     assert all(cell.outputs for cell in code_of(notebook) if "print(" in cell.source)
+    said = [output.get("text", "") for cell in code_of(notebook) for output in cell.outputs]
+    assert not [text for text in said if "\u2501" in text or "\x1b[K" in text]  # bars of progress, which were erased
 
 
 def test_a_notebook_runs(tmp_path, monkeypatch):
