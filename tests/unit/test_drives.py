@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from kinetostat.engine.moving import Path
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, load
+from kinetostat.motion.forces import PARTS
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.drives import drives
@@ -271,3 +272,14 @@ def test_a_limit_does_not_hide_that_the_machine_is_singular(tmp_path):
     assert not answer.drives
     assert answer.status is Status.SINGULAR
     assert "cannot be followed" in answer.message
+
+
+def test_a_drive_that_stands_has_no_friction(tmp_path):
+    """At both ends of a move with limited jerk, speeds of drives are round-off."""
+    rows = (
+        "feed [mm/s], acceleration [m/s**2], jerk [m/s**3], x [mm], roll [deg]\n300, 5, 100, 0, 0\n300, 5, 100, 15, 2\n"
+    )
+    answer = answer_of(tmp_path, rows, *MASS, "drives.guide_friction=7 N")
+    friction = answer.curves.parts[:, PARTS.index("friction")]
+    assert (friction[:, [0, -1]] == 0.0).all()
+    assert np.abs(friction).max(axis=1) == pytest.approx(7.0)

@@ -22,6 +22,8 @@ PARTS = ("weight", "inertia", "process", "friction", "springs")
 """Parts of what drives must do: against the weight of all parts, to accelerate masses and rotors, against the loads on
 the platform, against friction of joints and drives, and against flexure hinges."""
 NOTHING = Wrench(ZERO, ZERO)
+STANDING = 1e-12
+"""Rate of a joint, rad/s or in lengths of the machine per second, up to which it stands: round-off, not a motion."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
     in_balls = {place for ball in leg.balls for place in ball}
     for place, part in enumerate(leg.friction):
         if place not in in_balls and not is_zero(part.coulomb):
-            row[place] = row[place] + part.coulomb * sign(motion.rates[place])
+            row[place] = row[place] + part.coulomb * sense(motion.rates[place])
     for ball in leg.balls:
         coulomb = leg.friction[ball[0]].coulomb
         if is_zero(coulomb):
@@ -175,15 +177,15 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
             row[place] = row[place] + coulomb * (axis.dot(turning) * share)
     for place, number in enumerate(leg.drives, leg.passive):
         drive, rate = machine.drives[number], motion.rates[place]
-        row.append(drive.viscous * rate + (drive.coulomb + drive.guide) * sign(rate))
+        row.append(drive.viscous * rate + (drive.coulomb + drive.guide) * sense(rate))
     return row
 
 
-def sign(a: Scalar) -> Scalar:
-    """1 of a positive number, -1 of a negative one, 0 of 0."""
-    if is_zero(a):
+def sense(rate: Scalar) -> Scalar:
+    """1 of a joint that moves forward, -1 of one that moves back, 0 of one that stands: round-off has no friction."""
+    if is_zero(rate):
         return 0.0
-    return where(a > 0.0, 1.0, where(a < 0.0, -1.0, 0.0))
+    return where(rate > STANDING, 1.0, where(rate < -STANDING, -1.0, 0.0))
 
 
 def demands(machine: RigidMachine, motion: MachineMotion) -> dict[str, ForceDemand]:

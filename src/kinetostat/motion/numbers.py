@@ -14,7 +14,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.machine import Configuration
-from kinetostat.motion.forces import NOTHING, PARTS, ForceDemand, drive_forces, leg_wrenches, sign
+from kinetostat.motion.forces import NOTHING, PARTS, ForceDemand, drive_forces, leg_wrenches, sense
 from kinetostat.motion.operators import MachineAtPose, forces_along, mass_at_drives
 from kinetostat.motion.rates import PoseRates
 
@@ -128,7 +128,7 @@ def tool_wrench(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
         for place, number in enumerate(leg.drives, leg.passive):
             drive, rate = here.rigid.drives[number], moving.rates[place]
             row[place] = (
-                row[place] - drive.inertia * moving.change[place] - drive.viscous * rate - drive.coulomb * sign(rate)
+                row[place] - drive.inertia * moving.change[place] - drive.viscous * rate - drive.coulomb * sense(rate)
             )
         for solved, force in zip(leg.solved, row, strict=True):
             whole = [a - b * force for a, b in zip(whole, solved, strict=True)]
