@@ -365,13 +365,16 @@ def test_a_page_follows_its_address_and_its_sliders(pages, new_tab):
 
 
 @needs_chromium
-@pytest.mark.parametrize("width", [390, 768, 1280, 1920])
+@pytest.mark.parametrize("width", [390, 768, 870, 1280, 1920])
 def test_nothing_sticks_out_at_any_width(pages, width, new_tab):
     watched = new_tab(width)
-    for name in ("hexapod-hardware", "planar-3rrr", "delta"):
+    parts = "[...document.querySelectorAll('.column > *')]"
+    wide = f"{parts}.filter(one => one.offsetWidth > (one.parentElement.clientWidth || innerWidth))"
+    for name in ("hexapod-hardware", "planar-3rrr", "delta", "cogiro"):
         watched.tab.goto(pages[name].as_uri())
         watched.tab.wait_for_function("document.documentElement.dataset.mapTime")
         assert watched.tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
+        assert not watched.tab.evaluate(f"{wide}.map(one => one.className)"), f"{name}: one column covers the other"
     assert not watched.complaints
 
 

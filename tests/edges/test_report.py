@@ -129,6 +129,17 @@ def test_every_question_has_a_section(paper):
     assert ranking[0] == "geometry.passive_links.0"
 
 
+def test_parts_that_share_a_direction_are_named_by_their_kind_and_numbers_have_no_unit(tmp_path):
+    """Each of eight winches has too small a share to be named alone; the exponent of a norm is no length per length."""
+    with pytest.MonkeyPatch.context() as patch:
+        no_pictures(patch)
+        page = Page(reported(tmp_path / "r.html", "cogiro", *QUICK, "--without", "maps"))
+    mainly = {row[0]: row[-1] for row in page.table("Each direction")[1:]}
+    assert mainly["z"] == mainly["rz"] == "winch ×8 100\N{NO-BREAK SPACE}%"
+    assert mainly["x"].startswith("cable 3 winch 31")
+    assert {row[0]: row[1] for row in page.table("All values")[1:]}["cables.exponent"] == "2"
+
+
 def test_it_can_be_made_again(paper, tmp_path):
     """The command, the file as written, and the machine with its overrides are in the page."""
     assert 'kinetostat report zhang-gosselin-4dof --set \'load.force=["0 N","0 N","-500 N"]\'' in paper.text

@@ -239,7 +239,8 @@ def _the(answer: Guidelines, k: int) -> str:
     if not _many(element):
         return element.name
     label = element.name.partition(" ×")[0]
-    noun = f"{label} links" if label in WITHOUT_NOUN else label if label.endswith("s") else f"{label}s"
+    ending = "" if label.endswith("s") else "es" if label.endswith(("ch", "sh", "x")) else "s"
+    noun = f"{label} links" if label in WITHOUT_NOUN else f"{label}{ending}"
     alike = [other for other in answer.elements if other.name.partition(" ×")[0] == label]
     return f"the {noun}" if len(alike) == 1 else f"the {len(element.parts)} {noun}"
 

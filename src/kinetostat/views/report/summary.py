@@ -4,18 +4,21 @@ Nothing is computed here but sums of shares.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.display import Display, number
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.machine import springs as springs_of
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.spec.installation import extra_command
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.attribution import by_part, ranking_of
+from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
@@ -31,10 +34,6 @@ from kinetostat.views.validation import verdict
 
 LINES_OF_THE_POSE = ("Pose", "Margin")
 """Lines about the free machine that stand in the summary of a loaded one, whose stiffness is that at rest."""
-MOST_PARTS_NAMED = 2
-"""Number of parts that are named in each direction, at most."""
-LEAST_NAMED_SHARE = 0.05
-"""Share of a direction's compliance from which a part is named."""
 
 
 def summary_section(answers: Answers, validation: Validation | str, portrait: Figure) -> Section:
@@ -115,13 +114,13 @@ def _directions(answers: Answers) -> Table:
     analysis = answers.analysis
     display = analysis.machine.display
     heads = ("direction", "compliance C", "stiffness 1/C", "stiffness K", "mainly from")
-    rows = []
+    springs, rows = springs_of(state_of(analysis.machine).configuration), []
     for i, name in enumerate(analysis.components):
         soft, stiff = float(analysis.compliance_diagonal[i]), float(analysis.stiffness_diagonal[i])
         free = math.inf if soft == 0.0 else 1.0 / soft
         values = [_shown_value(soft, f"compliance_{name}", "free", display)]
         values += [_shown_value(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
-        rows.append((name, *values, _contributors(analysis, i)))
+        rows.append((name, *values, _contributors(analysis, springs, i)))
     caption = (
         f"Each direction at the {analysis.machine.reference}: C is the motion by a unit load in the same direction, "
         "1/C the stiffness with all other motions free to follow, K the stiffness with all other motions held."
@@ -133,13 +132,9 @@ def _shown_value(value: float, quantity: str, infinite: str, display: Display) -
     return typeset(display.show(value, QUANTITIES[quantity].unit, infinite))
 
 
-def _contributors(analysis: Analysis, i: int) -> str:
-    parts = by_part(analysis.attribution).items()
-    shares = {name: float(np.nansum([spring.compliance_share[i] for spring in springs])) for name, springs in parts}
-    largest = [pair for pair in ranking_of(shares) if pair[1] >= LEAST_NAMED_SHARE]
-    named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_PARTS_NAMED])
-    more = len(largest) - MOST_PARTS_NAMED
-    return f"{named} and {more} more" if more > 0 else named or "nothing"
+def _contributors(analysis: Analysis, springs: Sequence[Spring], i: int) -> str:
+    shares = {one.spring: float(np.nan_to_num(one.compliance_share[i])) for one in analysis.attribution}
+    return largest_contributors(*parts_and_kinds(springs, shares)) or "nothing"
 
 
 def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figure:
