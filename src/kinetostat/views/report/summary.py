@@ -133,7 +133,7 @@ def _shown_value(value: float, quantity: str, infinite: str, display: Display) -
 
 
 def _contributors(analysis: Analysis, springs: Sequence[Spring], i: int) -> str:
-    shares = {one.spring: float(np.nan_to_num(one.compliance_share[i])) for one in analysis.attribution}
+    shares = {part.spring: float(np.nan_to_num(part.compliance_share[i])) for part in analysis.attribution}
     return largest_contributors(*parts_and_kinds(springs, shares)) or "nothing"
 
 
