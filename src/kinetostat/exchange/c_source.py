@@ -9,6 +9,7 @@ pose by pose, and a make file. Nothing but libm is needed.
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
@@ -164,10 +165,12 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
             yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
         if counts and counts.at_rest:
             yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
-        known = {"closed": closed, "limited": functions.needs_state, "plan": plan, "mode_counts": counts}
-        formula = objectives_of(kind, form, wanted, **known)
-        yield _program(functions, "quantities_at", formula.body)
-        formula = objectives_of(kind, form, wanted, functions.inputs, **known)
+        limited = functions.needs_state
+        traced = partial(
+            objectives_of, kind, form, wanted, closed=closed, limited=limited, plan=plan, mode_counts=counts
+        )
+        yield _program(functions, "quantities_at", traced().body)
+        formula = traced(functions.inputs)
         inputs = formula.inputs[: len(functions.inputs)]
         yield _program(functions, "quantity_slopes_at", with_gradients(formula.body, inputs))
 
