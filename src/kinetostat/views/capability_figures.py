@@ -98,6 +98,7 @@ def _draw_row(
         panel.plot(0.0, 0.0, "+", color="#444444", markersize=5)
         limit = reach * scale.factor
         panel.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+        panel.locator_params(axis="x", nbins=4)  # five-digit forces run into each other in three panels side by side
         panel.set_xlabel(scale.label(f"{part.name} {'xyz'[plane[0]]}"))
         panel.set_ylabel(scale.label(f"{part.name} {'xyz'[plane[1]]}"))
     row[0].set_title(TITLES[part.name], loc="left")
