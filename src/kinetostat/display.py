@@ -18,6 +18,7 @@ DIGITS = (2, 12)
 DASH = "–"
 """Stands where there is no number."""
 INFINITE = "∞"
+_HYPHEN_OF_NUMBER = re.compile(r"(?<![\w.,)-])-(?=[\d.∞])")
 MOST_DECIMALS = 6
 """Decimals with which a number stands beside its uncertainty at most."""
 PLAIN_POWERS = (-3, 5)
@@ -176,6 +177,11 @@ def number(value: float | None, endless: str = INFINITE, digits: int = 4) -> str
     if PLAIN_POWERS[0] <= size <= PLAIN_POWERS[1]:
         return _without_zeros(f"{value:.{max(digits - 1 - size, 0)}f}")
     return f"{_without_zeros(mantissa)}e{size}"
+
+
+def with_minus_signs(text: str) -> str:
+    """Return a text with a minus sign in front of negative numbers instead of a hyphen, for pages and print."""
+    return _HYPHEN_OF_NUMBER.sub("\N{MINUS SIGN}", text)
 
 
 def number_and_uncertainty(value: float, uncertainty: float) -> tuple[str, str]:

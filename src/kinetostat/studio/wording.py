@@ -7,14 +7,13 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from kinetostat.display import ENGINEERING, Display
+from kinetostat.display import ENGINEERING, Display, with_minus_signs
 from kinetostat.machine.parameters import Parameter, entry_name
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
 
 FIELD_DIGITS = 6
 """Significant digits of a value in a field that may be typed over."""
-MINUS = "\u2212"
 LEAST_FULL_BAR = 1e-3
 """Least logarithm of a gain that fills a whole bar, so that bars stay short if all gains are tiny."""
 
@@ -39,7 +38,7 @@ def engineering(value: float | None, unit: str = "1", display: Display = ENGINEE
 
 def entry(value: float | None, unit: str, display: Display = ENGINEERING) -> str:
     """Return a matrix entry without its unit, e.g. "0.5094"; a dash if there is none."""
-    return display.number(value, unit).replace("-", MINUS)
+    return with_minus_signs(display.number(value, unit))
 
 
 def label(parameter: Parameter) -> str:
@@ -83,7 +82,7 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(
         f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'
-        for first, *rest in rows
+        for first, *rest in ((name, *map(with_minus_signs, cells)) for name, *cells in rows)
     )
     columns = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
     return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{columns}<tbody>{body}</tbody></table>'
@@ -104,7 +103,7 @@ def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str
         f'<li{of_leg.get(name, "")}><span class="bar-name" title="{escape(name)}">{escape(name)}</span>'
         f'<span class="bar-track"><span class="bar-fill {"negative" if share < 0 else ""}" '
         f'style="width:{100 * min(abs(share), 1.0):.2f}%"></span></span>'
-        f'<span class="bar-value">{escape(text)}</span></li>'
+        f'<span class="bar-value">{escape(with_minus_signs(text))}</span></li>'
         for name, share, text in rows
     )
     return f'<ol class="bars" aria-label="{escape(caption)}">{items}</ol>'

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 from rich.table import Table as TerminalTable
 
+from kinetostat.display import with_minus_signs
 from kinetostat.frozen import dataclass
 
 
@@ -130,7 +131,6 @@ class Report:
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
 _EXPONENT = re.compile(r"\*\*([2-4])\b")
-_MINUS = re.compile(r"(?<![\w.,)-])-(?=[\d.])")
 _DEGREES = re.compile(r"(?<=\d) deg\b")
 _WHOLE = re.compile(r"(?<=\d)\.0(?= (?:m|rad|N|kg|Pa)\b)")
 _PLAIN_NUMBER = re.compile(r"[-+.\de]+")
@@ -144,7 +144,7 @@ def typeset(text: str) -> str:
     text = _ZEROS.sub(lambda match: _scientific(match[1], len(match[2])), text)
     text = _POWER.sub(lambda match: "×10" + f"{match[1].replace('+', '')}{match[2]}".translate(_SUPERSCRIPTS), text)
     text = _TIMES.sub("\\1 × ", _WHOLE.sub("", text))
-    return _DEGREES.sub("°", _MINUS.sub("−", text))
+    return _DEGREES.sub("°", with_minus_signs(text))
 
 
 def _scientific(digits: str, zeros: int) -> str:
