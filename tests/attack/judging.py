@@ -172,10 +172,11 @@ def wrong_answer(machine: Machine) -> str | None:
             return f"NaN in the {name} of a pose that is ok"
     if all(c == 0.0 for c in analysis.compliance_diagonal) and not analysis.rigid:
         return "a compliance of zeros, and no spring is rigid"
-    shares = [entry.compliance_share for entry in analysis.attribution]
-    return (
-        "NaN in a share" if any(x is not None and math.isnan(x) for share in shares for x in np.ravel(share)) else None
-    )
+    # Where nothing is compliant, or something is free, there is nothing to share.
+    diagonal = np.asarray(analysis.compliance_diagonal, dtype=float)
+    shared = np.isfinite(diagonal) & (diagonal != 0.0)
+    shares = [np.asarray(entry.compliance_share, dtype=float) for entry in analysis.attribution]
+    return "NaN in a share" if any(np.isnan(share[shared]).any() for share in shares) else None
 
 
 def _lost_in_writing(machine: Machine) -> str | None:
