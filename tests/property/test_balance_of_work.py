@@ -44,7 +44,9 @@ def lightly_loaded(machine, wrench):
     exists = np.isin(np.arange(6), machine.family.components)
     wrench = np.where(exists, wrench, 0.0) * units
     softest = np.linalg.norm(np.array(response.compliance.rows(), dtype=float) * np.outer(units, units))
-    wrench = wrench * (SMALL / (softest * np.linalg.norm(wrench / units)) if softest > 0.0 else 0.0)
+    moved = softest * np.linalg.norm(wrench / units)
+    # Nothing moves where all is rigid, or where a planar machine is pushed out of its plane.
+    wrench = wrench * (SMALL / moved if moved > 0.0 else 0.0)
     names = [f"load.{kind}.{i}" for kind in ("moment", "force") for i in range(3)]
     loaded = {name: float(c) for name, c, there in zip(names, wrench, exists, strict=True) if there}
     return wrench, under_load(with_values(machine, loaded))
