@@ -1,9 +1,11 @@
 """Motions with forces of the process: the same forces set in the file point by point, and the work done at the tool."""
 
+import io
 import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from kinetostat.engine.moving import Path, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
@@ -14,7 +16,7 @@ from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import Motion, read_motion
 from kinetostat.studies.motors import motors
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.views.data_forms import dataset_of, json_of
+from kinetostat.views.data_forms import json_of, netcdf_of
 from kinetostat.views.drives import DRIVES, curves_csv
 
 MASSES = ("tool.mass=3 kg", "tool.inertia=[0.02, 0.03, 0.04, 0.001, 0, 0.002]", "load.gravity=[0, 0, -9.81]")
@@ -167,13 +169,13 @@ def test_every_surface_has_the_forces_of_the_motion(tmp_path):
     given = json_of(DRIVES, answer)["loads"]["load.force.z"]
     assert given["units"] == "N"
     assert given["values"] == pytest.approx(motion.path.loads["load.force.2"])
-    data = dataset_of(DRIVES, answer)
+    data = xr.load_dataset(io.BytesIO(netcdf_of(DRIVES, answer)))
     rows = data.loads_over_time.sel(load_component="load.force.x")
     assert rows.values == pytest.approx(motion.path.loads["load.force.0"])
     quiet = drives(machine, read(tmp_path, machine, "time, x\n0, 0\n0.2, 0.001\n"))
     assert "Loads" not in dict(DRIVES.lines(quiet))
     assert "loads" not in json_of(DRIVES, quiet)
-    assert dataset_of(DRIVES, quiet).loads_over_time.shape[0] == 0
+    assert xr.load_dataset(io.BytesIO(netcdf_of(DRIVES, quiet))).loads_over_time.shape[0] == 0
 
 
 def test_a_force_alone_asks_something_of_drives_and_motors(tmp_path):
