@@ -204,6 +204,8 @@ def test_massive_legs_that_close_loops_have_frequencies_and_load_factors(name, s
     machine = load(name, ["tool.mass=2 kg", *settings])
     wanted = ["frequency_1", "frequency_2", "loaded_frequency_1", "load_factor"]
     functions = Functions(machine, tmp_path, None, wanted)
+    (header,) = tmp_path.rglob("*.h")
+    assert re.search(r"At most \d{6,} before them, for the states and modes", header.read_text("utf-8"))
     poses, points = poses_of(machine, 6, 0.03)
     size = poses.shape[1]
     codes, found, slopes = functions.at("quantities", poses, len(wanted), len(wanted) * size)

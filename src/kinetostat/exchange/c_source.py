@@ -52,7 +52,7 @@ from kinetostat.studies.commanding import actuator_targets
 from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import CLOSED, COMMANDED
 from kinetostat.units import KINDS
-from kinetostat.vibration.springwise import ModeCounts
+from kinetostat.vibration.springwise import ModeCounts, SpringSizes
 
 FILE_NAME = re.compile(r"[\w.-]+$", re.ASCII)
 TEMPLATES = Path(__file__).with_name("c")
@@ -279,6 +279,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
         poses = STEPS_OF_COMMAND + 2 * functions.coordinates
         work["command"] = poses * (work["rest"] + 2 * work["placement_at"])
+    before = _operations_before(functions, work)
     given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.arguments)]
     driven = [f"[{k}]: {in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
@@ -292,8 +293,28 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         "given": listing(given),
         "driven": listing(driven),
         "listed": listing(listed),
+        "before": f"\n   At most {before} before them, for the states and modes that they are of." if before else "",
     }
     return filled_template(functions, "header.h", words | work)
+
+
+def _operations_before(functions: MachineFunctions, work: Mapping[str, int]) -> int:
+    """Operations at most that find the state of rest and the modes of which quantities are: see `_state_lines`."""
+    counts = functions.mode_counts or ModeCounts()
+    result = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] if functions.needs_state else 0
+    solved = {"springs_at": (counts.free,), "springs_at_rest_at": (counts.loaded, counts.factor)}
+    for program, groups in solved.items():
+        result += work[program] if any(groups) else 0
+        result += sum(_operations_of_modes(functions.springs, count) for count in groups if count)
+    return result
+
+
+def _operations_of_modes(sizes: SpringSizes, count: int) -> int:
+    """Operations at most of `modes_of` in source.c, loop by loop."""
+    n, entries = sizes.springs, sizes.springs * (sizes.springs + 1) // 2
+    closed = 4 * sizes.ways * entries + 8 * sizes.conditions * n * n
+    rotations = SWEEPS * n * (n - 1) // 2 * (16 + 18 * n) + 2 * n * n
+    return 2 * closed + 3 * n**3 + 4 * n * n + rotations + count * 2 * n * n
 
 
 def in_comment(text: str) -> str:

@@ -49,7 +49,7 @@ int machine_command(const machine_real in[], machine_real coordinates[]);
 
 /* Quantities, in SI, and unless slopes is a null pointer, their derivatives by all inputs
    [MACHINE_QUANTITIES x MACHINE_INPUTS], NaN where a quantity is infinite:
-$listed   $quantities_at operations; $quantity_slopes_at with slopes. */
+$listed   $quantities_at operations; $quantity_slopes_at with slopes.$before */
 int machine_quantities(const machine_real in[], machine_real quantities[], machine_real *slopes);
 /* section: always */
 
