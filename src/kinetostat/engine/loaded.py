@@ -284,7 +284,7 @@ class RestFill:
             memory.reverse()
 
     def _approach(self, given: list[Array], memory: list[Array], count: int) -> None:
-        """Lead states nearer to rest by steps of the chord method, as long as these shrink fast.
+        """Take steps of the chord method towards the states of rest, as long as they shrink fast.
 
         Args:
             given: columns of the programs before those of the states.

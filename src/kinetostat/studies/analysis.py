@@ -139,7 +139,7 @@ class Analysis(ImmutableAnswer):
 
     @property
     def K(self) -> Array:  # noqa: N802
-        """Stiffness at T [n x n], SI, as an array; rows and columns as in `components`.
+        """Stiffness at T [n x n], SI; rows and columns as in `components`.
 
         Raises:
             InputError: it is not finite here, or the pose has no answer.
@@ -148,7 +148,7 @@ class Analysis(ImmutableAnswer):
 
     @property
     def C(self) -> Array:  # noqa: N802
-        """Compliance at T [n x n], SI, as an array; rows and columns as in `components`.
+        """Compliance at T [n x n], SI; rows and columns as in `components`.
 
         Raises:
             InputError: it is not finite here, or the pose has no answer.

@@ -84,7 +84,10 @@ class ScrewRating:
 
     @property
     def turning(self) -> float:
-        """Inertia of all that turns in it, kg·m²; of a solid shaft, pi/32 times density and diameter to the fourth."""
+        """Moment of inertia of all that turns with the screw, kg·m².
+
+        Per length, a solid shaft has pi / 32 times its density times the fourth power of its diameter.
+        """
         solid = math.pi / 32.0 * MATERIALS["steel"].density * self.diameter**4
         return self.inertia + (self.shaft or solid) * self.length
 

@@ -251,13 +251,13 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
     ]
     table = numeric_table("Eigenscrews", "", heads)
     for i, screw in enumerate(screws, 1):
-        point = "–" if screw.point is None else _point(screw.point, display)
+        point = "–" if screw.point is None else _point_text(screw.point, display)
         cells = (display.number(screw.eigenvalue, "N/rad", "infinite"), display.number(screw.pitch, "m", "infinite"))
         table.add_row(str(i), *cells, direction_words(screw.direction), point)
     return table
 
 
-def _point(point: Array, display: Display) -> str:
+def _point_text(point: Array, display: Display) -> str:
     """A point given in m, without round-off."""
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
@@ -316,7 +316,7 @@ def remarks(analysis: Analysis) -> list[str]:
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
-            place = f"{_point(centre, display)} {display.scale('m').unit}"
+            place = f"{_point_text(centre, display)} {display.scale('m').unit}"
             lines.append(f"Centre of stiffness: {place} from the {analysis.machine.reference}.")
         lines.append(
             f"Condition numbers: {number(analysis.indices.stiffness_condition, 'infinite')} of K, "

@@ -37,11 +37,13 @@ def influence_table(answer: Sensitivity, count: int) -> FittedTable:
     table = numeric_table(f"{machine.name}: {title}", "parameter", ["value", *heads])
     for influence in answer.parameters[:count]:
         value = machine.display.show(influence.value, KINDS[influence.kind].unit, RIGID, DIGITS_OF_PARAMETERS)
-        table.add_row(with_leg(machine, influence.path), value, *(_percent(percent) for percent in influence.percents))
+        table.add_row(
+            with_leg(machine, influence.path), value, *(_percent_text(percent) for percent in influence.percents)
+        )
     return table
 
 
-def _percent(value: float) -> str:
+def _percent_text(value: float) -> str:
     """Return a number with three decimals, or a dash where there is none."""
     if math.isnan(value):
         return "–"
