@@ -313,7 +313,7 @@ def _operations_of_modes(sizes: SpringSizes, count: int) -> int:
     """Operations at most of `modes_of` in source.c, loop by loop."""
     n, entries = sizes.springs, sizes.springs * (sizes.springs + 1) // 2
     closed = 4 * sizes.ways * entries + 8 * sizes.conditions * n * n
-    rotations = SWEEPS * n * (n - 1) // 2 * (16 + 18 * n) + 2 * n * n
+    rotations = SWEEPS * n * (n - 1) // 2 * (17 + 18 * n) + 2 * n * n
     return 2 * closed + 3 * n**3 + 4 * n * n + rotations + count * 2 * n * n
 
 
