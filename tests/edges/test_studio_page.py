@@ -336,7 +336,7 @@ def test_every_view_follows():
             await page.front(tab)
             assert words in page.one(mark).content
         await page.send("control load.force.2", "write", "-500 N")
-        assert "-500 N" in page.one("under-load").content
+        assert "−500 N" in page.one("under-load").content
         assert page.one("exaggeration").visible
         names = [solid["name"] for solid in page.shown("MachineView", "overlay")]
         assert "load/force" in names
