@@ -11,7 +11,7 @@ from typing import Any
 
 import httpx
 import pytest
-from nicegui import background_tasks, core, ui
+from nicegui import Client, background_tasks, core, ui
 from nicegui.elements.upload_files import SmallFileUpload
 from nicegui.events import GenericEventArguments, handle_event
 from nicegui.testing import User
@@ -165,6 +165,13 @@ def recorded(calls: list[tuple[str, str, Any]]) -> Iterator[None]:
         yield
 
 
+async def outboxes_ended() -> None:
+    """End what sends to the pages: where it wakes while NiceGUI cancels it, NiceGUI waits two seconds for it."""
+    for client in Client.instances.values():
+        client.outbox.stop()
+    await asyncio.gather(*(t for t in background_tasks.running_tasks if t.get_name().startswith("outbox loop")))
+
+
 def on_page(
     steps: Callable[[Page], Awaitable[None]],
     machine: str = "zhang-gosselin-4dof",
@@ -185,6 +192,7 @@ def on_page(
                     await steps(await opened(user, calls))
                 except BaseException as error:  # NiceGUI ends its tasks only where all went well; they would run on
                     failed = error
+                await outboxes_ended()
             if failed is not None:
                 raise failed
 
