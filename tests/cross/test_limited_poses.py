@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.engine.batch import first_limit_passed, limits_used
+from kinetostat.engine.batch import first_limit_passed, in_slabs, limits_used
 from kinetostat.engine.form import Specimen, form_of, traced_machine
 from kinetostat.engine.kernel import slab_fill
+from kinetostat.engine.loaded import Way, loaded_fill
+from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
@@ -96,6 +99,36 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
         broken = [check.limit.name for check in response.checks if not check.kept]
         if expected[i] == Status.JOINT_LIMIT:
             assert fields[passed[i]] == broken[0]
+
+
+def test_no_limit_hides_that_a_pose_is_singular():
+    """A Gough platform is singular where it is turned by a right angle; every leg of this one is too long as well."""
+    machine = load("hexapod", ["limits.longest_leg=7 cm", "tool.mass=2 kg"])
+    columns = {"pose.yaw": np.array([0.0, math.pi / 2])}
+    expected = [Status.JOINT_LIMIT, Status.SINGULAR]
+    assert [respond(at(machine, columns, i)).status for i in range(2)] == expected
+    with np.errstate(all="ignore"):
+        assert np.array_equal(np.broadcast_to(respond(with_values(machine, columns)).status, 2), expected)
+    results, codes = np.empty((1, 2)), np.empty(2, dtype=np.int8)
+    slab_fill(machine, [*columns], ["compliance_z"])(columns, results, codes)
+    assert codes.tolist() == expected
+    assert np.isnan(results).all()
+    refusal = state_of(at(machine, columns, 1)).refusal
+    assert "singular (actuation singularity)" in refusal
+    assert "limits.longest_leg asks for at most 70 mm" in refusal
+
+
+@pytest.mark.parametrize("way", [Way.ANY_MACHINE, Way.NATIVE])
+def test_loads_that_hold_a_singular_machine_hold_it_within_its_limits_only(way):
+    """Weight holds the platform of a hexapod that hangs in its singular pose; a limit forbids the pose nevertheless."""
+    hangs = ["tool.mass=3 kg", "load.gravity=[0, 0, 9.81]", 'load.state="loaded"']
+    columns = {"pose.yaw": np.full(4, math.pi / 2), "load.force.2": np.linspace(0.0, 3.0, 4)}
+    statuses = []
+    for limits in ((), ("limits.longest_leg=7 cm",)):
+        machine = load("hexapod", [*hangs, *limits])
+        fill = loaded_fill(machine, [*columns], ["displacement_z"], way)
+        statuses.append(in_slabs(PointTable(columns), fill, 1, way.slab, 1)[1].tolist())
+    assert statuses == [[Status.OK] * 4, [Status.JOINT_LIMIT] * 4]
 
 
 @pytest.mark.parametrize(("name", "load_settings", "fields"), CASES, ids=[case[0] for case in CASES])

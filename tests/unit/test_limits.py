@@ -208,7 +208,7 @@ class TestDistance:
         (0, True, 1.0, False, True, Status.JOINT_LIMIT),
         (0, True, 1.0, True, False, Status.JOINT_LIMIT),
         (0, True, 0.0, True, False, Status.SINGULAR),
-        (0, True, 0.0, False, True, Status.JOINT_LIMIT),
+        (0, True, 0.0, False, True, Status.SINGULAR),
         (0, False, 1.0, False, False, Status.OUT_OF_REACH),
         (4, True, 1.0, False, False, Status.NOT_CONVERGED),
     ],

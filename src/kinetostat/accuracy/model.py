@@ -31,7 +31,7 @@ from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
@@ -42,9 +42,6 @@ from kinetostat.tolerances import ONE_PLACEMENT
 
 LOAD = "load."
 """Prefix of the fields of [load], which press joints and move no leg of the drawn machine."""
-
-PLACED = (Status.OK, Status.JOINT_LIMIT)
-"""Statuses at which errors have a meaning."""
 
 
 @dataclass(frozen=True)
@@ -211,8 +208,8 @@ class ErrorModel:
         each = np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
         for number, spring in enumerate(drawn.springs, len(self.sources)):
             motion = motion + spring.deflection(drawn.load) * each[:, number, None]
-        status = np.where(np.isin(drawn.status, PLACED) & ~state.settled, int(Status.NOT_CONVERGED), drawn.status)
-        return np.where(np.isin(status, PLACED)[:, None], motion, np.nan), status
+        status = np.where(np.isin(drawn.status, REGULAR) & ~state.settled, int(Status.NOT_CONVERGED), drawn.status)
+        return np.where(np.isin(status, REGULAR)[:, None], motion, np.nan), status
 
     def linearisation(self, values: Array, wanted: Collection[int]) -> tuple[Array, Array]:
         """Compute `displacement` and `rates` at errors [errors] together [n x 6], [n x 6 x errors].
@@ -257,7 +254,7 @@ class ErrorModel:
                     result[:, :, number] += twists[:, :, column]
         result[:, 3:] *= length
         result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
-        sound = np.isin(self.drawn.status, PLACED) & state.settled
+        sound = np.isin(self.drawn.status, REGULAR) & state.settled
         return np.where(sound[:, None, None], result, np.nan)
 
 
@@ -352,7 +349,7 @@ def _mark_other_placements(rows: HomeRows, coordinates: Sequence[Array], actuato
         for drive in (unit.drive for unit in row.units if unit.drive):
             off = actuators[:, drive.number] - drive.home - drive.sense * joints[:, drive.coordinate]
             off = off / rows.length if drive.slides else np.arctan2(np.sin(off), np.cos(off))
-            elsewhere = ~(np.abs(off) < ONE_PLACEMENT) & np.isin(status, PLACED)
+            elsewhere = ~(np.abs(off) < ONE_PLACEMENT) & np.isin(status, REGULAR)
             status[elsewhere] = int(Status.NOT_CONVERGED)
 
 

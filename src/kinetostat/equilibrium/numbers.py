@@ -11,7 +11,7 @@ from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.state import HELD_BY_LOADS, MachineState, actuator_loads_at_rest
+from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest
 from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import load_checks, within
@@ -47,8 +47,9 @@ class States:
 def states_of_rest(state: MachineState) -> States:
     """Find the states of rest at n poses. It raises what `loaded_numbers` raises."""
     count, free = state.count, state.free
-    status = np.broadcast_to(free.status, (count,)).astype(np.int64)
-    rows = np.flatnonzero(np.isin(status, HELD_BY_LOADS))
+    status = np.broadcast_to(free.place_status, (count,)).astype(np.int64)
+    status[np.broadcast_to(free.status, (count,)) == Status.UNDECIDED] = Status.UNDECIDED
+    rows = np.flatnonzero(status == Status.OK)
     if not len(rows):
         return States(status, rows)
     placed = state.at(rows)

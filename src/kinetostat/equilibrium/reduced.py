@@ -24,7 +24,6 @@ from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits
 from kinetostat.equilibrium.pulls import RodPull, loads_of_rods, pull_of, sum_of_dyads, wrench_of_rods
 from kinetostat.equilibrium.solving import LONGEST_STEP
-from kinetostat.equilibrium.state import HELD_BY_LOADS
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.status import Status
@@ -180,9 +179,7 @@ class Reduced:
             result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
             at_rest = status_with_load_limits(self.machine, response, loads, at_rest)
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
-        for kept in sorted(set(Status) - set(HELD_BY_LOADS)):
-            code = where(abs(response.place_status - float(kept)) < 0.5, int(kept), code)
-        return result, code
+        return result, where(response.place_status > Status.OK + 0.5, response.place_status, code)
 
 
 def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, Scalar]:

@@ -19,7 +19,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.mobility import Mobility
-from kinetostat.kinematics.status import PLACELESS, Status
+from kinetostat.kinematics.status import PLACELESS, REGULAR, Status
 from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.kinetostatics.refusal import known_mobility, why_not
 from kinetostat.kinetostatics.response import Response, respond
@@ -56,8 +56,6 @@ else:
     closure = LateModule("kinetostat.kinematics.closure")
     distribution = LateModule("kinetostat.numerics.distribution")
 
-HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
-"""Statuses without loads at which a machine may come to rest: tension and weight hold where springs do not."""
 WITHOUT_SEARCH_FOR_REST = (*PLACELESS, Status.UNDECIDED)
 """Statuses without loads at which no state of rest can be sought: legs cannot be placed, or loads are undecided."""
 NEARBY_DISTANCE = 0.03
@@ -114,7 +112,7 @@ class MachineState(Immutable):
         It is `free` itself if nothing limits these loads, if the machine comes to no rest, and if masses or bounds are
         missing in the file: the answer under load then says so.
         """
-        if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.status) not in HELD_BY_LOADS:
+        if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.place_status) != Status.OK:
             return self.free
         try:
             stands = self.stands
@@ -261,7 +259,7 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
     here, rng = values(machine), Random(0)
     poses = [{path: here[path] + r * rng.uniform(-1.0, 1.0) for path, r in reach.items()} for _ in range(3)]
     answers = [respond(with_values(machine, pose)) for pose in poses]
-    return [answer.configuration for answer in answers if Status(int(answer.status)) is Status.OK]
+    return [answer.configuration for answer in answers if int(answer.status) in REGULAR]
 
 
 def actuator_loads_at_rest(equations: "Balance") -> list[tuple[Spring, Array]]:

@@ -6,7 +6,12 @@ from kinetostat.spec.errors import InputError, shorten
 
 
 class Status(IntEnum):
-    """Whether a pose has results. Only `OK` has; the others say why there are none."""
+    """Whether a pose has results. Only `OK` has; the others say why there are none.
+
+    A pose with several obstacles has the status of the most fundamental one: without a place there are no screws, at a
+    singular or undecided pose no K and C, and only a pose that has both can be beyond a limit. So `JOINT_LIMIT` never
+    hides a singular pose, and says that limits alone forbid the pose.
+    """
 
     OK = 0
     OUT_OF_REACH = 1
@@ -34,6 +39,8 @@ class Status(IntEnum):
 
 PLACELESS = (Status.OUT_OF_REACH, Status.NOT_CONVERGED)
 """Statuses of poses at which the machine has no place."""
+REGULAR = (Status.OK, Status.JOINT_LIMIT)
+"""Statuses of poses at which K and C exist, whether or not the limits allow the pose."""
 
 _SENTENCES = {
     Status.OK: "The pose can be reached and the machine resists every load.",

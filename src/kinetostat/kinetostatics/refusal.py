@@ -14,6 +14,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.late import LateModule
 from kinetostat.machine.leg import Spring
+from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.tolerances import SINGULAR
 
@@ -43,8 +44,15 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
         return why_beyond(response.checks, machine.display)
-    if status is Status.UNDECIDED:
-        return status.sentence
+    passed = [check for check in response.checks if check.limit.about is not About.LOAD]  # loads have no numbers here
+    return " ".join(filter(None, [_without_numbers(response, nearby), why_beyond(passed, machine.display)]))
+
+
+def _without_numbers(response: Response, nearby: Sequence[Configuration]) -> str:
+    """Explain why K and C do not exist at a pose, which is singular or undecided."""
+    configuration = response.configuration
+    if int(response.status) == Status.UNDECIDED:
+        return Status.UNDECIDED.sentence
     motion = known_mobility(response, nearby)
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)

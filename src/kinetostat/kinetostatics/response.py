@@ -56,7 +56,8 @@ class Response:
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
-        place_status: as `status`, but a singular pose may count as OK: loads can hold a machine there.
+        place_status: as `status`, but a singular pose within the limits of geometry is OK, and one beyond them
+            JOINT_LIMIT: loads can hold a machine there.
         frequencies: the lowest natural frequencies, Hz, where they have been computed.
         cutting_pressure: of the machine's table [cutting], N/m².
         meant_loaded: whether the machine is meant at rest under its loads (`Machine.loaded`): its actuators then carry
@@ -152,7 +153,8 @@ def respond(machine: Machine, joints: Joints | None = None, configuration: Confi
     singularity_margin = smaller(singularity_margin, statics.singularity_margin)
     geometric = geometric_checks(machine, configuration, joints.coordinates)
     loaded = actuator_checks(machine, configuration, statics)
-    reached = within_reach(configuration)
+    reached, allowed, borne = within_reach(configuration), within(geometric), within(loaded)
+    undetermined = abs(joints.status - float(Status.SINGULAR)) < 0.5
     return Response(
         configuration,
         reference,
@@ -162,18 +164,19 @@ def respond(machine: Machine, joints: Joints | None = None, configuration: Confi
         stiffness_matrix(statics),
         compliance_matrix(statics),
         singularity_margin,
-        pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded), statics.doubt),
+        pose_status(joints.status, reached, singularity_margin, allowed, borne, statics.doubt),
         load_on_platform(machine, configuration.platform),
         (*geometric, *loaded),
         moving_mass(machine, configuration),
         joints.status,
         pose_status(
-            joints.status,
+            where(undetermined, int(Status.OK), joints.status),
             reached,
             singularity_margin if loaded else 1.0,
-            within(geometric),
-            within(loaded),
+            allowed,
+            borne,
             statics.doubt if loaded else 0.0,
+            singular=where(allowed, int(Status.OK), int(Status.JOINT_LIMIT)),
         ),
         meant_loaded=machine.loaded,
         drives=drive_limits(machine, configuration),
@@ -220,8 +223,12 @@ def pose_status(
     allowed: Scalar = True,
     borne: Scalar = True,
     doubt: Scalar = 0.0,
+    singular: Scalar = int(Status.SINGULAR),
 ) -> Scalar:
     """Status code of a pose, the most fundamental obstacle first; a singularity margin of NaN counts as singular.
+
+    Limits come last: a pose beyond them is called singular or undecided if it is, for no change of limits gives it K
+    and C.
 
     Args:
         placed: `Status` code of the joints.
@@ -230,12 +237,12 @@ def pose_status(
         allowed: whether the limits of geometry are kept.
         borne: whether the actuators bear the load, which means something where the pose is regular.
         doubt: 1 where it is undecided which rigid parts share a load, else 0.
+        singular: code of a singular pose.
     """
-    bearable = where(borne, int(Status.OK), int(Status.JOINT_LIMIT))
-    decided = where(doubt > 0.5, int(Status.UNDECIDED), bearable)
-    solvable = where(singularity_margin > SINGULAR, decided, int(Status.SINGULAR))
-    possible = where(allowed, solvable, int(Status.JOINT_LIMIT))
-    return where(placed > Status.OK + 0.5, placed, where(reached, possible, int(Status.OUT_OF_REACH)))
+    kept = where(allowed, where(borne, int(Status.OK), int(Status.JOINT_LIMIT)), int(Status.JOINT_LIMIT))
+    decided = where(doubt > 0.5, int(Status.UNDECIDED), kept)
+    solvable = where(singularity_margin > SINGULAR, decided, singular)
+    return where(placed > Status.OK + 0.5, placed, where(reached, solvable, int(Status.OUT_OF_REACH)))
 
 
 def actuator_loads(configuration: Configuration, statics: Statics, load: Wrench) -> list[tuple[Spring, Scalar]]:

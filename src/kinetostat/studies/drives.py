@@ -7,7 +7,6 @@ Source: theory (99).
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +20,11 @@ from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.drives import numbers_of_drive
-from kinetostat.machine.limits import Limits
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
@@ -40,7 +38,7 @@ from kinetostat.studies.motions import Motion, every_direction, read_motion, req
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
 
-PASSABLE = [int(Status.OK), int(Status.JOINT_LIMIT), int(Status.UNDECIDED)]
+PASSABLE = (*REGULAR, Status.UNDECIDED)
 """Statuses of poses at which drives have forces: limits of the file are compared with, but stop no motion."""
 
 
@@ -232,16 +230,10 @@ def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoa
             f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
             'drives; give it one, e.g. --set tool.mass="5 kg".'
         )
-    points = PointTable(moved.path.columns)
-    codes = evaluate(state.machine, points, ["singularity_margin"]).status
-    without_limits = codes
-    if (codes == Status.JOINT_LIMIT).any():
-        # A pose beyond a limit can be passed, but not where the machine is singular as well, which its code hides.
-        unbounded = replace(state.machine, tables={**state.machine.tables, "limits": Limits()})
-        without_limits = evaluate(unbounded, points, ["singularity_margin"]).status
-    lost = np.flatnonzero(~np.isin(without_limits, PASSABLE))
+    codes = evaluate(state.machine, PointTable(moved.path.columns), ["singularity_margin"]).status
+    lost = np.flatnonzero(~np.isin(codes, PASSABLE))
     if lost.size:
-        status = Status(int(without_limits[lost[0]]))
+        status = Status(int(codes[lost[0]]))
         return DriveLoads(
             state.machine,
             status,

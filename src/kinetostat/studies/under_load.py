@@ -24,7 +24,7 @@ from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffn
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, limit_use, load_checks, why_beyond, within
 from kinetostat.kinematics.mobility import describe
-from kinetostat.kinematics.status import PLACELESS, Status
+from kinetostat.kinematics.status import PLACELESS, REGULAR, Status
 from kinetostat.kinetostatics.indices import free_stiffnesses
 from kinetostat.kinetostatics.loading import DeflectedLink
 from kinetostat.kinetostatics.response import Response
@@ -144,7 +144,7 @@ class LoadedState(ImmutableAnswer):
         if self.compliance is None:
             return {}
         free = self.state.free
-        if int(free.status) not in (Status.OK, Status.JOINT_LIMIT):
+        if int(free.status) not in REGULAR:
             known, statics = [], replace(free.statics, flexibility=(), compliance=())
         else:
             known, statics = springs(free.configuration), clean_statics(free.statics)
@@ -301,7 +301,7 @@ def _springs(equations: Balance) -> list[SpringState]:
 def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array | None:
     """The displacement to first order: one step of Newton's method from the free state."""
     rows = np.array(response.compliance.rows(), dtype=float)
-    if int(response.status) not in (Status.OK, Status.JOINT_LIMIT) or not np.isfinite(rows).all():
+    if int(response.status) not in REGULAR or not np.isfinite(rows).all():
         return None
     start = balance(mechanism, free_state(mechanism))
     step = solve(start, -start.left[:, :, None], loaded=False)[0, :, 0]

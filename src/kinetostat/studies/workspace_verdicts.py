@@ -22,7 +22,7 @@ from kinetostat.engine.loaded import NATIVE_FROM
 from kinetostat.engine.points import Axis, PointTable
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
@@ -31,7 +31,6 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
 from kinetostat.studies.grid import GridQuestion
 from kinetostat.studies.quantities import resolve_quantities
-from kinetostat.tolerances import SINGULAR
 from kinetostat.units import KINDS, UnitError, as_read, parse
 
 Poses = dict[str, Array]
@@ -159,10 +158,7 @@ class Judge:
     def aspect(self) -> float:
         """Aspect of the file's pose; 0 if no singular surface divides poses, or this pose has no answer."""
         response = self.state.free
-        placed = (
-            Status(int(response.status)) in (Status.OK, Status.JOINT_LIMIT) and response.singularity_margin > SINGULAR
-        )
-        return float(aspect(response)) if placed else 0.0
+        return float(aspect(response)) if int(response.status) in REGULAR else 0.0
 
     @property
     def limits(self) -> list[str]:

@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.accuracy.model import PLACED, error_model
+from kinetostat.accuracy.model import error_model
 from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.identification.fit import Fit
@@ -150,7 +150,7 @@ def _candidates(
         poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
         within = BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS
     whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
-    rows = np.flatnonzero(np.isin(whole.drawn.status, PLACED if within != WITHIN_LIMITS else Status.OK))
+    rows = np.flatnonzero(np.isin(whole.drawn.status, REGULAR if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
     there = observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
     return replace(there, members=seen.members), within

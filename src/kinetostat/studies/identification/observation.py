@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kinetostat.accuracy.errors import MachineError
-from kinetostat.accuracy.model import PLACED, ErrorModel
+from kinetostat.accuracy.model import ErrorModel
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
 from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, ROTATION, Measurements
 
@@ -226,7 +226,7 @@ def observation(
         InputError: the drawn machine has no place at a commanded pose, or measured positions lie far from it although
             the measuring frame is the base frame.
     """
-    elsewhere = np.flatnonzero(~np.isin(model.drawn.status, PLACED))
+    elsewhere = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
     if elsewhere.size:
         row = int(elsewhere[0])
         sentence = Status(int(model.drawn.status[row])).sentence

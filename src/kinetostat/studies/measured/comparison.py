@@ -14,12 +14,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from kinetostat.accuracy.built import compliances_as_built
-from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
+from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.toleranced_parts import toleranced_parts
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
@@ -276,7 +276,7 @@ def validate_measured(
     pose = dict(measured.deflections.pose) if measured.deflections else {}
     count = len(measured.deflections) if measured.deflections else 1
     model = error_model(machine, pose, count, np.zeros(6))
-    bad = np.flatnonzero(~np.isin(model.drawn.status, PLACED))
+    bad = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
     if bad.size:
         sentence = Status(int(model.drawn.status[bad[0]])).sentence
         line = f"line {measured.deflections.lines[bad[0]]}: " if measured.deflections else ""
