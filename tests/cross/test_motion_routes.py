@@ -151,7 +151,7 @@ def losses(machine, form, path, point):
     for leg, moving in zip(here.rigid.legs, here.along(PoseRates(*direction)).legs, strict=True):
         driven = [here.rigid.drives[number] for number in leg.drives]
         dampers = [*(part.viscous for part in leg.friction), *(drive.viscous for drive in driven)]
-        rubs = [*(part.coulomb for part in leg.friction), *(drive.coulomb + drive.guide for drive in driven)]
+        rubs = [*(part.coulomb for part in leg.friction), *(drive.coulomb + drive.guide_friction for drive in driven)]
         for rate, damper, rub in zip(moving.rates, dampers, rubs, strict=True):
             lost += float(damper) * float(rate) ** 2 + float(rub) * abs(float(rate))
     return lost * float(here.rigid.length)

@@ -68,9 +68,9 @@ def _inertial(
 ) -> list[Wrench]:
     """The wrench that accelerates each mass, theory (90); bodies are those that carry the masses."""
     gained = [_acceleration(m.point, body, way) for m, body, way in zip(masses, bodies, moving, strict=True)]
-    momenta = [acceleration * (mass.alone * length) for mass, acceleration in zip(masses, gained, strict=True)]
+    momenta = [acceleration * (mass.uncoupled * length) for mass, acceleration in zip(masses, gained, strict=True)]
     for first, second in pairs:
-        coupled = (masses[first].mass - masses[first].alone) * length
+        coupled = (masses[first].mass - masses[first].uncoupled) * length
         momenta[first] = momenta[first] + gained[second] * coupled
         momenta[second] = momenta[second] + gained[first] * coupled
     wrenches = []
@@ -93,13 +93,13 @@ def _demand(
     rows, carried = [], []
     for number, (leg, wrenches) in enumerate(zip(machine.legs, of_legs, strict=True)):
         beyond = [NOTHING]
-        row = [0.0] * len(leg.solved) if further is None else list(further[number])
+        row = [0.0] * len(leg.rates_by_twist) if further is None else list(further[number])
         for motion in reversed(range(len(leg.screws))):
             load = beyond[0]
             for mass, wrench in zip(leg.masses, wrenches, strict=False):
                 if mass.carried == motion + 1:
                     load = load + wrench
-            place = leg.follows[motion]
+            place = leg.coordinates[motion]
             if place >= 0:
                 row[place] = row[place] + load.work(leg.screws[motion])
             beyond.insert(0, load)
@@ -167,7 +167,7 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
         coulomb = leg.friction[ball[0]].coulomb
         if is_zero(coulomb):
             continue
-        axes = [leg.screws[leg.follows.index(place)].rotational for place in ball]
+        axes = [leg.screws[leg.coordinates.index(place)].rotational for place in ball]
         turning = ZERO
         for place, axis in zip(ball, axes, strict=True):
             turning = turning + axis * motion.rates[place]
@@ -177,7 +177,7 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
             row[place] = row[place] + coulomb * (axis.dot(turning) * share)
     for place, number in enumerate(leg.drives, leg.passive):
         drive, rate = machine.drives[number], motion.rates[place]
-        row.append(drive.viscous * rate + (drive.coulomb + drive.guide) * sense(rate))
+        row.append(drive.viscous * rate + (drive.coulomb + drive.guide_friction) * sense(rate))
     return row
 
 
@@ -221,7 +221,7 @@ def drive_statics(machine: RigidMachine) -> DriveStatics:
     by_twist: list[Row] = [[] for _ in machine.drives]
     for leg in machine.legs:
         for place, number in enumerate(leg.drives, leg.passive):
-            by_twist[number] = leg.solved[place]
+            by_twist[number] = leg.rates_by_twist[place]
     rates = [
         [total([a * b for a, b in zip(row, way, strict=True)]) for way in ways] if machine.ways else row
         for row in by_twist
@@ -237,7 +237,7 @@ def _weights(machine: RigidMachine) -> list[Scalar]:
     """Roots of the drives' stiffness, by which more drives than ways share a load; alike where a drive is rigid."""
     springs = [drive.spring for drive in machine.drives]
     stiff = [s.stiffness for s in springs]
-    if not machine.plan.shared or any(type(k) is float and math.isinf(k) for k in stiff):
+    if not machine.plan.overactuated or any(type(k) is float and math.isinf(k) for k in stiff):
         return [1.0] * len(springs)
     shrink = 1.0 / machine.length
     return [sqrt(k) if d.slides else sqrt(k) * shrink for k, d in zip(stiff, machine.drives, strict=True)]
@@ -247,7 +247,7 @@ def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) 
     """Generalised forces along some twists of the platform, with the legs following, theory (92)."""
     whole = list(demand.platform.components())
     for leg, row in zip(machine.legs, demand.legs, strict=True):
-        for solved, force in zip(leg.solved, row, strict=True):
+        for solved, force in zip(leg.rates_by_twist, row, strict=True):
             if not is_zero(force):
                 whole = [a + b * force for a, b in zip(whole, solved, strict=True)]
     return [total([a * b for a, b in zip(way, whole, strict=True)]) for way in ways]
@@ -273,22 +273,24 @@ def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Sc
     for leg, row in zip(machine.legs, demand.legs, strict=True):
         driving = [0.0] * leg.passive + [forces[number] for number in leg.drives]
         parts = [force - given for force, given in zip(row, driving, strict=True)]
-        balance = [total([solved[i] * part for solved, part in zip(leg.solved, parts, strict=True)]) for i in range(6)]
+        balance = [
+            total([solved[i] * part for solved, part in zip(leg.rates_by_twist, parts, strict=True)]) for i in range(6)
+        ]
         inner.append(Wrench(Vector(*balance[:3]), Vector(*balance[3:])))
         left = left - inner[-1]
-    against = [row for leg in machine.legs for row in leg.against]
-    if not against:
+    constraints = [row for leg in machine.legs for row in leg.constraints]
+    if not constraints:
         return inner
     basis = [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
     if machine.ways:
         basis = complement(machine.ways)[0]
-    felt = [[total([a * b for a, b in zip(way, row, strict=True)]) for row in against] for way in basis]
-    solution, _, _ = right_inverse(felt)
+    powers = [[total([a * b for a, b in zip(way, row, strict=True)]) for row in constraints] for way in basis]
+    solution, _, _ = right_inverse(powers)
     missing = [total([a * b for a, b in zip(way, left.components(), strict=True)]) for way in basis]
     amounts = iter([total([a * b for a, b in zip(row, missing, strict=True)]) for row in solution])
     result = []
     for leg, wrench in zip(machine.legs, inner, strict=True):
-        for row in leg.against:
+        for row in leg.constraints:
             amount = next(amounts)
             wrench = wrench + Wrench(Vector(*row[:3]), Vector(*row[3:])) * amount
         result.append(wrench)

@@ -130,7 +130,7 @@ def tool_wrench(here: MachineAtPose, direction: PoseRates) -> list[Scalar]:
             row[place] = (
                 row[place] - drive.inertia * moving.change[place] - drive.viscous * rate - drive.coulomb * sense(rate)
             )
-        for solved, force in zip(leg.solved, row, strict=True):
+        for solved, force in zip(leg.rates_by_twist, row, strict=True):
             whole = [a - b * force for a, b in zip(whole, solved, strict=True)]
     length = here.rigid.length
     return [*(part * length for part in whole[:3]), *whole[3:]]

@@ -139,17 +139,17 @@ def leg_motion(leg: RigidLeg, platform: Moving, along: "LegMotion | None" = None
         platform: the motion of the platform.
         along: how the leg moves, if that is not this motion itself.
     """
-    rates = [_product(row, platform.twist) for row in leg.solved]
+    rates = [_product(row, platform.twist) for row in leg.rates_by_twist]
     carried, bent = [STILL], [STILL]
-    for screw, place in zip(leg.screws, leg.follows, strict=True):
+    for screw, place in zip(leg.screws, leg.coordinates, strict=True):
         carried.append(carried[-1] + screw * rates[place] if place >= 0 else carried[-1])
     moving = carried if along is None else [body.twist for body in along.bodies]
-    for number, (screw, place) in enumerate(zip(leg.screws, leg.follows, strict=True)):
+    for number, (screw, place) in enumerate(zip(leg.screws, leg.coordinates, strict=True)):
         bent.append(bent[-1] + bracket(moving[number], screw) * rates[place] if place >= 0 else bent[-1])
     left = platform.change - bent[-1]
-    change = [_product(row, left) for row in leg.solved]
+    change = [_product(row, left) for row in leg.rates_by_twist]
     changes, grown = [STILL], STILL
-    for number, (screw, place) in enumerate(zip(leg.screws, leg.follows, strict=True), 1):
+    for number, (screw, place) in enumerate(zip(leg.screws, leg.coordinates, strict=True), 1):
         grown = grown + screw * change[place] if place >= 0 else grown
         changes.append(grown + bent[number])
     bodies = tuple(Moving(twist, changed) for twist, changed in zip(carried, changes, strict=True))
@@ -176,14 +176,14 @@ class Coordinates:
         arm: from the tool point to P, in units of the machine's length.
         axes: about which roll, pitch and yaw turn, theory (89).
         rates_of_turns: rows that take an angular velocity to the rates of roll, pitch and yaw.
-        solved: of each coordinate, the platform's twist along it alone [coordinates][6].
+        unit_twists: the twist of the platform at a unit rate of each coordinate alone [coordinates][6].
     """
 
     names: tuple[str, ...]
     arm: Vector
     axes: tuple[Vector, Vector, Vector]
     rates_of_turns: tuple[Vector, Vector, Vector]
-    solved: tuple[Row, ...]
+    unit_twists: tuple[Row, ...]
 
 
 def coordinates_of(
@@ -216,11 +216,11 @@ def coordinates_of(
         for name in names
     ]
     dual, _ = dual_basis(felt)
-    solved = [
+    unit_twists = [
         [total([share * way[i] for share, way in zip(shares, machine.ways, strict=True)]) for i in range(6)]
         for shares in dual
     ]
-    return Coordinates(tuple(names), arm, axes, rows, tuple(solved))
+    return Coordinates(tuple(names), arm, axes, rows, tuple(unit_twists))
 
 
 Angles = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
@@ -246,18 +246,18 @@ def motion_along(
 ) -> MachineMotion:
     """The motion of a machine of less than six coordinates along a direction; `along` as in `leg_motion`."""
     units = {name: (1.0 / machine.length if name in POINT else 1.0) for name in coordinates.names}
-    twist = _sum(coordinates.solved, [direction.rates[name] * units[name] for name in coordinates.names])
+    twist = _sum(coordinates.unit_twists, [direction.rates[name] * units[name] for name in coordinates.names])
     # What the legs ask for does not depend on how the platform's twist changes.
     still = machine_motion(machine, Moving(twist, STILL), along)
     needed = [
         total([a * b for a, b in zip(row, motion.drift.components(), strict=True)])
         for leg, motion in zip(machine.legs, still.legs, strict=True)
-        for row in leg.against
+        for row in leg.constraints
     ]
     chosen = [needed[number] for number in machine.plan.independent]
     forced = Twist(ZERO, ZERO)
     if chosen:
-        forced = _sum([list(row) for row in zip(*machine.following, strict=True)], chosen)
+        forced = _sum([list(row) for row in zip(*machine.constraint_twists, strict=True)], chosen)
     moving = twist if along is None else along.platform.twist
     speed = moving.translational + moving.rotational.cross(coordinates.arm)
     lags = []
@@ -269,7 +269,7 @@ def motion_along(
             turned = _turning_axes(coordinates, twist, moving)
             wanted = wanted + coordinates.rates_of_turns[ANGLES.index(name)].dot(turned)
         lags.append(wanted - _coordinate_rate(name, coordinates.arm, coordinates.rates_of_turns, forced))
-    return machine_motion(machine, Moving(twist, forced + _sum(coordinates.solved, lags)), along)
+    return machine_motion(machine, Moving(twist, forced + _sum(coordinates.unit_twists, lags)), along)
 
 
 def _turning_axes(coordinates: Coordinates, twist: Twist, moving: Twist) -> Vector:

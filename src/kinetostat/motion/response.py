@@ -103,7 +103,7 @@ def _halves(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
 def _lost_motion_of_leg(leg: RigidLeg, motion: Twist, length: Scalar) -> Scalar:
     """Motion, m or rad, that friction of the joints of a leg holds back, whose end moves so far per unit of a load."""
     scaled = [*motion.rotational.components(), *(motion.translational * (1.0 / length)).components()]
-    rates = [total([a * b for a, b in zip(row, scaled, strict=True)]) for row in leg.solved[: leg.passive]]
+    rates = [total([a * b for a, b in zip(row, scaled, strict=True)]) for row in leg.rates_by_twist[: leg.passive]]
     in_balls = {place for ball in leg.balls for place in ball}
     parts = [
         abs(rate) * part.coulomb
@@ -113,6 +113,6 @@ def _lost_motion_of_leg(leg: RigidLeg, motion: Twist, length: Scalar) -> Scalar:
     for ball in leg.balls:
         turning = ZERO
         for place in ball:
-            turning = turning + leg.screws[leg.follows.index(place)].rotational * rates[place]
+            turning = turning + leg.screws[leg.coordinates.index(place)].rotational * rates[place]
         parts.append(sqrt(turning.dot(turning)) * leg.friction[ball[0]].coulomb)
     return total(parts) * (2.0 * length)

@@ -1,10 +1,10 @@
 """A machine of rigid parts at a pose: motions of its legs as screws, the masses that they carry, and what closes them.
 
-It is made of the mechanism of `equilibrium.mechanism` over scalars, which gives masses, friction and loads. Springs
-stand still here, while joints and drives may move. Units are those of the mechanism: turns in rad, lengths in units of
+It is made from the mechanism of `equilibrium.mechanism` over scalars, which has masses, friction and loads. Springs do
+not deflect here; joints and drives may move. Units are those of the mechanism: rotations in rad, lengths in units of
 the machine's length, forces in N, so that generalised forces of slides are in N, and moments in N times that length.
-The origin is the tool point at the pose, and axes are those of the base. How fast parts move is computed in `rates`,
-and the forces that this takes in `forces`.
+The origin is the tool point at the pose, and axes are those of the base. Velocities of the parts are computed in
+`rates`, and the forces that a motion takes in `forces`.
 
 Source: theory section 20, (85).
 """
@@ -40,7 +40,7 @@ class MassPoint:
         carried: number of the motions of the leg that carry it.
         point: its place.
         mass: the mass, kg.
-        alone: the part of the mass whose momentum is its own; the rest is coupled to the other half of a bar.
+        uncoupled: the part of the mass that has a momentum of its own; the rest is coupled to the other half of a bar.
         tensor: rows of the inertia about the point; empty if there is none.
     """
 
@@ -48,7 +48,7 @@ class MassPoint:
     carried: int
     point: Vector
     mass: Scalar
-    alone: Scalar
+    uncoupled: Scalar
     tensor: tuple[Vector, ...] = ()
 
     def spin(self, turning: Vector) -> Vector:
@@ -62,9 +62,10 @@ class RigidDrive:
 
     Attributes:
         spring: the spring of its actuator.
-        turns: radians of the rotor per unit of its coordinate, rad per rad or per unit of length; 0 if it is not known.
-        inertia, viscous, coulomb: inertia and friction of the rotor as the coordinate of the drive feels them.
-        guide: Coulomb friction of the joint itself, behind screw or gear.
+        turns: rotation of the rotor per unit of the drive's coordinate, rad per rad or per unit of length; 0 if it is
+            not known.
+        inertia, viscous, coulomb: inertia, viscous and Coulomb friction of the rotor, taken to the drive's coordinate.
+        guide_friction: Coulomb friction of the joint itself, behind screw or gear.
     """
 
     spring: Spring
@@ -72,7 +73,7 @@ class RigidDrive:
     inertia: Scalar
     viscous: Scalar
     coulomb: Scalar
-    guide: Scalar = 0.0
+    guide_friction: Scalar = 0.0
 
     @property
     def slides(self) -> bool:
@@ -82,7 +83,7 @@ class RigidDrive:
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction of a passive coordinate: per speed, and at any speed."""
+    """Friction of a passive coordinate: viscous, in proportion to its speed, and Coulomb friction, at any speed."""
 
     viscous: Scalar
     coulomb: Scalar
@@ -90,17 +91,17 @@ class Friction:
 
 @dataclass(frozen=True)
 class LegFreedoms:
-    """The coordinates of a leg that move, and whether they follow the platform in one way.
+    """The coordinates of a leg that move, and whether the platform's motion determines their rates.
 
     Attributes:
-        kept: numbers of the passive coordinates of the mechanism's leg that move.
-        spare: whether there are more coordinates than motions of the platform: their rates are then those of least
-            norm.
-        balls: places among those that are kept of the three turns of each ball joint.
+        moving: numbers of those passive coordinates of the mechanism's leg that move; the others stand still.
+        redundant: whether the leg has more moving coordinates than the platform has motions by them, so that the rates
+            are those of least norm.
+        balls: places among the moving coordinates of the three rotations of each ball joint.
     """
 
-    kept: tuple[int, ...]
-    spare: bool
+    moving: tuple[int, ...]
+    redundant: bool
     balls: tuple[tuple[int, int, int], ...] = ()
 
 
@@ -111,12 +112,12 @@ class MotionPlan:
     Attributes:
         legs: the freedoms of each leg.
         independent: numbers of those constraints of all legs that do not follow from the constraints before them.
-        shared: whether there are more drives than motions.
+        overactuated: whether there are more drives than motions.
     """
 
     legs: tuple[LegFreedoms, ...]
     independent: tuple[int, ...]
-    shared: bool
+    overactuated: bool
 
 
 @dataclass(frozen=True)
@@ -126,27 +127,27 @@ class RigidLeg:
     Attributes:
         name: name of the leg.
         screws: screws of its motions in order from the base.
-        follows: number of the coordinate that each motion follows; -1 for motions that stand still.
+        coordinates: number of the coordinate by which each motion moves; -1 for motions that stand still.
         drives: numbers of the machine's drives that move its last coordinates; passive coordinates come first.
         friction: friction of its passive coordinates.
         balls: places of the three passive coordinates of each ball joint.
         springs: load of the flexure hinge at each passive coordinate; 0 for other joints.
-        solved: rates of its coordinates by the platform's twist, J+ [coordinates][6].
-        against: wrenches by which it keeps the platform from moving whatever its drives do, N.
+        rates_by_twist: rates of its coordinates per component of the platform's twist, J+ [coordinates][6].
+        constraints: wrenches by which it keeps the platform from moving whatever its drives do, N [constraints][6].
         masses: masses that it carries.
         pairs: pairs of masses that are the halves of a bar.
-        ends: number of the motions that its first k elements make, for each k from 0 to all of them.
+        ends: number of motions of its first k elements, for each k from 0 to all of them.
     """
 
     name: str
     screws: tuple[Twist, ...]
-    follows: tuple[int, ...]
+    coordinates: tuple[int, ...]
     drives: tuple[int, ...]
     friction: tuple[Friction, ...]
     balls: tuple[tuple[int, int, int], ...]
     springs: tuple[Scalar, ...]
-    solved: tuple[Row, ...]
-    against: tuple[Row, ...]
+    rates_by_twist: tuple[Row, ...]
+    constraints: tuple[Row, ...]
     masses: tuple[MassPoint, ...]
     pairs: tuple[tuple[int, int], ...]
     ends: tuple[int, ...]
@@ -169,9 +170,10 @@ class RigidMachine:
         gravity: acceleration of free fall, m/s².
         length: unit of length, m.
         origin: the tool point, base frame, m.
-        ways: a basis of the twists that the legs allow, orthonormal; none where they allow all.
-        following: the twist that the constraints of the legs demand, per unit of each of them [6][constraints].
-        plan: the form by which it was made.
+        ways: an orthonormal basis of the twists that the legs allow; empty where they allow all.
+        constraint_twists: the twist of the platform per unit of what each independent constraint demands
+            [6][constraints].
+        plan: its independent motions, with which it was made.
     """
 
     legs: tuple[RigidLeg, ...]
@@ -182,7 +184,7 @@ class RigidMachine:
     length: Scalar
     origin: Vector
     ways: tuple[Row, ...]
-    following: tuple[Row, ...]
+    constraint_twists: tuple[Row, ...]
     plan: MotionPlan
 
 
@@ -221,27 +223,27 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
     legs = tuple(
         _rigid_leg(leg, leg_plan, machine, mechanism) for leg, leg_plan in zip(mechanism.legs, plan.legs, strict=True)
     )
-    against = [row for leg in legs for row in leg.against]
-    chosen = [against[number] for number in plan.independent]
+    constraints = [row for leg in legs for row in leg.constraints]
+    independent = [constraints[number] for number in plan.independent]
     ways: list[Row] = []
-    following: list[Row] = []
-    if chosen:
-        following, ways, _ = right_inverse(chosen)
+    constraint_twists: list[Row] = []
+    if independent:
+        constraint_twists, ways, _ = right_inverse(independent)
     process = Wrench(*_vectors(mechanism.wrench[0]))
     for point, force in zip(mechanism.pushed[0], mechanism.forces[0], strict=True):
         at, push = Vector(*point), Vector(*force)
         process = process + Wrench(at.cross(push), push)
     return RigidMachine(
-        legs,
-        drives,
-        _mass_points(mechanism.platform, mechanism.length[0]),
-        process,
-        Vector(*mechanism.gravity[0]),
-        mechanism.length[0],
-        origin,
-        tuple(ways),
-        tuple(following),
-        plan,
+        legs=legs,
+        drives=drives,
+        platform=_mass_points(mechanism.platform, mechanism.length[0]),
+        process=process,
+        gravity=Vector(*mechanism.gravity[0]),
+        length=mechanism.length[0],
+        origin=origin,
+        ways=tuple(ways),
+        constraint_twists=tuple(constraint_twists),
+        plan=plan,
     )
 
 
@@ -252,16 +254,16 @@ def _vectors(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
 def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
     numbers, slides = numbers_of_drive(machine, "drives", spring), spring.joint.point is None
     turns = rotor_turns(spring, numbers)
-    here = turns * length if slides else turns  # per unit of the coordinate
+    turns = turns * length if slides else turns  # coordinates of slides are in units of the length
     shrink = 1.0 / length
-    square = here * here * shrink
+    square = turns * turns * shrink
     return RigidDrive(
-        spring,
-        here,
-        square * numbers.rotor_inertia,
-        square * numbers.rotor_damping,
-        here * numbers.rotor_friction * shrink,
-        numbers.guide_friction if slides else numbers.bearing_friction * shrink,
+        spring=spring,
+        turns=turns,
+        inertia=square * numbers.rotor_inertia,
+        viscous=square * numbers.rotor_damping,
+        coulomb=turns * numbers.rotor_friction * shrink,
+        guide_friction=numbers.guide_friction if slides else numbers.bearing_friction * shrink,
     )
 
 
@@ -269,11 +271,16 @@ def _mass_points(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
     rows = []
     for number, name in enumerate(masses.names):
         xx, yy, zz, xy, xz, yz = (entry * length for entry in masses.inertia[0, number].tolist())
-        still = all(is_zero(entry) for entry in (xx, yy, zz, xy, xz, yz))
-        tensor = () if still else (Vector(xx, xy, xz), Vector(xy, yy, yz), Vector(xz, yz, zz))
-        point = Vector(*masses.point[0, number].tolist())
+        without_inertia = all(is_zero(entry) for entry in (xx, yy, zz, xy, xz, yz))
         rows.append(
-            MassPoint(name, masses.carried[number], point, masses.mass[0, number], masses.uncoupled[0, number], tensor)
+            MassPoint(
+                name=name,
+                carried=masses.carried[number],
+                point=Vector(*masses.point[0, number].tolist()),
+                mass=masses.mass[0, number],
+                uncoupled=masses.uncoupled[0, number],
+                tensor=() if without_inertia else (Vector(xx, xy, xz), Vector(xy, yy, yz), Vector(xz, yz, zz)),
+            )
         )
     return tuple(rows)
 
@@ -283,127 +290,139 @@ def _passive_coordinates(leg: ElasticLeg) -> list[int]:
     passive = []
     for number, spring in enumerate(leg.springs):
         before = leg.springs[number - 1] if number else None
-        again = before is not None and spring is not None and before.hinge and before.joint is spring.joint
-        if spring is None or (spring.hinge and not again):
+        # A hinge with several springs about the same joint is one coordinate, that of the first spring.
+        same_hinge = before is not None and spring is not None and before.hinge and before.joint is spring.joint
+        if spring is None or (spring.hinge and not same_hinge):
             passive.append(number)
     return passive
 
 
 def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: Mechanism) -> RigidLeg:
     screws = tuple(Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist())
-    places, drives = _places(leg, plan.kept, len(mechanism.driven))
-    size = len(plan.kept) + len(drives)
-    columns = _columns(screws, places, size)
-    solved, against = _following(columns, plan.spare)
-    length, damping = mechanism.length[0], machine.tables["damping"]
-    friction = []
-    for number in plan.kept:
-        turning = [i for i, place in enumerate(leg.chain.coordinate) if place == number]
-        slides = all(screws[i].slides for i in turning)
-        coulomb = damping.slide_friction if slides else damping.hinge_friction * (1.0 / length)
-        if len(turning) > 1 and not slides:  # the bars of a parallelogram turn about both of their ends
-            coulomb = coulomb * total([screws[i].rotational.norm() for i in turning])
-        friction.append(Friction(leg.dampers[0, number] * length, coulomb))
+    coordinates, drives = _coordinates_of_motions(leg, plan.moving, len(mechanism.driven))
+    columns = _jacobian_columns(screws, coordinates, len(plan.moving) + len(drives))
+    rates_by_twist, constraints = _rates_and_constraints(columns, plan.redundant)
+    length = mechanism.length[0]
     return RigidLeg(
-        leg.name,
-        screws,
-        places,
-        tuple(drives),
-        tuple(friction),
-        plan.balls,
-        tuple(0.0 if leg.springs[n] is None else leg.preload[0, n] for n in plan.kept),
-        tuple(solved),
-        tuple(against),
-        _mass_points(leg.masses, length),
-        leg.masses.pairs,
-        leg.ends,
+        name=leg.name,
+        screws=screws,
+        coordinates=coordinates,
+        drives=tuple(drives),
+        friction=tuple(_friction(leg, number, screws, machine, length) for number in plan.moving),
+        balls=plan.balls,
+        springs=tuple(0.0 if leg.springs[n] is None else leg.preload[0, n] for n in plan.moving),
+        rates_by_twist=tuple(rates_by_twist),
+        constraints=tuple(constraints),
+        masses=_mass_points(leg.masses, length),
+        pairs=leg.masses.pairs,
+        ends=leg.ends,
     )
 
 
-def _places(leg: ElasticLeg, kept: Sequence[int], drives: int) -> tuple[tuple[int, ...], list[int]]:
-    """The coordinate that each motion of a leg follows, or -1, and the drives that its last coordinates are."""
-    here = [given for given in leg.chain.given if 0 <= given < drives]
-    order = {number: place for place, number in enumerate(kept)}
-    driven = {given: len(kept) + place for place, given in enumerate(here)}
-    places = [
-        driven.get(given, -1) if coordinate < 0 else order.get(coordinate, -1)
+def _friction(leg: ElasticLeg, number: int, screws: Sequence[Twist], machine: Machine, length: Scalar) -> Friction:
+    """Friction of the coordinate with this number, of which the leg has these screws."""
+    damping = machine.tables["damping"]
+    motions = [i for i, coordinate in enumerate(leg.chain.coordinate) if coordinate == number]
+    slides = all(screws[i].slides for i in motions)
+    coulomb = damping.slide_friction if slides else damping.hinge_friction * (1.0 / length)
+    if len(motions) > 1 and not slides:  # the bars of a parallelogram turn about both of their ends
+        coulomb = coulomb * total([screws[i].rotational.norm() for i in motions])
+    return Friction(leg.dampers[0, number] * length, coulomb)
+
+
+def _coordinates_of_motions(leg: ElasticLeg, moving: Sequence[int], drives: int) -> tuple[tuple[int, ...], list[int]]:
+    """The coordinate by which each motion of a leg moves, or -1, and the drives that its last coordinates are."""
+    driving = [given for given in leg.chain.given if 0 <= given < drives]
+    passive = {number: place for place, number in enumerate(moving)}
+    driven = {given: len(moving) + place for place, given in enumerate(driving)}
+    coordinates = [
+        driven.get(given, -1) if coordinate < 0 else passive.get(coordinate, -1)
         for coordinate, given in zip(leg.chain.coordinate, leg.chain.given, strict=True)
     ]
-    return tuple(places), here
+    return tuple(coordinates), driving
 
 
-def _columns(screws: Sequence[Twist], places: Sequence[int], size: int) -> list[Row]:
-    """The platform's twist per unit of each coordinate [size][6]."""
-    rows = [[s.components() for s, p in zip(screws, places, strict=True) if p == k] for k in range(size)]
+def _jacobian_columns(screws: Sequence[Twist], coordinates: Sequence[int], size: int) -> list[Row]:
+    """The platform's twist per unit of each coordinate, the columns of J [size][6]."""
+    rows = [[s.components() for s, c in zip(screws, coordinates, strict=True) if c == k] for k in range(size)]
     return [[total(list(parts)) for parts in zip(*row, strict=True)] for row in rows]
 
 
-def _following(columns: Sequence[Row], spare: bool) -> tuple[list[Row], list[Row]]:
+def _rates_and_constraints(columns: Sequence[Row], redundant: bool) -> tuple[list[Row], list[Row]]:
     """J+ and N of a leg: rates of its coordinates by the platform's twist, and the wrenches that hold the platform."""
-    if spare:
+    if redundant:
         solution, _, _ = right_inverse([list(row) for row in zip(*columns, strict=True)])
         return solution, []
     if not columns:
         return [], [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
-    solution, against, _ = right_inverse(columns)
-    return [list(row) for row in zip(*solution, strict=True)], against
+    solution, constraints, _ = right_inverse(columns)
+    return [list(row) for row in zip(*solution, strict=True)], constraints
 
 
 def plan_of(machine: Machine, configuration: Configuration, joints: Joints | None) -> MotionPlan:
     """Decide, at a pose with numbers, which motions there are; arguments as of `mechanism_over_scalars`."""
     with np.errstate(all="ignore"):
-        return _plan_of(mechanism_over_scalars(machine, configuration, joints))
+        mechanism = mechanism_over_scalars(machine, configuration, joints)
+        legs, constraints = [], []
+        for leg in mechanism.legs:
+            freedoms, rows = _freedoms_of(leg, len(mechanism.driven))
+            legs.append(freedoms)
+            constraints += rows
+        independent = _independent(constraints)
+    return MotionPlan(tuple(legs), independent, overactuated=len(mechanism.driven) > 6 - len(independent))
 
 
-def _plan_of(mechanism: Mechanism) -> MotionPlan:
-    legs, against = [], []
-    for leg in mechanism.legs:
-        passive = _passive_coordinates(leg)
-        screws = [Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist()]
-        while True:
-            places, drives = _places(leg, passive, len(mechanism.driven))
-            columns = _columns(screws, places, len(passive) + len(drives))
-            matrix = np.array(columns, dtype=float).reshape(-1, 6)
-            _, sizes, rows = np.linalg.svd(matrix.T)
-            rank = int((sizes > DEPENDENT * max(sizes.max(initial=0.0), 1.0)).sum())
-            if rank == len(columns) or rank == 6:
-                break
-            # Of motions that depend on each other, the passive one that the rest replaces best stands still.
-            idle = np.abs(rows[rank:, : len(passive)]).max(axis=0)
-            passive.pop(len(passive) - 1 - int(np.argmax(idle[::-1] > idle.max() - DEPENDENT)))
-        spare = len(columns) > rank
-        legs.append(LegFreedoms(tuple(passive), spare, _balls(screws, places, len(passive))))
-        against += _following(columns, spare)[1]
+def _freedoms_of(leg: ElasticLeg, drives: int) -> tuple[LegFreedoms, list[Row]]:
+    """The freedoms of a leg of a machine with so many drives, and the wrenches by which it holds the platform."""
+    passive = _passive_coordinates(leg)
+    screws = [Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist()]
+    while True:
+        coordinates, driving = _coordinates_of_motions(leg, passive, drives)
+        columns = _jacobian_columns(screws, coordinates, len(passive) + len(driving))
+        matrix = np.array(columns, dtype=float).reshape(-1, 6)
+        _, sizes, rows = np.linalg.svd(matrix.T)
+        rank = int((sizes > DEPENDENT * max(sizes.max(initial=0.0), 1.0)).sum())
+        if rank == len(columns) or rank == 6:
+            break
+        # Of motions that depend on each other, the passive one that the rest replaces best stands still.
+        idle = np.abs(rows[rank:, : len(passive)]).max(axis=0)
+        passive.pop(len(passive) - 1 - int(np.argmax(idle[::-1] > idle.max() - DEPENDENT)))
+    redundant = len(columns) > rank
+    freedoms = LegFreedoms(tuple(passive), redundant, _balls(screws, coordinates, len(passive)))
+    return freedoms, _rates_and_constraints(columns, redundant)[1]
+
+
+def _independent(constraints: Sequence[Row]) -> tuple[int, ...]:
+    """Numbers of the wrenches that do not depend on those before them."""
     independent: list[int] = []
     basis = np.zeros((0, 6))
-    for number, row in enumerate(against):
-        left = np.array(row, dtype=float)
-        left = left - basis.T @ (basis @ left)
-        left = left - basis.T @ (basis @ left)
-        size = float(np.linalg.norm(left))
+    for number, row in enumerate(constraints):
+        remainder = np.array(row, dtype=float)
+        for _ in range(2):  # the second time takes away what round-off has left of the first
+            remainder = remainder - basis.T @ (basis @ remainder)
+        size = float(np.linalg.norm(remainder))
         if size > DEPENDENT:
             independent.append(number)
-            basis = np.vstack([basis, left / size])
-    shared = len(mechanism.driven) > 6 - len(independent)
-    return MotionPlan(tuple(legs), tuple(independent), shared)
+            basis = np.vstack([basis, remainder / size])
+    return tuple(independent)
 
 
-def _balls(screws: Sequence[Twist], places: Sequence[int], passive: int) -> tuple[tuple[int, int, int], ...]:
+def _balls(screws: Sequence[Twist], coordinates: Sequence[int], passive: int) -> tuple[tuple[int, int, int], ...]:
     """Find the ball joints: three passive coordinates in a row whose axes meet in one point and span the space."""
-    motions = [[i for i, place in enumerate(places) if place == k] for k in range(passive)]
+    motions = [[i for i, coordinate in enumerate(coordinates) if coordinate == k] for k in range(passive)]
     turns = [row[0] if len(row) == 1 and not screws[row[0]].slides else None for row in motions]
     result, first = [], 0
     while first + 3 <= passive:
         row = turns[first : first + 3]
-        together = None not in row and [row[0] + k for k in range(3)] == row  # type: ignore[operator]
-        if together and _about_one_point([screws[i] for i in row if i is not None]):
+        in_a_row = None not in row and [row[0] + k for k in range(3)] == row  # type: ignore[operator]
+        if in_a_row and _meet_in_a_point([screws[i] for i in row if i is not None]):
             result.append((first, first + 1, first + 2))
             first += 2
         first += 1
     return tuple(result)
 
 
-def _about_one_point(screws: Sequence[Twist]) -> bool:
+def _meet_in_a_point(screws: Sequence[Twist]) -> bool:
     axes = np.array([screw.rotational.components() for screw in screws], dtype=float)
     moments = np.array([screw.translational.components() for screw in screws], dtype=float)
     if abs(np.linalg.det(axes)) < DEPENDENT:

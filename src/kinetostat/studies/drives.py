@@ -1,7 +1,7 @@
-"""Drives along a motion: speed, force, power and energy, at the drive and at its motor, and what joints and tool feel.
+"""Drives along a motion: speed, force, power and energy of each and of its motor, loads of joints, deflection of tool.
 
-Parts are rigid (theory section 20); what the tool deflects is what springs do under the same forces, one pose after the
-other. Formulas are in `motion`, motions in `motions`. Nothing is drawn here.
+Parts are rigid (theory section 20). The tool deflects as springs do under the same forces, at rest at one pose after
+the other. Formulas are in `motion`, motions in `motions`. Nothing is drawn here.
 
 Source: theory (99).
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.arrays import Array, Codes
+from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.engine.points import PointTable
@@ -25,6 +25,7 @@ from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.drives import numbers_of_drive
+from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
@@ -49,19 +50,19 @@ class DriveLoad:
     Attributes:
         name: of the drive.
         slides: whether it is linear.
-        turns: radians of its rotor per m or rad of its coordinate; 1 where the file gives neither lead nor ratio: its
-            motor is then the drive itself.
+        turns: rotation of its rotor, rad per m or rad of its coordinate; 1 where the file gives neither lead nor ratio:
+            its motor is then the drive itself.
         rotary: whether its motor turns.
         coordinate: least and greatest.
         speed, acceleration, force: greatest sizes at the drive.
         rms_force: root of the mean square of the force over time.
         parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
         motor_speed, motor_torque, rms_torque: at the motor: rad/s and N·m, or of a linear motor m/s and N.
-        power: greatest power that the motor gives, W; least power, where it brakes, W.
-        energy: that the motor gives in the motion, and of it what it takes back while it brakes, J.
-        reflected: greatest inertia that it accelerates while the others stand still, at the motor, without its rotor:
+        power: greatest power of the motor, W, and the least, which is negative where it brakes.
+        energy: energy that the motor gives in the whole motion, and energy that it takes back while it brakes, J.
+        reflected: greatest inertia that the motor accelerates beside its rotor, while the other drives stand still:
             kg·m², or kg of a linear motor; None where drives cannot move one by one.
-        inertia_ratio: of that to its rotor's; None without a rotor.
+        inertia_ratio: ratio of that inertia to the rotor's; None without a rotor.
     """
 
     name: str
@@ -84,12 +85,12 @@ class DriveLoad:
 
     @property
     def unit(self) -> str:
-        """Of its force."""
+        """Unit of its force or moment."""
         return "N" if self.slides else "N·m"
 
     @property
     def motor_unit(self) -> str:
-        """Of its motor's torque or force."""
+        """Unit of its motor's torque or force."""
         return "N·m" if self.rotary else "N"
 
 
@@ -129,14 +130,14 @@ class DriveLoads(ImmutableAnswer):
 
     Attributes:
         machine: with its masses.
-        status: of the first pose that has no answer, else OK.
+        status: status of the first pose that has no answer, else OK.
         message: the answer in a sentence.
         motion: the motion.
         drives: each drive; none without an answer.
         joints: the load of each joint.
-        curves: all of it over time; None without an answer.
-        deflection: of the tool point [n x 6], rad and m, quasi-static; NaN where K does not hold it.
-        worst: number of the point at which a drive has the greatest share of its greatest force, and that drive's name.
+        curves: the drives over time; None without an answer.
+        deflection: quasi-static deflection of the tool point [n x 6], rad and m; NaN where K does not hold it.
+        worst: number of the point at which the drive with the greatest torque has its greatest force, and its name.
         along_modes: the modes of the machine at its pose along the motion; None where they are not known.
         requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
@@ -206,62 +207,58 @@ def drives(
         motion = required_motion(state.machine, points)
     form = rigid_form_of(state)
     if motion is None:
-        moved = every_direction(form, _amount("speed", speed), _amount("acceleration", acceleration))
+        motion = every_direction(form, _amount("speed", speed), _amount("acceleration", acceleration))
     elif speed is not None or acceleration is not None:
         raise InputError("a motion says its speed and acceleration itself; give either a motion or these.")
-    else:
-        moved = read_motion(state.machine, motion, points) if isinstance(motion, Path) else motion
-    return drive_loads(state, form, moved)
+    elif isinstance(motion, Path):
+        motion = read_motion(state.machine, motion, points)
+    return drive_loads(state, form, motion)
 
 
-def drive_loads(state: MachineState, form: RigidForm, moved: Motion) -> DriveLoads:
+def drive_loads(state: MachineState, form: RigidForm, motion: Motion) -> DriveLoads:
     """Compute what a motion asks of the drives of a machine: see `drives`.
 
     Args:
-        state: of the machine.
-        form: of its equations.
-        moved: the motion.
+        state: state of the machine.
+        form: form of its equations.
+        motion: the motion.
 
     Raises:
         InputError: nothing of the machine has a mass, friction or a load.
     """
-    if not (any(np.any(rows) for rows in moved.path.loads.values()) or _weighs(state, form)):
+    if not (any(np.any(rows) for rows in motion.path.loads.values()) or _has_forces(state, form)):
         raise InputError(
             f"nothing of {state.machine.name} has a mass, friction or a load, so that no motion asks anything of its "
             'drives; give it one, e.g. --set tool.mass="5 kg".'
         )
-    codes = evaluate(state.machine, PointTable(moved.path.columns), ["singularity_margin"]).status
+    codes = evaluate(state.machine, PointTable(motion.path.columns), ["singularity_margin"]).status
     lost = np.flatnonzero(~np.isin(codes, PASSABLE))
     if lost.size:
         status = Status(int(codes[lost[0]]))
-        return DriveLoads(
-            state.machine,
-            status,
-            f"The motion cannot be followed: at {moved.times[lost[0]]:.4g} s the pose is "
-            f"{status.word.replace('_', ' ')}. {status.sentence}",
-            moved,
-        )
-    forces = forces_on_path(form, moved.path, joints=True)
-    curves = _curves(state, moved, forces)
-    summaries = _summaries(state, moved, forces, curves)
+        where = f"at {motion.times[lost[0]]:.4g} s the pose is {status.word.replace('_', ' ')}"
+        return DriveLoads(state.machine, status, f"The motion cannot be followed: {where}. {status.sentence}", motion)
+    forces = forces_on_path(form, motion.path, joints=True)
+    motors = _motors_of(state)
+    curves = _curves(state, motors, motion, forces)
+    summaries = [_summary(k, motors, motion, forces, curves) for k in range(len(motors.springs))]
     joints = [
         JointLoad(joint.name, float(load[0].max()), _moment(load, joint.turns, float(state.configuration.length)))
         for joint, load in zip(joints_of(state.configuration), forces.joints, strict=True)
     ]
-    shares = np.abs(curves.force) / np.maximum(np.abs(curves.force).max(axis=1, keepdims=True), 1e-300)
     largest = max(range(len(summaries)), key=lambda k: abs(summaries[k].motor_torque))
-    worst = int(np.argmax(shares[largest])), summaries[largest].name
     return DriveLoads(
-        state.machine,
-        Status.OK,
-        _message(state.machine, moved, summaries) + _wrong_signs(state, curves) + _limits_passed(moved, codes),
-        moved,
-        tuple(summaries),
-        tuple(joints),
-        curves,
-        deflections(state.machine, moved, forces),
-        worst,
-        modes_along(state, form, moved, forces.wrench),
+        machine=state.machine,
+        status=Status.OK,
+        message=_message(state.machine, motion, summaries)
+        + _wrong_signs(state, curves)
+        + _limits_passed(motion, codes),
+        motion=motion,
+        drives=tuple(summaries),
+        joints=tuple(joints),
+        curves=curves,
+        deflection=deflections(state.machine, motion, forces),
+        worst=(int(np.argmax(np.abs(curves.force[largest]))), summaries[largest].name),
+        along_modes=modes_along(state, form, motion, forces.wrench),
     )
 
 
@@ -287,11 +284,12 @@ def _moment(load: Array, turns: bool, length: float) -> float | None:
     return moment if moment > ROUND_OFF_OF_ENTRY * float(load[0].max()) * length else 0.0
 
 
-def _weighs(state: MachineState, form: RigidForm) -> bool:
+def _has_forces(state: MachineState, form: RigidForm) -> bool:
+    """Whether anything of the machine itself asks forces of its drives: loads, masses or friction."""
     rigid = form.at(state).rigid
     loads = any(abs(float(part)) > 0.0 for part in rigid.process.components())
     heavy = bool(rigid.platform) or any(leg.masses for leg in rigid.legs)
-    friction = any(drive.inertia or drive.viscous or drive.coulomb or drive.guide for drive in rigid.drives)
+    friction = any(drive.inertia or drive.viscous or drive.coulomb or drive.guide_friction for drive in rigid.drives)
     return (
         loads or heavy or friction or any(part.coulomb or part.viscous for leg in rigid.legs for part in leg.friction)
     )
@@ -304,55 +302,64 @@ def _coordinates(state: MachineState, motion: Motion) -> Array:
     every = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
     chosen = [number for number, spring in enumerate(every) if any(spring is other for other in driven)]
     with np.errstate(all="ignore"):
-        there = states_at(machine, motion.path.columns, count)
-        if there.joints is None:
-            actuators = actuators_of(there.configuration)
+        states = states_at(machine, motion.path.columns, count)
+        if states.joints is None:
+            actuators = actuators_of(states.configuration)
         else:
-            actuators = [a.at(there.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
+            actuators = [a.at(states.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
         rows = stacked_columns([actuators[number].coordinate for number in chosen], count).T
     slides = np.array([spring.joint.point is None for spring in driven])
     return np.where(slides[:, None], rows, np.unwrap(rows, axis=1))
 
 
-def _curves(state: MachineState, motion: Motion, forces: PathForces) -> DriveCurves:
+@dataclass(frozen=True)
+class _Motors:
+    """The motors of all drives, and how they are connected with them.
+
+    Attributes:
+        springs: the spring of each drive's actuator.
+        numbers: the table [drives] as each drive has it.
+        turns: rotation of the rotor per unit of the drive's coordinate, rad; 1 where the motor is the drive itself
+            [drives].
+        rotary: whether the motor turns; that of a linear drive does where the file gives its lead [drives].
+    """
+
+    springs: tuple[Spring, ...]
+    numbers: tuple[Any, ...]
+    turns: Array
+    rotary: Mask
+
+    def column(self, name: str) -> Array:
+        """A field of the tables [drives], a row for each drive [drives x 1]."""
+        return np.array([getattr(numbers, name) for numbers in self.numbers])[:, None]
+
+
+def _motors_of(state: MachineState) -> _Motors:
+    springs = driven_springs(state.configuration)
+    numbers = [numbers_of_drive(state.machine, "drives", spring) for spring in springs]
+    turns = np.array([float(rotor_turns(spring, given)) for spring, given in zip(springs, numbers, strict=True)])
+    slides = np.array([spring.joint.point is None for spring in springs])
+    return _Motors(tuple(springs), tuple(numbers), np.where(turns > 0.0, turns, 1.0), ~slides | (turns > 0.0))
+
+
+def _curves(state: MachineState, motors: _Motors, motion: Motion, forces: PathForces) -> DriveCurves:
     """Drives and, theory (99), their motors at all points."""
     senses = senses_of_drives(state)[:, None]
     speed, acceleration = forces.drives[:, 0] * senses, forces.drives[:, 1] * senses
     parts = forces.drives[:, 2:] * senses[:, :, None]
     force = parts.sum(axis=1)
-    turns, rotary = _turns(state)[:, None], _rotary(state)[:, None]
-    inertia, damping, friction, efficiency = (
-        np.array([getattr(numbers, name) for numbers in _numbers(state)])[:, None]
-        for name in ("rotor_inertia", "rotor_damping", "rotor_friction", "efficiency")
-    )
+    turns, efficiency = motors.turns[:, None], motors.column("efficiency")
+    inertia, damping, friction = map(motors.column, ("rotor_inertia", "rotor_damping", "rotor_friction"))
     rotor = inertia * acceleration * turns + damping * speed * turns + friction * np.sign(speed)
-    rotor = np.where(rotary, rotor, 0.0)
-    passed = force / turns - rotor  # through gear or screw, to the machine
-    loss = np.where(passed * speed > 0.0, 1.0 / efficiency, efficiency)
-    torque = rotor + passed * loss
+    rotor = np.where(motors.rotary[:, None], rotor, 0.0)
+    transmitted = force / turns - rotor  # by gear or screw, to the machine
+    loss = np.where(transmitted * speed > 0.0, 1.0 / efficiency, efficiency)
+    torque = rotor + transmitted * loss
     power = torque * speed * turns
     steps = 0.5 * (power[:, 1:] + power[:, :-1]) * np.diff(motion.times)
     energy = np.concatenate([np.zeros((len(power), 1)), np.cumsum(steps, axis=1)], axis=1)
     place = _coordinates(state, motion)
     return DriveCurves(place, speed, acceleration, force, parts, speed * turns, torque, power, energy)
-
-
-def _rotary(state: MachineState) -> Array:
-    """Whether the motor of each drive turns: that of a linear drive does where the file gives its lead."""
-    pairs = zip(driven_springs(state.configuration), _numbers(state), strict=True)
-    return np.array([s.joint.point is not None or rotor_turns(s, numbers) > 0.0 for s, numbers in pairs])
-
-
-def _numbers(state: MachineState) -> list[Any]:
-    """The table [drives] as each drive has it."""
-    return [numbers_of_drive(state.machine, "drives", spring) for spring in driven_springs(state.configuration)]
-
-
-def _turns(state: MachineState) -> Array:
-    """Turns of the rotor per unit of each drive's coordinate, rad; 1 where the motor is the drive itself."""
-    pairs = zip(driven_springs(state.configuration), _numbers(state), strict=True)
-    given = np.array([float(rotor_turns(spring, numbers)) for spring, numbers in pairs])
-    return np.where(given > 0.0, given, 1.0)
 
 
 def root_mean_square(times: Array, rows: Array) -> Array:
@@ -362,36 +369,31 @@ def root_mean_square(times: Array, rows: Array) -> Array:
     return np.asarray(np.sqrt(np.trapezoid(rows * rows, times, axis=-1) / (times[-1] - times[0])))
 
 
-def _summaries(state: MachineState, motion: Motion, forces: PathForces, curves: DriveCurves) -> list[DriveLoad]:
-    turns, rotary, numbers = _turns(state), _rotary(state), _numbers(state)
-    rms_force, rms_torque = (root_mean_square(motion.times, rows) for rows in (curves.force, curves.motor_torque))
-    result = []
-    for k, spring in enumerate(driven_springs(state.configuration)):
-        rotor = float(numbers[k].rotor_inertia) if rotary[k] else 0.0
-        reflected = float(forces.inertia[k].max() / turns[k] ** 2) - rotor if len(forces.inertia) else None
-        braking = np.minimum(0.5 * (curves.power[k, 1:] + curves.power[k, :-1]), 0.0) * np.diff(motion.times)
-        result.append(
-            DriveLoad(
-                name_of(spring),
-                spring.joint.point is None,
-                float(turns[k]),
-                bool(rotary[k]),
-                (float(curves.coordinate[k].min()), float(curves.coordinate[k].max())),
-                _size(curves.speed[k]),
-                _size(curves.acceleration[k]),
-                _size(curves.force[k]),
-                float(rms_force[k]),
-                {part: _size(curves.parts[k, i]) for i, part in enumerate(PARTS)},
-                _size(curves.motor_speed[k]),
-                _size(curves.motor_torque[k]),
-                float(rms_torque[k]),
-                (float(curves.power[k].max()), float(min(curves.power[k].min(), 0.0))),
-                (np.nan, np.nan) if motion.timeless else (float(curves.energy[k, -1]), float(-braking.sum())),
-                reflected,
-                reflected / rotor if reflected is not None and rotor else None,
-            )
-        )
-    return result
+def _summary(k: int, motors: _Motors, motion: Motion, forces: PathForces, curves: DriveCurves) -> DriveLoad:
+    """The drive of number k along the whole motion."""
+    spring, turns, power = motors.springs[k], float(motors.turns[k]), curves.power[k]
+    rotor = float(motors.numbers[k].rotor_inertia) if motors.rotary[k] else 0.0
+    reflected = float(forces.inertia[k].max() / turns**2) - rotor if len(forces.inertia) else None
+    braking = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * np.diff(motion.times)
+    return DriveLoad(
+        name=name_of(spring),
+        slides=spring.joint.point is None,
+        turns=turns,
+        rotary=bool(motors.rotary[k]),
+        coordinate=(float(curves.coordinate[k].min()), float(curves.coordinate[k].max())),
+        speed=_size(curves.speed[k]),
+        acceleration=_size(curves.acceleration[k]),
+        force=_size(curves.force[k]),
+        rms_force=float(root_mean_square(motion.times, curves.force[k])),
+        parts={part: _size(curves.parts[k, i]) for i, part in enumerate(PARTS)},
+        motor_speed=_size(curves.motor_speed[k]),
+        motor_torque=_size(curves.motor_torque[k]),
+        rms_torque=float(root_mean_square(motion.times, curves.motor_torque[k])),
+        power=(float(power.max()), float(min(power.min(), 0.0))),
+        energy=(np.nan, np.nan) if motion.timeless else (float(curves.energy[k, -1]), float(-braking.sum())),
+        reflected=reflected,
+        inertia_ratio=reflected / rotor if reflected is not None and rotor else None,
+    )
 
 
 def _size(row: Array) -> float:

@@ -1,8 +1,8 @@
 """Motors, gears and screws of a catalogue, and which motors fit a motion of a machine. Nothing is drawn here.
 
 A motor fits if its torque is within the peak limit at every point of the motion, the root of the mean square of its
-torque is within the continuous limit at the root of the mean square of its speed, and it never turns too fast. Its
-rotor is accelerated as well, so that the same motion asks something else of each motor.
+torque is within the continuous limit at the root of the mean square of its speed, and it never turns too fast. Each
+motor must accelerate its own rotor as well, so that the same motion asks another torque of each.
 
 Source: theory (100).
 """
@@ -49,17 +49,17 @@ class MotorRating:
         """The torque limit at speeds: constant up to the rated one, then of constant power, and 0 beyond the greatest.
 
         Args:
-            peak: whether that for a short while, otherwise the continuous one.
-            speeds: of the motor, rad/s [n].
+            peak: whether to take the limit for a short while, otherwise the continuous one.
+            speeds: speeds of the motor, rad/s [n].
 
         Returns:
             N·m [n].
 
         Source: theory (100).
         """
-        given = np.maximum(np.abs(speeds), self.rated_speed)
-        most = (self.peak_torque if peak else self.torque) * self.rated_speed / given
-        return np.asarray(np.where(given > self.greatest_speed, 0.0, most))
+        sizes = np.maximum(np.abs(speeds), self.rated_speed)
+        torques = (self.peak_torque if peak else self.torque) * self.rated_speed / sizes
+        return np.asarray(np.where(sizes > self.greatest_speed, 0.0, torques))
 
 
 @table
@@ -95,7 +95,7 @@ class ScrewRating:
 SOURCE = "source"
 """Field of an entry that says where its numbers are printed."""
 TABLES: Mapping[str, Any] = {"motors": MotorRating, "gears": GearRating, "screws": ScrewRating}
-"""Tables of a catalogue, and what each of their entries is."""
+"""Tables of a catalogue, with the class of their entries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +112,10 @@ def read_catalogue(path: Path | None = None) -> Catalogue:
     """Read a catalogue.
 
     Args:
-        path: of its TOML file; that of kinetostat if None.
+        path: path of its TOML file; that of kinetostat if None.
 
     Raises:
-        InputError: there is no such file, or an entry of it is not one: it names the entry and the field.
+        InputError: there is no such file, or one of its entries has a mistake: names the entry and the field.
     """
     path = path or CATALOGUE
     return catalogue_of(documents.read(path), path.name)
@@ -125,7 +125,7 @@ def catalogue_of(document: documents.Document, origin: str) -> Catalogue:
     """Read the catalogue in a document; `origin` names it in messages.
 
     Raises:
-        InputError: an entry of it is not one: it names the entry and the field.
+        InputError: one of its entries has a mistake: names the entry and the field.
     """
     for name in document:
         choice(name, TABLES, f'the table of "{origin}"')
@@ -141,21 +141,21 @@ def catalogue_of(document: documents.Document, origin: str) -> Catalogue:
 
 
 def _entry(kind: Any, where: str, given: Any) -> Any:
-    """One motor, gear or screw of what was written; `where` names it in messages."""
+    """A motor, gear or screw from its table as it is written; `where` names it in messages."""
     if not isinstance(given, dict):
         raise InputError(f"{where} is not a table; write its fields below its name in brackets.")
-    known, values = quantities(kind), dict[str, float | tuple[float, ...]]()
+    fields, values = quantities(kind), dict[str, float | tuple[float, ...]]()
     for field, value in given.items():
-        choice(field, [*known, SOURCE], f"the field of {where}")
+        choice(field, [*fields, SOURCE], f"the field of {where}")
         if field == SOURCE:
             continue
         try:
-            values[field] = known[field].read(value)
+            values[field] = fields[field].read(value)
         except UnitError as error:
             raise InputError(f"{where}.{field} is {shorten(value)}: {error}.") from None
-    missing = [field for field in known if field not in values and not hasattr(kind, field)]
+    missing = [field for field in fields if field not in values and not hasattr(kind, field)]
     if missing:
-        raise InputError(f"{where} lacks {missing[0]}, {known[missing[0]].meaning}.")
+        raise InputError(f"{where} lacks {missing[0]}, {fields[missing[0]].meaning}.")
     return kind(**values)
 
 
@@ -164,10 +164,10 @@ class MotorFit:
     """A motor along a motion.
 
     Attributes:
-        name: of the motor.
+        name: name of the motor.
         motor: its numbers.
-        loads: what the motion asks, with its rotor.
-        drive: name of the drive with the least reserve.
+        loads: what the motion asks of drives with its rotor.
+        drive: name of the drive that uses the greatest share of a limit.
         peak: share of the peak limit that is used, at the worst point of the worst drive; infinite if too fast.
         continuous: share of the continuous limit that is used.
         speed: share of the greatest speed that is used.
@@ -207,10 +207,11 @@ class MotorChoice(ImmutableAnswer):
     """The motors of a catalogue along a motion.
 
     Attributes:
-        machine: with lead or ratio of its drives.
-        status: of the first pose without an answer, else OK.
+        machine: the machine with lead or ratio of its drives.
+        status: status of the first pose without an answer, else OK.
         message: the answer in a sentence.
-        fits: of each motor, the smallest that fits first, then the others by what is missing; none without an answer.
+        fits: each motor along the motion: those that fit, the smallest first, then the others, the nearest to fitting
+            first; none without an answer.
         requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
 
@@ -236,66 +237,71 @@ def motors(
     """Find which motors of a catalogue fit a motion of a machine.
 
     Args:
-        machine: with masses, friction, and lead or ratio of its drives, unless a gear or a screw is chosen.
+        machine: a machine with masses, friction, and lead or ratio of its drives, unless a gear or a screw is chosen.
         motion: a motion, or the path of its CSV file; that of the requirements of the machine's file if None.
         catalogue: path of the file; that of kinetostat if None.
         gear, screw: names of a gear for rotary drives, or a screw for linear ones, of the catalogue; none if empty.
-        points: of the motion that are looked at, about.
+        points: number of points of the motion at which it is looked at, about.
 
     Raises:
         InputError: no motion, a mistake in a file, an unknown gear or screw, or motors of which nothing says how far
             they turn.
     """
-    known = read_catalogue(catalogue)
-    if not known.motors:
+    products = read_catalogue(catalogue)
+    if not products.motors:
         raise InputError("the catalogue has no motors; write [motors.NAME] with torques, speeds and inertia.")
-    fitted, beside = with_transmission(machine, known, gear, screw)
-    moved = read_motion(fitted, motion, points) if isinstance(motion, Path) else motion
-    moved = required_motion(fitted, points) if moved is None else moved
-    if moved is None:
+    fitted, inertia = with_transmission(machine, products, gear, screw)
+    if isinstance(motion, Path):
+        motion = read_motion(fitted, motion, points)
+    elif motion is None:
+        motion = required_motion(fitted, points)
+    if motion is None:
         raise InputError(
             "no motion is given, and the file requires no motor for one; name its CSV file, or write the requirement "
-            f'drives = {{ fits = "{next(iter(known.motors))}", motion = "motion.csv" }}.'
+            f'drives = {{ fits = "{next(iter(products.motors))}", motion = "motion.csv" }}.'
         )
     fits = []
-    for name in known.motors:
-        loads = loads_with(fitted, known.motors[name], beside, moved)
+    for name in products.motors:
+        loads = loads_with(fitted, products.motors[name], inertia, motion)
         if loads.curves is None or not loads.drives:
             return MotorChoice(fitted, loads.status, loads.message)
-        fits.append(fit_of(known, name, loads))
+        fits.append(fit_of(products, name, loads))
     ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.hardest[1])))
     return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
 
 
-def with_transmission(machine: Machine, known: Catalogue, gear: str, screw: str) -> tuple[Machine, float]:
-    """The machine with a gear or a screw of a catalogue, and the inertia that turns beside its rotors, kg·m².
+def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: str) -> tuple[Machine, float]:
+    """The machine with a gear or a screw of a catalogue, and the inertia of what turns with each rotor then, kg·m².
 
     Raises:
         InputError: there is no gear or screw of that name.
     """
     settings: dict[str, float] = {}
-    beside = 0.0
-    for name, parts, field, what in ((gear, known.gears, "ratio", "gear"), (screw, known.screws, "lead", "screw")):
-        if name:
-            part: Any = parts[choice(name, parts, f"the {what} of the catalogue")]
-            settings |= {f"drives.{field}": getattr(part, field), "drives.efficiency": part.efficiency}
-            beside += part.turning if isinstance(part, ScrewRating) else part.inertia
-    return with_every_drive(machine, settings), beside
+    inertia = 0.0
+    if gear:
+        chosen_gear = catalogue.gears[choice(gear, catalogue.gears, "the gear of the catalogue")]
+        settings |= {"drives.ratio": chosen_gear.ratio, "drives.efficiency": chosen_gear.efficiency}
+        inertia += chosen_gear.inertia
+    if screw:
+        chosen_screw = catalogue.screws[choice(screw, catalogue.screws, "the screw of the catalogue")]
+        settings |= {"drives.lead": chosen_screw.lead, "drives.efficiency": chosen_screw.efficiency}
+        inertia += chosen_screw.turning
+    return with_every_drive(machine, settings), inertia
 
 
-def loads_with(machine: Machine, motor: MotorRating, beside: float, motion: Motion) -> DriveLoads:
+def loads_with(machine: Machine, motor: MotorRating, inertia: float, motion: Motion) -> DriveLoads:
     """The demands of a motion on the drives of a machine with the rotors of a motor.
 
     Args:
-        machine: with lead or ratio of its drives.
-        motor: of all drives.
-        beside: inertia that turns with each rotor, kg·m².
+        machine: the machine with lead or ratio of its drives.
+        motor: the motor of all drives.
+        inertia: inertia that turns with each rotor, kg·m².
         motion: the motion.
 
     Raises:
         InputError: nothing says how far the motors turn.
     """
-    state = state_of(with_every_drive(machine, {"drives.rotor_inertia": motor.inertia + beside}))
+    state = state_of(with_every_drive(machine, {"drives.rotor_inertia": motor.inertia + inertia}))
     loads = drive_loads(state, rigid_form_of(state), motion)
     if any(not drive.rotary for drive in loads.drives):
         raise InputError(
@@ -305,36 +311,37 @@ def loads_with(machine: Machine, motor: MotorRating, beside: float, motion: Moti
     return loads
 
 
-def fit_of(known: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
+def fit_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
     """Compare what a motion asks with what a motor of a catalogue may give.
 
     Args:
-        known: the catalogue.
-        name: of the motor.
-        loads: an answer with this motor's rotors.
+        catalogue: the catalogue.
+        name: name of the motor.
+        loads: what the motion asks of drives with this motor's rotors.
     """
-    motor = known.motors[name]
+    motor = catalogue.motors[name]
     if loads.curves is None or loads.motion is None:
         raise ValueError("a motion without an answer asks nothing of a motor")
     torques, speeds = np.abs(loads.curves.motor_torque), np.abs(loads.curves.motor_speed)
-    worst: list[tuple[float, ...]] = []
+    shares: list[tuple[float, ...]] = []  # peak torque, continuous torque and speed, drive by drive
     for torque, speed, drive in zip(torques, speeds, loads.drives, strict=True):
-        mean = float(root_mean_square(loads.motion.times, speed))
-        lasting = _share(np.array([drive.rms_torque]), motor.limit(False, np.array([mean])))
-        worst.append((_share(torque, motor.limit(True, speed)), lasting, drive.motor_speed / motor.greatest_speed))
-    place = max(range(len(worst)), key=lambda k: max(worst[k]))
+        rms_speed = root_mean_square(loads.motion.times, speed)
+        peak = _share(torque, motor.limit(peak=True, speeds=speed))
+        continuous = _share(np.array([drive.rms_torque]), motor.limit(peak=False, speeds=np.array([rms_speed])))
+        shares.append((peak, continuous, drive.motor_speed / motor.greatest_speed))
+    hardest = max(range(len(shares)), key=lambda k: max(shares[k]))
     ratios = [drive.inertia_ratio for drive in loads.drives if drive.inertia_ratio is not None]
-    peak, continuous, speed = (max(column) for column in zip(*worst, strict=True))
+    peak, continuous, speed_share = (max(column) for column in zip(*shares, strict=True))
     return MotorFit(
-        name,
-        motor,
-        loads,
-        loads.drives[place].name,
-        peak,
-        continuous,
-        speed,
-        max(ratios, default=None),
-        known.sources["motors", name],
+        name=name,
+        motor=motor,
+        loads=loads,
+        drive=loads.drives[hardest].name,
+        peak=peak,
+        continuous=continuous,
+        speed=speed_share,
+        inertia_ratio=max(ratios, default=None),
+        source=catalogue.sources["motors", name],
     )
 
 

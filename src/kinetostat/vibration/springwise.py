@@ -1,14 +1,16 @@
-"""Motions of a machine whose legs close loops, by the deflections of its springs: frequencies, load factor.
+"""Natural frequencies and load factor of a machine whose legs close loops, over the deflections of its springs.
 
-The unknowns y are deflections times roots of stiffnesses, so that springs alone make the stiffness 1. They tell how the
-platform moves and how each leg follows; combinations that would open a leg are projected out. The modes
-are solved for elsewhere, by a loop or a library; here they are numbers, whose errors count by their squares alone.
+The unknowns y are the deflections of all springs, times the roots of their stiffnesses, so that the springs by
+themselves have the stiffness matrix 1. They determine how the platform moves, and how the coordinates of each leg
+follow; deflections that would open a leg are projected out. Modes are found outside of this file, by a loop over points
+or by a library. Here they are given numbers: what is computed of a mode is stationary in it, so that only the squares
+of its errors count.
 
 Source: theory (44), (58) and (63). Units are those of `equilibrium.mechanism`.
 """
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -41,19 +43,43 @@ from kinetostat.vibration.slopes import EQUALS, energy_of
 
 @dataclass(frozen=True)
 class SpringSizes:
-    """Sizes of what `SpringMotions.parts` gives.
+    """Sizes of the matrices that `SpringMotions.parts` gives, and the modes that follow from them.
 
     Attributes:
-        ways: motions that the platform has.
-        springs: all springs of legs and rods.
-        conditions: combinations of deflections that would open a leg.
+        ways: number of motions that the platform has.
+        springs: number of springs of all legs and rods.
+        conditions: number of combinations of deflections that would open a leg.
     """
 
     ways: int
     springs: int
     conditions: int
 
-    def upper(self, rows: Array) -> Array:
+    def matrices(self, parts: Array) -> tuple[Array, Array, Array]:
+        """The matrices of n states over deflections that keep all legs closed, each [n x springs x springs].
+
+        Args:
+            parts: results of `SpringMotions.parts` [entries x n].
+
+        Returns:
+            The projection Q onto these deflections, the mass Q M Q, and the stiffness Q (K - 1) Q without the springs'.
+        """
+        over_ways, over_conditions = self.ways * self.springs, self.conditions * self.springs
+        entries = self.springs * (self.springs + 1) // 2
+        ends = np.cumsum([over_ways] * 3 + [over_conditions] * 2 + [entries])
+        twists, mixed_mass, mixed_stiffness, conditions, inverse, mass, stiffness = np.split(parts.T, ends, axis=1)
+        twists, mixed_mass, mixed_stiffness, conditions = (
+            rows.reshape(len(rows), -1, self.springs) for rows in (twists, mixed_mass, mixed_stiffness, conditions)
+        )
+        projection = np.eye(self.springs) - inverse.reshape(len(inverse), self.springs, -1) @ conditions
+        products = [np.swapaxes(twists, 1, 2) @ mixed for mixed in (mixed_mass, mixed_stiffness)]
+        projected_mass, projected_stiffness = (
+            projection @ (mixed + np.swapaxes(mixed, 1, 2) + self._from_upper(rows)) @ projection
+            for mixed, rows in zip(products, (mass, stiffness), strict=True)
+        )
+        return projection, projected_mass, projected_stiffness
+
+    def _from_upper(self, rows: Array) -> Array:
         """Symmetric matrices [n x springs x springs] from their upper triangles, row by row [n x entries]."""
         result = np.zeros((len(rows), self.springs, self.springs))
         i, j = np.triu_indices(self.springs)
@@ -61,37 +87,26 @@ class SpringSizes:
         return result
 
     def modes(self, parts: Array, count: int, massive: bool = True) -> Array:
-        """The modes of n states that give most first: 1 / omega², or least stiffness [n x count x springs].
+        """Find the lowest modes of n states, those of the least frequency first, or those of the least stiffness.
 
         Args:
             parts: results of `SpringMotions.parts` [entries x n].
-            count: of modes; those that a machine does not have are zero.
+            count: number of modes; those that a machine does not have are zero.
             massive: whether masses count; without them, modes are those of the least stiffness.
 
         Returns:
-            The modes; NaN where springs and loads do not hold the machine.
+            The modes [n x count x springs]; NaN where springs and loads do not hold the machine.
         """
-        ways, size = self.ways * self.springs, self.conditions * self.springs
-        ends = np.cumsum([ways, ways, ways, size, size, self.springs * (self.springs + 1) // 2])
-        twists, pushed, turned, closing, back, heavy, stiff = np.split(parts.T, ends, axis=1)
-        twists, pushed, turned, closing = (
-            rows.reshape(len(rows), -1, self.springs) for rows in (twists, pushed, turned, closing)
-        )
-        ones = np.eye(self.springs)
-        kept = ones - back.reshape(len(back), self.springs, -1) @ closing
-        mixed = [np.swapaxes(twists, 1, 2) @ part for part in (pushed, turned)]
-        mass, stiffness = (
-            kept @ (part + np.swapaxes(part, 1, 2) + self.upper(rows)) @ kept
-            for part, rows in zip(mixed, (heavy, stiff), strict=True)
-        )
-        result = np.full((len(kept), count, self.springs), np.nan)
-        sound = np.flatnonzero(np.isfinite(mass).all(axis=(1, 2)) & np.isfinite(stiffness).all(axis=(1, 2)))
-        sizes, axes = np.linalg.eigh(ones + stiffness[sound])
+        projection, mass, stiffness = self.matrices(parts)
+        result = np.full((len(mass), count, self.springs), np.nan)
+        finite = np.flatnonzero(np.isfinite(mass).all(axis=(1, 2)) & np.isfinite(stiffness).all(axis=(1, 2)))
+        sizes, axes = np.linalg.eigh(np.eye(self.springs) + stiffness[finite])
         stable = sizes[:, 0] > 0.0
-        rows, sizes, axes = sound[stable], sizes[stable], axes[stable]
+        rows, sizes, axes = finite[stable], sizes[stable], axes[stable]
+        # In the coordinates of these factors the stiffness is 1, so that an ordinary eigenvalue problem is left.
         factors = axes / np.sqrt(sizes)[:, None]
-        ringing = np.swapaxes(factors, 1, 2) @ (mass if massive else kept)[rows] @ factors
-        shapes = factors @ np.linalg.eigh(ringing)[1][:, :, ::-1]
+        reduced = np.swapaxes(factors, 1, 2) @ (mass if massive else projection)[rows] @ factors
+        shapes = factors @ np.linalg.eigh(reduced)[1][:, :, ::-1]
         shown = min(count, self.springs - self.conditions)
         result[rows] = 0.0
         result[rows, :shown] = np.swapaxes(shapes, 1, 2)[:, :shown]
@@ -101,12 +116,12 @@ class SpringSizes:
 def spring_sizes(machine: Cut) -> SpringSizes:
     """Count the springs and conditions of a machine with its loops cut."""
     ways = machine.mechanism.ways.shape[1]
-    free = [leg.springs.count(None) for leg in machine.legs]
-    springs = len(machine.rods) + sum(len(leg.springs) for leg in machine.legs) - sum(free)
-    return SpringSizes(ways, springs, len(machine.rods) + sum(ways - count for count in free) - ways)
+    joints = [leg.springs.count(None) for leg in machine.legs]
+    springs = len(machine.rods) + sum(len(leg.springs) for leg in machine.legs) - sum(joints)
+    return SpringSizes(ways, springs, len(machine.rods) + sum(ways - count for count in joints) - ways)
 
 
-def in_its_ways(machine: Cut) -> bool:
+def springs_follow_ways(machine: Cut) -> bool:
     """Whether all springs of legs deflect in motions that the machine has; those of a planar machine may not."""
     outside = np.eye(6) - machine.mechanism.ways @ machine.mechanism.ways.T
     return all(not (leg.chain.twists.astype(float) @ outside).any() for leg in machine.legs)
@@ -129,34 +144,39 @@ class SpringMotions:
         """
         tangent = LegwiseTangent(machine, coordinates)
         self._machine, self._tangent = machine, tangent
-        mechanism, length = machine.mechanism, machine.mechanism.length
-        ways = mechanism.ways.astype(object)
-        self._shrink = [
+        # Of each leg, the deflections of its springs per unit of y: 1 / sqrt(k).
+        self._deflections = [
             np.array([*(1.0 / sqrt(part) for part in leg.terms.carrying[0, leg.elastic]), None], dtype=object)[:-1]
             for leg in tangent.legs
         ]
-        felt = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
-        felt += [leg.felt * shrink for leg, shrink in zip(tangent.legs, self._shrink, strict=True)]
-        stretched = block_diagonal(felt)
-        self.size = stretched.shape[1]
-        balanced, internal, _ = right_inverse(tangent.lines.T.tolist())
+        openings = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
+        openings += [leg.felt * scale for leg, scale in zip(tangent.legs, self._deflections, strict=True)]
+        opening = block_diagonal(openings)  # by which y opens the cuts along the lines
+        self.size = opening.shape[1]
+        ways = machine.mechanism.ways.astype(object)
+        inverse, internal, _ = right_inverse(tangent.lines.T.tolist())
         count = len(internal)
-        self._twists = product(array_of(balanced, len(tangent.lines), ways.shape[1]).T, stretched)
-        self._closing = product(array_of(internal, count, len(tangent.lines)), stretched)
+        self._twists = product(array_of(inverse, len(tangent.lines), ways.shape[1]).T, opening)
+        self._conditions = product(array_of(internal, count, len(tangent.lines)), opening)
         self.sure: Scalar = True
-        self._back = array_of([], self.size, 0)
+        self._inverse = array_of([], self.size, 0)
         if count:
-            solution, _, margin = right_inverse(self._closing.tolist())
-            self._back, self.sure = array_of(solution, self.size, count), margin > SURELY_MORE
-        self._inertia = platform_inertia(mechanism.platform, tangent.platform, length)[0]
-        for rod, pull in zip(machine.rods, tangent.pulls, strict=True):
+            solution, _, margin = right_inverse(self._conditions.tolist())
+            self._inverse, self.sure = array_of(solution, self.size, count), margin > SURELY_MORE
+        self._inertia = self._platform_inertia(ways)
+
+    def _platform_inertia(self, ways: Array) -> Array:
+        """The inertia of the platform with the rotors of all rods, over the motions of the platform [ways x ways]."""
+        mechanism, tangent = self._machine.mechanism, self._tangent
+        inertia = platform_inertia(mechanism.platform, tangent.platform, mechanism.length)[0]
+        for rod, pull in zip(self._machine.rods, tangent.pulls, strict=True):
             if not is_zero(rod.rotor):
                 line = np.array([part * (1.0 / pull.length) for part in pull.line], dtype=object)
-                self._inertia = self._inertia + np.outer(line, line) * (rod.rotor * length[0])
-        self._inertia = ways.T @ self._inertia @ ways
+                inertia = inertia + np.outer(line, line) * (rod.rotor * mechanism.length[0])
+        return np.asarray(ways.T @ inertia @ ways)
 
     def parts(self) -> list[Scalar]:
-        """The parts of which loops make the mass M and the stiffness K over y, row by row.
+        """The parts of the mass M and the stiffness K over y, row by row: `SpringSizes.matrices` puts them together.
 
         With the twists T y of the platform, M is T^T H + H^T T + D and K is 1 + T^T F + F^T T + E, of D and E the upper
         triangles. Legs stay closed where A y = 0.
@@ -164,78 +184,94 @@ class SpringMotions:
         Returns:
             T, H, F [ways x springs], A [conditions x springs], A+ [springs x conditions], D, E.
         """
-        machine, tangent = self._machine, self._tangent
-        length, blocks = machine.mechanism.length, []
-        sums = []
-        for stiff in (False, True):
-            whole = tangent.turning if stiff else self._inertia
-            mixed, alone = [], []
-            for leg, elastic, shrink in zip(tangent.legs, machine.legs, self._shrink, strict=True):
-                if stiff:
-                    matrix = leg.terms.geometric[0].astype(object)
-                else:
-                    matrix = np.diag(elastic.rotors[0].astype(object) * length[0])
-                    for _, part in energies(elastic.masses, leg_rates(elastic, leg.placed), length):
-                        matrix = matrix + part[0]
-                follows, stretches = self._rates_of(leg, shrink)
-                pushed = product(matrix, stretches)
-                whole = whole + symmetric_product(follows.T, product(matrix, follows))
-                mixed.append(product(follows.T, pushed))
-                alone.append(symmetric_product(stretches.T, pushed))
-            count = len(machine.rods)
-            whole = 0.5 * (whole + whole.T)
-            beside = np.concatenate([array_of([], len(whole), count), *mixed], axis=1)
-            sums.append(0.5 * product(whole, self._twists) + beside)
-            blocks.append(block_diagonal([array_of([], count, count), *alone]))
-        rows = [self._twists, *sums, self._closing, self._back]
-        upper = [matrix[i, j] for matrix in blocks for i in range(self.size) for j in range(i, self.size)]
+        mixed_mass, mass = self._over_springs(self._inertia, self._leg_inertias())
+        mixed_stiffness, stiffness = self._over_springs(self._tangent.turning, self._leg_stiffnesses())
+        rows = [self._twists, mixed_mass, mixed_stiffness, self._conditions, self._inverse]
+        upper = [matrix[i, j] for matrix in (mass, stiffness) for i in range(self.size) for j in range(i, self.size)]
         return [entry for row in rows for entry in row.ravel().tolist()] + upper
 
+    def _leg_inertias(self) -> Iterator[Array]:
+        """The inertia of each leg over its coordinates."""
+        length = self._machine.mechanism.length
+        for leg, elastic in zip(self._tangent.legs, self._machine.legs, strict=True):
+            matrix = np.diag(elastic.rotors[0].astype(object) * length[0])
+            for _, part in energies(elastic.masses, leg_rates(elastic, leg.placed), length):
+                matrix = matrix + part[0]
+            yield matrix
+
+    def _leg_stiffnesses(self) -> Iterator[Array]:
+        """The stiffness of each leg over its coordinates that comes from wrenches which turn with its parts."""
+        return (leg.terms.geometric[0].astype(object) for leg in self._tangent.legs)
+
+    def _over_springs(self, platform: Array, legs: Iterable[Array]) -> tuple[Array, Array]:
+        """Write a quadratic form of all motions over y: the factor of its mixed part, and the part that has no twist.
+
+        Args:
+            platform: matrix of the form over the motions of the platform [ways x ways].
+            legs: its matrix over the coordinates of each leg.
+
+        Returns:
+            X [ways x springs] and Z [springs x springs] of y^T (T^T X + X^T T + Z) y.
+        """
+        mixed, without_twist = [], []
+        for matrix, leg, scale in zip(legs, self._tangent.legs, self._deflections, strict=True):
+            by_twist, by_springs = self._leg_motion(leg, scale)
+            loads = product(matrix, by_springs)
+            platform = platform + symmetric_product(by_twist.T, product(matrix, by_twist))
+            mixed.append(product(by_twist.T, loads))
+            without_twist.append(symmetric_product(by_springs.T, loads))
+        count = len(self._machine.rods)
+        platform = 0.5 * (platform + platform.T)
+        beside = np.concatenate([array_of([], len(platform), count), *mixed], axis=1)
+        return 0.5 * product(platform, self._twists) + beside, block_diagonal(
+            [array_of([], count, count), *without_twist]
+        )
+
     @staticmethod
-    def _rates_of(leg: CondensedLeg, shrink: Array) -> tuple[Array, Array]:
-        """Motion of a leg's coordinates by the twist of the platform and by the leg's springs."""
+    def _leg_motion(leg: CondensedLeg, scale: Array) -> tuple[Array, Array]:
+        """Rates of a leg's coordinates by the twist of the platform, and by the unknowns of the leg's springs."""
         size = len(leg.elastic) + len(leg.passive)
-        follows = np.full((size, leg.across.shape[1]), 0.0, dtype=object)
-        stretches = np.full((size, len(leg.elastic)), 0.0, dtype=object)
-        follows[leg.passive] = leg.closes
-        stretches[leg.passive] = -(leg.follows * shrink)
+        by_twist = np.full((size, leg.across.shape[1]), 0.0, dtype=object)
+        by_springs = np.full((size, len(leg.elastic)), 0.0, dtype=object)
+        by_twist[leg.passive] = leg.closes
+        by_springs[leg.passive] = -(leg.follows * scale)
         for place, number in enumerate(leg.elastic):
-            stretches[number, place] = shrink[place]
-        return follows, stretches
+            by_springs[number, place] = scale[place]
+        return by_twist, by_springs
 
     def square(self, mode: Sequence[Scalar]) -> Scalar:
-        """1 / omega² of a mode, s²."""
-        twist, moved, deflections = self._motion(mode)
+        """1 / omega² of a mode, s²: its kinetic energy over its elastic one, at omega = 1."""
+        twist, leg_motions, unknowns = self._motion(mode)
         machine, tangent, length = self._machine, self._tangent, self._machine.mechanism.length
         kinetic = twist @ (self._inertia @ twist)
-        for leg, elastic, motion in zip(tangent.legs, machine.legs, moved, strict=True):
+        for leg, elastic, motion in zip(tangent.legs, machine.legs, leg_motions, strict=True):
             kinetic = kinetic + energy_of(elastic.masses, leg_rates(elastic, leg.placed), motion, length)
             kinetic = kinetic + length[0] * total(list(elastic.rotors[0] * motion * motion))
-        return kinetic / (deflections @ deflections + self._work_of_turning(twist, moved))
+        return kinetic / (unknowns @ unknowns + self._work_of_turning(twist, leg_motions))
 
     def factor(self, mode: Sequence[Scalar]) -> Scalar:
-        """By which the load may grow until the machine gives way in a mode."""
-        twist, moved, deflections = self._motion(mode)
-        share = -(self._work_of_turning(twist, moved) / (deflections @ deflections))
+        """The factor by which the load may grow until the machine gives way in a mode; infinite if it never does."""
+        twist, leg_motions, unknowns = self._motion(mode)
+        share = -(self._work_of_turning(twist, leg_motions) / (unknowns @ unknowns))
         grows = share > UNRESISTED
         return where(grows, 1.0 / where(grows, share, 1.0), math.inf)
 
     def _motion(self, mode: Sequence[Scalar]) -> tuple[Array, list[Array], Array]:
-        """The twist of the platform, the coordinates of all legs, and y, of a mode without what opens legs."""
-        deflections = of_scalars([*mode])[0]
-        if len(self._closing):
-            deflections = deflections - self._back @ (self._closing @ deflections)
-        twist, start, moved = self._twists @ deflections, len(self._machine.rods), []
-        for leg, shrink in zip(self._tangent.legs, self._shrink, strict=True):
-            follows, stretches = self._rates_of(leg, shrink)
-            moved.append(product(follows, twist) + product(stretches, deflections[start : start + len(shrink)]))
-            start += len(shrink)
-        return twist, moved, deflections
+        """The twist of the platform in a mode, the motions of each leg's coordinates, and y that keeps legs closed."""
+        unknowns = of_scalars([*mode])[0]
+        if len(self._conditions):
+            unknowns = unknowns - self._inverse @ (self._conditions @ unknowns)
+        twist, start, leg_motions = self._twists @ unknowns, len(self._machine.rods), []
+        for leg, scale in zip(self._tangent.legs, self._deflections, strict=True):
+            by_twist, by_springs = self._leg_motion(leg, scale)
+            leg_motions.append(product(by_twist, twist) + product(by_springs, unknowns[start : start + len(scale)]))
+            start += len(scale)
+        return twist, leg_motions, unknowns
 
-    def _work_of_turning(self, twist: Array, moved: Sequence[Array]) -> Scalar:
-        """Twice the work of loads and wrenches that turn."""
+    def _work_of_turning(self, twist: Array, leg_motions: Sequence[Array]) -> Scalar:
+        """Twice the work in a mode of loads and wrenches, which turn with the parts that they act on."""
         work = twist @ (self._tangent.turning @ twist)
-        for leg, motion in zip(self._tangent.legs, moved, strict=True):
+        for leg, motion in zip(self._tangent.legs, leg_motions, strict=True):
             work = work + motion @ (leg.terms.geometric[0].astype(object) @ motion)
         return work
 
@@ -286,14 +322,15 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
     state, alone = state_of(machine), platform_alone(machine, varying)
     with np.errstate(all="ignore"):
         machine_cut = cut(state.free_equations.mechanism)
-    if machine_cut is None or not machine_cut.legs or not in_its_ways(machine_cut):
+    if machine_cut is None or not machine_cut.legs or not springs_follow_ways(machine_cut):
         return None
-    most = spring_sizes(machine_cut).springs - spring_sizes(machine_cut).conditions
-    wanted = [
+    sizes = spring_sizes(machine_cut)
+    most = sizes.springs - sizes.conditions
+    highest = [
         max([int(row.name.rpartition("_")[2]) for row in modal if row.modal and bool(row.loaded) == at_rest], default=0)
         for at_rest in (True, False)
     ]
-    loaded, free = (min(most, count + EQUALS) if count and not alone else 0 for count in wanted)
+    loaded, free = (min(most, number + EQUALS) if number and not alone else 0 for number in highest)
     result = ModeCounts(loaded, int(any(row.loaded == "factor" for row in modal)), free)
     return result if result != ModeCounts() else None
 

@@ -38,50 +38,52 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     """Write the vibrations of a machine as equations of first order.
 
     Args:
-        modes: at the pose.
-        damping: the damping of the modes.
-        inputs: motion of each point and direction in which a force acts, in each mode [inputs x m], SI per root of a
+        modes: modes at the pose.
+        damping: damping of the modes.
+        inputs: motion in each mode of each point and direction in which a force acts [inputs x m], SI per root of a
             joule.
-        outputs: likewise, motions that are looked at [outputs x m].
-        count: of the lowest modes that are states; all that have mass if None. Higher ones follow at once, without
-            friction, and what they add to the compliance stays in D.
+        outputs: motion in each mode of each point and direction whose motion is an output [outputs x m].
+        count: number of the lowest modes that become states; all that have mass if None. The others follow at once,
+            without friction, and what they add to the compliance stays in D.
     """
-    rings = modes.ringing if count is None else min(count, modes.ringing)
+    with_mass = modes.ringing
+    kept = with_mass if count is None else min(count, with_mass)
     friction = damping.friction
-    slow, turned = _slow_friction(
-        friction[modes.ringing :, modes.ringing :], UNRESISTED * float(np.abs(friction).max())
+    least = UNRESISTED * float(np.abs(friction).max())
+    creeping, turns = _principal_friction(friction[with_mass:, with_mass:], least)
+    without_mass = with_mass + np.arange(turns.shape[1])
+    creep, free = turns[:, : len(creeping)], turns[:, len(creeping) :]
+    # What follows at once: modes with mass that are no states, and motions without mass that no friction slows.
+    pushed, seen = (
+        np.concatenate([rows[:, kept:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
     )
-    slowed = modes.ringing + np.arange(turned.shape[1])
-    kept, drag = slice(0, rings), turned[:, : len(slow)]
-    at_once = np.concatenate([inputs[:, rings : modes.ringing], inputs[:, slowed] @ turned[:, len(slow) :]], axis=1)
-    seen = np.concatenate([outputs[:, rings : modes.ringing], outputs[:, slowed] @ turned[:, len(slow) :]], axis=1)
-    roots = np.sqrt(modes.squares[kept])
-    coupling = drag.T @ friction[modes.ringing :, kept] / roots
-    push, slide = inputs[:, kept].T / roots[:, None], drag.T @ inputs[:, slowed].T
-    against = friction[kept, kept] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
-    lag = coupling.T / slow
-    zeros, unit = np.zeros((rings, rings)), np.eye(rings)
+    roots = np.sqrt(modes.squares[:kept])
+    coupling = creep.T @ friction[with_mass:, :kept] / roots
+    push, slide = inputs[:, :kept].T / roots[:, None], creep.T @ inputs[:, without_mass].T
+    drag = friction[:kept, :kept] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
+    by_creep = coupling.T / creeping
+    zeros, unit, size = np.zeros((kept, kept)), np.eye(kept), len(creeping)
     rates = [
-        [zeros, unit, np.zeros((rings, len(slow)))],
-        [-np.diag(1.0 / roots**2), lag @ coupling - against, lag],
-        [np.zeros((len(slow), rings)), -coupling / slow[:, None], -np.diag(1.0 / slow)],
+        [zeros, unit, np.zeros((kept, size))],
+        [-np.diag(1.0 / roots**2), by_creep @ coupling - drag, by_creep],
+        [np.zeros((size, kept)), -coupling / creeping[:, None], -np.diag(1.0 / creeping)],
     ]
-    forced = [np.zeros((rings, len(inputs))), push - lag @ slide, slide / slow[:, None]]
-    motions = [outputs[:, kept] / roots, np.zeros((len(outputs), rings)), outputs[:, slowed] @ drag]
-    names = [f"{what} of mode {k + 1}" for what in ("amplitude", "speed") for k in range(rings)]
-    names += [f"creeping motion {k + 1}" for k in range(len(slow))]
-    return Equations(np.block(rates), np.vstack(forced), np.hstack(motions), seen @ at_once.T, tuple(names))
+    forced = [np.zeros((kept, len(inputs))), push - by_creep @ slide, slide / creeping[:, None]]
+    motions = [outputs[:, :kept] / roots, np.zeros((len(outputs), kept)), outputs[:, without_mass] @ creep]
+    states = [f"{kind} of mode {k + 1}" for kind in ("amplitude", "speed") for k in range(kept)]
+    states += [f"creeping motion {k + 1}" for k in range(size)]
+    return Equations(np.block(rates), np.vstack(forced), np.hstack(motions), seen @ pushed.T, tuple(states))
 
 
-def _slow_friction(friction: Array, least: float) -> tuple[Array, Array]:
-    """Friction of the motions without mass along its principal directions.
+def _principal_friction(friction: Array, least: float) -> tuple[Array, Array]:
+    """Friction of the motions without mass along its principal directions, of which those with friction creep.
 
     Args:
-        friction: between them, s [n x n].
-        least: up to which it is round-off, s.
+        friction: friction between these motions, s [n x n].
+        least: friction up to which it is round-off, s.
 
     Returns:
-        The frictions beyond that [k]; all directions as columns [n x n], those of the frictions first.
+        The frictions beyond that, the greatest first [k]; all directions as columns [n x n], in the same order.
     """
     sizes, directions = np.linalg.eigh(friction)
     sizes, directions = sizes[::-1], directions[:, ::-1]
