@@ -1,6 +1,6 @@
-"""Modules that are imported when something in them is first used, and what libraries are not to do unasked.
+"""Modules that are imported when something in them is first used, and slow habits of libraries that nobody needs.
 
-Where a module has a use for few of those who import it, it names it twice: to the type checker, and here.
+A module that most of its importers never use is named twice: to the type checker, and here.
 
     if TYPE_CHECKING:
         from kinetostat.equilibrium import solving

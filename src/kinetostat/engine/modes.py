@@ -1,6 +1,6 @@
-"""Modes over springs of slabs of points: programs give their matrices, LAPACK the modes.
+"""Modes over springs at many points: a program computes the matrices of all points, LAPACK the modes of each.
 
-No formula lives here; see `vibration.springwise`.
+The formulas are in `vibration.springwise`; here they are traced and run.
 """
 
 from collections.abc import Sequence
@@ -29,31 +29,34 @@ from kinetostat.vibration.springwise import ModeCounts, SpringMotions, motions_w
 def modes_at_rest(
     machine: Machine, form: Form, fixed: Array, given: Sequence[Array], counts: ModeCounts, closed: bool
 ) -> list[Array]:
-    """Find the modes of states of rest, as columns that programs of quantities take: a row of points for each number.
+    """Find the modes of states of rest.
 
     Args:
         machine: a machine whose legs close loops.
-        form: how its parameters enter.
+        form: how its parameters enter the program.
         fixed: values of the parameters that are the same at all points.
-        given: columns of the others, of joints if they are not `closed` inside the programs, and of states of rest.
-        counts: how many modes.
-        closed: whether joints are closed inside the programs.
+        given: columns of the other parameters, of joints if they are not `closed`, and of the states of rest.
+        counts: how many modes are wanted.
+        closed: whether programs compute the joints that close the legs by themselves, in closed form.
+
+    Returns:
+        The modes as further columns of programs of quantities: an array [points] for each of their numbers.
     """
     program = program_of(Recipe(spring_parts_of, Specimen(machine), form, (closed, True)), native=False)
-    count, sizes = len(given[0]), sizes_over_springs(machine)
-    parts = np.empty((program.rows, count))
-    program.run(fixed, given, parts, np.empty(count, dtype=np.int8))
+    points, sizes = len(given[0]), sizes_over_springs(machine)
+    parts = np.empty((program.rows, points))
+    program.run(fixed, given, parts, np.empty(points, dtype=np.int8))
     modes = [sizes.modes(parts, counts.loaded), sizes.modes(parts, counts.factor, massive=False)]
-    return [*np.ascontiguousarray(np.concatenate(modes, axis=1).reshape(count, -1).T)]
+    return [*np.ascontiguousarray(np.concatenate(modes, axis=1).reshape(points, -1).T)]
 
 
 def spring_parts_of(kind: Specimen, form: Form, closed: bool, at_rest: bool) -> TracedFormula:
-    """Trace what loops need to find modes over springs, see `SpringMotions.parts`.
+    """Trace the matrices of which modes over springs are found, see `SpringMotions.parts`.
 
     Args:
         kind, form, closed: as for `step_of`, of a machine whose legs close loops.
-        at_rest: whether the machine is at rest under its loads, of which the last columns are the coordinates; else it
-            has relaxed springs.
+        at_rest: whether the machine is at rest under its loads, whose coordinates are then the last columns; otherwise
+            its springs are relaxed.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)

@@ -1,8 +1,8 @@
 """Cables that hold a platform at n poses: their lines, their tensions, and the wrenches that they can hold.
 
-Straight cables pull along lines that the platform's pose alone says, whatever stretches. Those that weigh something,
-or leave the base over pulleys, pull along others, which depend on their tensions. A machine is one of cables if each
-of its legs is an actuated slide between two joints that only pulls (or pushes).
+Straight cables pull along lines that follow from the pose of the platform alone, whatever stretches. Cables that have
+weight, or leave the base over pulleys, pull along lines that depend on their tensions as well. A machine has cables if
+each of its legs is an actuated slide between two joints that only pulls (or only pushes).
 
 Source: theory (76) to (80).
 """
@@ -23,7 +23,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.loads import gravity_of, load_on_platform, platform_masses
-from kinetostat.machine.machine import Chains, Machine, Step
+from kinetostat.machine.machine import Chains, Machine
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
@@ -32,7 +32,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import SAME_DIRECTION
 
 MOST_CHANGES = 60
-"""Of the directions and tensions of cables that hang: each changes the next one by a small share."""
+"""Steps at most that find directions and tensions of hanging cables: each changes little of what the last has."""
 
 
 def cable_signs(machine: Machine) -> tuple[float, ...]:
@@ -58,18 +58,18 @@ class Cables:
     """The cables of a machine at n poses.
 
     Attributes:
-        near, far: where they leave the base, and where they hold the platform, base frame, m [n x cables x 3].
-        directions: those in which they pull the platform, base axes [n x cables x 3].
-        arms: from the tool point to their platform ends, over the length of the machine [n x cables x 3].
-        signs: 1 of each cable, -1 of a leg that only pushes [cables].
-        components: places of those of rx ry rz x y z that exist [d].
+        near, far: points where they leave the base, and where they hold the platform, base frame, m [n x cables x 3].
+        directions: directions in which they pull the platform, base axes [n x cables x 3].
+        arms: vectors from the tool point to their platform ends, over the length of the machine [n x cables x 3].
+        signs: 1 for each cable, -1 for a leg that only pushes [cables].
+        components: numbers of those of rx ry rz x y z that the machine has [d].
         load: all loads on the platform at the tool point, base axes, moments over the length of the machine, N [n x d].
         least, most: bounds of the tensions, N [n].
-        rule: how they are chosen.
+        rule: the rule by which tensions are chosen.
         box: half the sizes of the box of wrenches that must be held about the load [n x d].
-        stiffness: of each with its winch, straight, N/m [n x cables].
-        wound: length that lies on its pulley, m [n x cables].
-        shape: how they hang; None of straight ones.
+        stiffness: stiffness of each straight cable with its winch, N/m [n x cables].
+        wound: length of each cable that lies on its pulley, m [n x cables].
+        shape: how the cables hang; None for straight ones.
     """
 
     near: Array
@@ -141,20 +141,21 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
     wrench[:, :3], box[:, :3] = wrench[:, :3] / length, box[:, :3] / length
     least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
     parts = machine.family.components
+    springs = [step.element.springs[0] for leg in chains.legs for step in leg if step.element.springs]
     cables = Cables(
-        near,
-        far,
-        _units(near - far),
-        (far - of_scalars(tool.components(), count)[:, None]) / length[:, None],
-        np.array(signs),
-        parts,
-        wrench[:, parts],
-        np.where(np.isinf(least), 0.0, least),
-        most,
-        Rule(*stacked_columns([table.level, table.exponent], count).T),
-        box[:, parts],
-        of_scalars([step.element.springs[0].stiffness for leg in chains.legs for step in leg if _sprung(step)], count),
-        np.zeros(near.shape[:2]),
+        near=near,
+        far=far,
+        directions=_units(near - far),
+        arms=(far - of_scalars(tool.components(), count)[:, None]) / length[:, None],
+        signs=np.array(signs),
+        components=parts,
+        load=wrench[:, parts],
+        least=np.where(np.isinf(least), 0.0, least),
+        most=most,
+        rule=Rule(*stacked_columns([table.level, table.exponent], count).T),
+        box=box[:, parts],
+        stiffness=of_scalars([spring.stiffness for spring in springs], count),
+        wound=np.zeros(near.shape[:2]),
     )
     gravity = of_scalars(gravity_of(load).components(), count)
     weight = density * np.linalg.norm(gravity, axis=1)
@@ -169,26 +170,23 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
     return _hanging_cables(cables, np.where(weight[:, None] > 0.0, -_units(gravity), [0.0, 0.0, 1.0]), weight, radius)
 
 
-def _sprung(step: Step) -> bool:
-    return bool(step.element.springs)
-
-
 def _units(vectors: Array) -> Array:
     sizes = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
     return np.asarray(vectors / np.where(sizes > 0.0, sizes, 1.0))
 
 
 def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
-    """Cables as they hang with the tensions that they then have, over their pulleys.
+    """Cables as they hang, and run over their pulleys, with the tensions that they have in these places.
 
-    Directions and tensions depend on each other; with the directions of one step the next tensions are chosen, until
-    nothing changes. Cables sag little, so that each step changes hardly more than a hundredth of the one before.
+    Directions and tensions depend on each other: tensions are chosen with the directions of the last step, and new
+    directions follow from them, until nothing changes. Cables sag little, so that a step changes hardly more than a
+    hundredth of what the last step has changed.
 
     Args:
-        cables: straight, without pulleys.
-        up: against gravity [n x 3].
-        weight: of a metre of unstretched cable, N/m [n].
-        radius: of the pulleys, m [n].
+        cables: the cables, straight and without pulleys.
+        up: unit vectors against gravity [n x 3].
+        weight: weight of a metre of unstretched cable, N/m [n].
+        radius: radius of the pulleys, m [n].
     """
     hung, guides, heavy = cables, cables.near, weight > 0.0
     rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
@@ -221,12 +219,12 @@ def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple
 
     Args:
         machine: the machine with columns of n poses, and its loads.
-        names: what is wanted: "tension_1", ..., "least_tension", "greatest_tension", "tension_reserve", "capacity",
-            "wrench_closure".
+        names: names of the quantities: "tension_1", ..., "least_tension", "greatest_tension", "tension_reserve",
+            "capacity", "wrench_closure".
         count: number of poses, n.
 
     Returns:
-        By name their values, SI [n], NaN where there is none or legs are no cables, and `Status` codes [n]: NO_REST
+        Their values by name, SI [n], NaN where there is none or legs are no cables, and `Status` codes [n]: NO_REST
         where tensions are wanted and none within their bounds hold the load.
     """
     signs, status = cable_signs(machine), np.full(count, Status.OK, dtype=np.int8)

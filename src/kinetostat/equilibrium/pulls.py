@@ -1,7 +1,7 @@
-"""Rods at a place of the platform: the force with which each pulls, and how all of them resist its motion.
+"""The pull of each rod at a place of the platform, and how all rods resist the platform's motion.
 
-All is computed over scalars, so that the same lines serve numbers, arrays and traced programs. No state of rest is
-sought here.
+Everything is computed over scalars, so that the same lines serve numbers, arrays and traced programs. States of rest
+are found elsewhere.
 
 Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
@@ -60,7 +60,7 @@ def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
     span = at - near
     square, longer = span.dot(span), 0.0
     length = sqrt(square)
-    if platform is not None:  # the difference of both lengths, without the round-off of their size
+    if platform is not None:  # the difference of both lengths as a quotient, which does not cancel
         longer = moved.dot(span + rest) * (1.0 / (length + rest.norm()))
     stiffness = 1.0 / rod.softness
     tension, slack = (longer + rod.given) * stiffness, 0.0

@@ -368,7 +368,7 @@ def plan_of(machine: Machine, configuration: Configuration, joints: Joints | Non
             freedoms, rows = _freedoms_of(leg, len(mechanism.driven))
             legs.append(freedoms)
             constraints += rows
-        independent = _independent(constraints)
+        independent = _independent_numbers(constraints)
     return MotionPlan(tuple(legs), independent, overactuated=len(mechanism.driven) > 6 - len(independent))
 
 
@@ -392,7 +392,7 @@ def _freedoms_of(leg: ElasticLeg, drives: int) -> tuple[LegFreedoms, list[Row]]:
     return freedoms, _rates_and_constraints(columns, redundant)[1]
 
 
-def _independent(constraints: Sequence[Row]) -> tuple[int, ...]:
+def _independent_numbers(constraints: Sequence[Row]) -> tuple[int, ...]:
     """Numbers of the wrenches that do not depend on those before them."""
     independent: list[int] = []
     basis = np.zeros((0, 6))

@@ -25,7 +25,7 @@ from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.studies.evaluation import MATRICES, entry_name
-from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_loaded, resolve_quantities
+from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_without_derivatives, resolve_quantities
 
 
 class Buffers:
@@ -228,7 +228,7 @@ class CompiledFunction:
     def _slopes(self) -> Callable[[PointTable], Gradients]:
         """The function with its derivatives by each leaf; refused where they are not known."""
         names, leaves = list(self.distinct), tuple(self._leaves)
-        refuse_loaded(self.machine, names, leaves)
+        refuse_without_derivatives(self.machine, names, leaves)
         return lambda points: evaluate_gradient(self.machine, points, names, leaves, repeated=True)
 
     def _points(self, given: Sequence[Scalar]) -> tuple[PointTable, tuple[int, ...]]:

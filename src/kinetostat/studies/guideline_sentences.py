@@ -1,6 +1,6 @@
 """Guidelines in plain sentences, each with the share of the poses of a grid at which it holds.
 
-One kind of statement is one function, in the order of the paper's section 4.2. Nothing is derived here.
+Each kind of statement has a function, in the order of the paper's section 4.2. Nothing is derived here.
 """
 
 import math
@@ -16,14 +16,14 @@ from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines import Guidelines, Move, Roles
 from kinetostat.tolerances import NO_ROLE
 
-MATTERS = 0.01
-"""Share of an entry of C from which an element is named as one that decides it."""
-APART = 10.0
-"""Ratio of limits of rigidity from which directions get a limit each."""
+DECIDING_SHARE = 0.01
+"""Share of an entry of C from which on an element is named as one that decides it."""
+RATIO_OF_LIMITS = 10.0
+"""Ratio of limits of rigidity above which directions get a limit each."""
 LEAST_EFFECT = 0.005
 """Percent per percent below which a sentence says that a parameter has no effect."""
-MOST_MOVES = 8
-"""Parameters of which a sentence is made."""
+MOST_PARAMETERS = 8
+"""Parameters that have a sentence, those with the largest effect."""
 WITHOUT_NOUN = ("proximal", "distal", "upper", "lower", "inner", "outer")
 """Labels of links that need the word "links" in a sentence."""
 
@@ -44,31 +44,31 @@ class Statement:
 
 
 def statements(answer: Guidelines) -> list[Statement]:
-    """Write all guidelines, at the pose of the file and, where there is a grid, with how far they hold over it."""
+    """Write all guidelines at the pose of the file, with the share of the grid over which they hold if there is one."""
     if answer.here is None:
         return []
     return [
         *_sources_of_compliance(answer, answer.here),
-        *_weakest(answer, answer.here),
-        *_counts_as_rigid(answer, answer.here),
-        *_design(answer),
+        *_weakest_elements(answer, answer.here),
+        *_limits_of_rigidity(answer, answer.here),
+        *_effects_of_parameters(answer),
     ]
 
 
 def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """Statements on the elements from which the compliance of each direction comes; alike directions share one."""
-    single, over = _single(answer), answer.over_grid
+    single, over = _single_elements(answer), answer.over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
     for i in _compliant_directions(here):
-        mask = here.shares[single, i] >= MATTERS
-        holds = None if over is None else _share_of((over.shares[single, i] >= MATTERS) == mask)
+        mask = here.shares[single, i] >= DECIDING_SHARE
+        holds = None if over is None else _share_of((over.shares[single, i] >= DECIDING_SHARE) == mask)
         groups.setdefault((mask.tobytes(), holds), []).append(i)
     for (_, holds), directions in groups.items():
         shares = here.shares[single][:, directions, 0]
         deciding = [
             f"{_the(answer, k)} ({_percents(row.min(), row.max())})"
             for k, row in zip(single, shares, strict=True)
-            if row.max() >= MATTERS
+            if row.max() >= DECIDING_SHARE
         ]
         silent = [_the(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
         aside = f", not from {_list_of(silent, 'or')}" if silent else ""
@@ -80,9 +80,9 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
             yield Statement("compliance", f"The platform is {word} {_where(answer, directions)}.", None)
 
 
-def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+def _weakest_elements(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
-    single, over = _single(answer), answer.over_grid
+    single, over = _single_elements(answer), answer.over_grid
     if not single:
         return
     best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
@@ -97,8 +97,8 @@ def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
         yield Statement("weakest", _capital(text), holds)
 
 
-def _counts_as_rigid(answer: Guidelines, here: Roles) -> Iterator[Statement]:
-    """From which stiffness on an element may be taken as rigid; directions with similar limits share one."""
+def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+    """The stiffness from which on each element may be taken as rigid; directions with similar limits share one."""
     for k, element in enumerate(answer.elements):
         factors = {i: float(here.rigid[k, i, 0]) for i in _compliant_directions(here) if here.rigid[k, i, 0] > 0.0}
         if element.actuated or not factors:
@@ -123,7 +123,7 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
     """Directions by rising factor, in groups that lie more than a power of ten apart."""
     groups: list[list[int]] = []
     for i in sorted(factors, key=lambda i: factors[i]):
-        if groups and factors[i] <= APART * factors[groups[-1][-1]]:
+        if groups and factors[i] <= RATIO_OF_LIMITS * factors[groups[-1][-1]]:
             groups[-1].append(i)
         else:
             groups.append([i])
@@ -131,7 +131,7 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
 
 
 def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
-    """The limit that is enough at every pose of the grid, in those directions in which there is one."""
+    """A sentence on the limit that is enough at every pose of the grid, in those directions in which there is one."""
     over = answer.over_grid
     if over is None:
         return ""
@@ -143,9 +143,9 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     return f" At every pose of the grid {_where(answer, finite)} from {limit} on."
 
 
-def _design(answer: Guidelines) -> Iterator[Statement]:
+def _effects_of_parameters(answer: Guidelines) -> Iterator[Statement]:
     """Statements on the directions that each parameter stiffens or softens."""
-    for move in answer.parameters[:MOST_MOVES]:
+    for move in answer.parameters[:MOST_PARAMETERS]:
         directions = [(i, p) for i, p in enumerate(move.percents) if not math.isnan(p)]
         rising = sorted(((i, p) for i, p in directions if p > LEAST_EFFECT), key=lambda pair: -pair[1])
         falling = sorted(((i, p) for i, p in directions if p < -LEAST_EFFECT), key=lambda pair: pair[1])
@@ -171,8 +171,8 @@ def _same_signs(answer: Guidelines, move: Move) -> float | None:
     return min(shares, default=None)
 
 
-def _single(answer: Guidelines) -> list[int]:
-    """Places of the elements that are no sums of others."""
+def _single_elements(answer: Guidelines) -> list[int]:
+    """Numbers of the elements that are not made of others."""
     taken: set[int] = set()
     single = []
     for k, element in enumerate(answer.elements):
@@ -183,7 +183,7 @@ def _single(answer: Guidelines) -> list[int]:
 
 
 def _compliant_directions(roles: Roles) -> list[int]:
-    """Places of the directions that are neither rigid nor free; none where the machine has no elements."""
+    """Numbers of the directions that are neither rigid nor free; none where the machine has no elements."""
     return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
 
 
@@ -211,7 +211,7 @@ def _stiffness(answer: Guidelines, element: Element, factor: float) -> str:
 
 
 def _against_actuators(answer: Guidelines, element: Element, factor: float) -> str:
-    """The limit as a ratio to the stiffness of an actuator, with the unit of that ratio."""
+    """A sentence on the limit as a ratio to the stiffness of an actuator, with the unit of that ratio."""
     actuator = answer.actuator
     if actuator is None or actuator.stiffness is None or element.stiffness is None:
         return ""
@@ -222,12 +222,12 @@ def _against_actuators(answer: Guidelines, element: Element, factor: float) -> s
 
 
 def limit_of(stiffness: float, factor: float) -> float:
-    """The stiffness from which on an element counts as rigid, SI; of one that is rigid now, factors are per 1 SI."""
+    """The stiffness from which on an element counts as rigid, SI; of one that is rigid now, the factor itself."""
     return factor if stiffness == math.inf else stiffness * factor
 
 
 def _many(element: Element) -> bool:
-    """Whether an element is several parts, and a sentence about it in the plural."""
+    """Whether an element consists of several parts, so that a sentence about it is in the plural."""
     return len(element.parts) > 1
 
 

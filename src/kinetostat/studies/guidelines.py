@@ -1,7 +1,7 @@
 """Design guidelines of a machine: what each direction depends on, what counts as rigid, what to change.
 
-They are derived as section 4.2 of the paper does it for its machine, here for any machine, at its pose and over a grid
-of poses: from the roles of the elastic elements in each direction, and from what the parameters of the design do.
+They are derived for any machine as section 4.2 of the paper derives them for its own, at its pose and over a grid of
+poses: from the roles of the elastic elements in each direction, and from the effects of the parameters of the design.
 Sentences and plain data are in `guideline_sentences`; what is printed or drawn is in `views`.
 """
 
@@ -48,13 +48,13 @@ from kinetostat.studies.sensitivity import (
 from kinetostat.tolerances import NO_ROLE
 
 MOST_GUIDELINE_POSES = 10_000
-"""Poses of a grid: whole responses of all of them are kept in memory."""
+"""Poses of a grid at most, because whole responses of all of them are kept in memory."""
 EXCESS = 0.01
 """An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid."""
-FELT = 1e-3
+LEAST_INFLUENCE = 1e-3
 """Percent per percent below which a parameter counts as without effect on a direction."""
-AXES = "as axes of joints, whose errors are a matter of tolerances: `kinetostat sensitivity` shows them"
-"""Why directions are no parameters of the design."""
+REASON_WITHOUT_AXES = "as axes of joints, whose errors are a matter of tolerances: `kinetostat sensitivity` shows them"
+"""The reason why directions are no parameters of the design."""
 NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
 """Tables of a machine file whose values are not part of the design."""
 
@@ -64,11 +64,10 @@ class Roles(ImmutableAnswer):
     """The effect of each element on each direction, pose by pose; NaN if the direction is rigid or free or has no pose.
 
     Attributes:
-        shares: of each entry of the diagonal of C, 0 to 1 [elements x components x poses].
-        rigid: by which factor the stiffness of an element may be multiplied until it only just counts as rigid: from
-            there on it does; infinite where nothing else is compliant, 0 where no compliance of it
-            matters [same shape].
-        gains: by which share an entry of C falls once the element is twice as stiff [same shape].
+        shares: share of the element in each entry of the diagonal of C, 0 to 1 [elements x components x poses].
+        rigid: the factor on the element's stiffness from which on it counts as rigid; infinite where nothing else is
+            compliant, 0 where its compliance never matters [same shape].
+        gains: the share by which an entry of C falls once the element is twice as stiff [same shape].
     """
 
     shares: Array
@@ -81,11 +80,11 @@ class Move(ImmutableAnswer):
     """The effect of a parameter of the design, or of all entries of a stiffness together, on the stiffness 1 / C_ii.
 
     Attributes:
-        path: of the parameter.
-        percents: percent by which each direction gets stiffer per percent more of the parameter, of an angle per 0.01
-            rad; None where rigid or free.
-        stiffer, softer: share of the poses of the grid at which it does so by more than round-off; empty
-            without a grid.
+        path: path of the parameter.
+        percents: percent by which each direction gets stiffer per percent more of the parameter, or per 0.01 rad more
+            of an angle; NaN where rigid or free.
+        stiffer, softer: share of the poses of the grid at which each direction gets stiffer, and softer, by more than
+            round-off; empty without a grid.
         turning: whether the parameter is an angle.
     """
 
@@ -98,7 +97,7 @@ class Move(ImmutableAnswer):
     @property
     def matters(self) -> bool:
         """Whether it changes any direction, here or anywhere on the grid."""
-        return self.greatest > FELT or any(self.stiffer) or any(self.softer)
+        return self.greatest > LEAST_INFLUENCE or any(self.stiffer) or any(self.softer)
 
     @property
     def greatest(self) -> float:
@@ -119,21 +118,21 @@ class Guidelines(ImmutableAnswer):
     """Design guidelines.
 
     Attributes:
-        state: of the machine at its pose.
-        status: of its pose; all that follows is empty unless it is OK.
+        state: state of the machine at its pose.
+        status: status of the pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         components: names of the directions.
         compliance_diagonal: the diagonal of C.
         elements: the elastic elements, actuators first.
         here: their roles at the pose of the file.
-        stiffness_equations: per element, its coefficients in the diagonal of K; None where K is not such a sum.
-        meaning: of the percentages in `parameters`, one sentence.
-        parameters: what the parameters of the design do, those with the largest effect first.
+        stiffness_equations: coefficients of each element in the diagonal of K; None where K is not a sum over elements.
+        meaning: a sentence on the meaning of the percentages in `parameters`.
+        parameters: the effects of the parameters of the design, the largest first.
         without_influence: paths of parameters that change no direction, here or anywhere on the grid.
-        left_out: paths of parameters without a derivative, and why.
-        ranges: of the grid, as written.
-        poses: how many poses of the grid have an answer, and how many there are.
-        everywhere: roles at those that have one; None without a grid.
+        left_out: paths of parameters without a derivative, and the reason.
+        ranges: ranges of the grid, as written.
+        poses: number of poses of the grid with an answer, and of all its poses.
+        everywhere: roles at the poses with an answer; None without a grid.
         loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
@@ -180,8 +179,8 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     """Derive what the stiffness of a machine depends on, at its pose and over a grid.
 
     Args:
-        machine: with its pose, or its state, as `state_of` returns it.
-        ranges: of the grid, "FIELD=from:to:count", coordinates of the pose; none for the file's pose alone.
+        machine: a machine with its pose, or its state, as `state_of` returns it.
+        ranges: ranges of the grid, "FIELD=from:to:count", coordinates of the pose; none for the file's pose alone.
         progress: receives how far the work is.
 
     Raises:
@@ -199,30 +198,30 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     kept, response = list(machine.family.components), state.free
     single = elements(response.configuration)
     every = with_links_together(single)
-    whole = without_rounding(response.compliance.diagonal(), response)[kept, 0]
-    moves = moves_at(sensitivities, whole > 0.0)
+    diagonal = without_rounding(response.compliance.diagonal(), response)[kept, 0]
+    moves = moves_at(sensitivities, diagonal > 0.0)
     everywhere, poses = None, (0, 0)
     if grid is not None:
         everywhere, poses = roles_over(machine, grid, every, kept, progress)
         moves = with_signs(state, grid, moves)
     without_derivative = [pair for pair in sensitivities.without_derivative if designed(machine, pair[0])]
     return Guidelines(
-        state,
-        sensitivities.status,
-        sensitivities.message,
-        names,
-        whole,
-        tuple(every),
-        roles_at(response, every, kept),
-        equations_of_k(response, single, kept),
-        next(notes(sensitivities)),
-        tuple(move for move in moves if move.matters),
-        tuple(move.path for move in moves if not move.matters),
-        (*without_derivative, *axes_left_out(sensitivities)),
-        tuple(ranges),
-        poses,
-        everywhere,
-        sensitivities.loads_left_out,
+        state=state,
+        status=sensitivities.status,
+        message=sensitivities.message,
+        components=names,
+        compliance_diagonal=diagonal,
+        elements=tuple(every),
+        here=roles_at(response, every, kept),
+        stiffness_equations=equations_of_k(response, single, kept),
+        meaning=next(notes(sensitivities)),
+        parameters=tuple(move for move in moves if move.matters),
+        without_influence=tuple(move.path for move in moves if not move.matters),
+        left_out=(*without_derivative, *axes_left_out(sensitivities)),
+        ranges=tuple(ranges),
+        poses=poses,
+        everywhere=everywhere,
+        loads_left_out=sensitivities.loads_left_out,
     )
 
 
@@ -244,9 +243,9 @@ def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int
     """Compute the roles of elements.
 
     Args:
-        response: at one pose, or at many as arrays.
+        response: response at one pose, or at many as arrays.
         elements: the elements.
-        kept: which of rx ry rz x y z = 0 ... 5 the machine has.
+        kept: numbers of those of rx ry rz x y z, 0 to 5, that the machine has.
     """
     with np.errstate(all="ignore"):
         whole = without_rounding(response.compliance.diagonal(), response)[kept]
@@ -255,11 +254,11 @@ def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int
         shares, rigid, gains = [], [], []
         for element in elements:
             part = without_rounding(element_share(response, element), response)[kept]
-            ever = part / np.where(np.isfinite(whole), whole, 1.0) > NO_ROLE
+            has_role = part / np.where(np.isfinite(whole), whole, 1.0) > NO_ROLE
             factor = 1.0 / rigid_from(response, element, EXCESS)[kept]
-            rigid.append(np.where(bounded, np.where(ever, factor, 0.0), math.nan))
-            here = 0.0 if element.stiffness == math.inf else part / whole
-            shares.append(np.where(here > NO_ROLE, here, whole * 0.0))
+            rigid.append(np.where(bounded, np.where(has_role, factor, 0.0), math.nan))
+            share = 0.0 if element.stiffness == math.inf else part / whole
+            shares.append(np.where(share > NO_ROLE, share, whole * 0.0))
             gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / whole)
     none = np.zeros((0, *np.shape(whole)))
     return Roles(*(np.stack(np.broadcast_arrays(*rows)) if rows else none for rows in (shares, rigid, gains)))
@@ -268,13 +267,16 @@ def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int
 def roles_over(
     machine: Machine, grid: Points, elements: Sequence[Element], kept: Sequence[int], progress: Progress
 ) -> tuple[Roles, tuple[int, int]]:
-    """Compute roles at the poses of a grid that have an answer; also how many these are, and how many there are.
+    """Compute roles at the poses of a grid that have an answer.
 
     Args:
-        machine: gives what does not vary.
-        grid: poses.
+        machine: the machine, with the values that do not vary.
+        grid: the poses.
         elements, kept: as for `roles_at`.
         progress: receives how far the work is.
+
+    Returns:
+        The roles, and the number of poses with an answer and of all poses.
     """
     response = responses(machine, grid)
     progress(1, 2)
@@ -290,9 +292,9 @@ def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
     """Stiffness of each direction while an element changes, as a share of the one with the element rigid.
 
     Args:
-        state: of the machine at its pose.
-        element: whose stiffness is multiplied.
-        factors: on its stiffness; of an element that is rigid, its stiffness itself (SI) [points].
+        state: state of the machine at its pose.
+        element: the element whose stiffness is multiplied.
+        factors: factors on its stiffness; of an element that is rigid, its stiffness itself (SI) [points].
 
     Returns:
         1 / C_ii over its limit [components x points]; 0 where nothing else is compliant.
@@ -316,11 +318,11 @@ def equations_of_k(response: Response, elements: Sequence[Element], kept: Sequen
 
 
 def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
-    """List what the parameters of the design do, the largest effect first; entries of one stiffness move together.
+    """List the effects of the parameters of the design, the largest first; entries of one stiffness change together.
 
     Args:
-        sensitivities: of the diagonal of C.
-        compliant: which directions are neither rigid nor free.
+        sensitivities: sensitivities of the diagonal of C.
+        compliant: whether each direction is neither rigid nor free.
     """
     machine = sensitivities.machine
     entries: dict[str, list[Array]] = {}
@@ -329,9 +331,10 @@ def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
             row = np.where(compliant, -parameter.percents, math.nan)
             entries.setdefault(_path_of_element(machine, parameter.path), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
-    quiet = [_path_of_element(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
     zero = np.where(compliant, 0.0, math.nan)
-    rows |= {path: zero for path in quiet if path not in rows}
+    without_influence = [path for path in sensitivities.without_influence if designed(machine, path)]
+    for path in without_influence:
+        rows.setdefault(_path_of_element(machine, path), zero)
     kinds = _kinds(machine)
     moves = [Move(path, row, turning=kinds[path] == "angle") for path, row in rows.items()]
     return strongest_first(moves)
@@ -343,9 +346,9 @@ def designed(machine: Machine, path: str) -> bool:
 
 
 def axes_left_out(sensitivities: Sensitivity) -> list[tuple[str, str]]:
-    """The axes of joints that have an influence, and why they are left out."""
+    """The axes of joints that have an influence, with the reason why they are left out."""
     axes = (p.path.rpartition(".")[0] for p in sensitivities.parameters if p.kind == "direction")
-    return [(path, AXES) for path in dict.fromkeys(axes)]
+    return [(path, REASON_WITHOUT_AXES) for path in dict.fromkeys(axes)]
 
 
 def _kinds(machine: Machine) -> dict[str, str]:
@@ -379,7 +382,7 @@ def with_signs(state: MachineState, grid: Points, moves: Sequence[Move]) -> list
         sizes = np.array([measure_of(kinds[leaf], here[leaf], length)[0] for leaf in leaves[move.path]])
         percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
         change = -np.nansum(percents, axis=1)
-        sign = np.where(np.abs(change) > FELT, np.sign(change), 0.0)[:, good]
+        sign = np.where(np.abs(change) > LEAST_INFLUENCE, np.sign(change), 0.0)[:, good]
         stiffer, softer = (tuple((sign == wanted).mean(axis=1).tolist()) for wanted in (1.0, -1.0))
         signed.append(replace(move, stiffer=stiffer, softer=softer))
     return signed

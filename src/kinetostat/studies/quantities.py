@@ -1,6 +1,6 @@
-"""Quantities of a machine: names that people write, and those that have no value for its parts or its file.
+"""Names of quantities as people write them, and refusals of quantities that have no value for a machine.
 
-All that is decided here follows from the file and from where the legs are, so that it costs no stiffness.
+Everything here follows from the machine's file and from the places of its legs: no stiffness is computed.
 """
 
 import difflib
@@ -9,19 +9,18 @@ from functools import cache
 
 import numpy as np
 
-from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinetostatics.drive_limits import drive_limits
+from kinetostat.kinetostatics.drive_limits import drive_limits, driven_springs
 from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
 from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
 from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
-from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import Parameter, values, with_values
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
@@ -40,8 +39,8 @@ def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterabl
     `MachineState.left_out` does not speak.
 
     Args:
-        state: of the machine with its loads.
-        names: of quantities; none for an answer about the free machine.
+        state: state of the machine with its loads.
+        names: names of quantities; none for an answer about the free machine.
         varied: parameters that vary, with their values, SI: each may bring in a load that the file does not have.
     """
     if names and all(QUANTITIES[name].loaded for name in names):
@@ -50,7 +49,7 @@ def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterabl
     brought = {leaf: float(row[np.abs(row).argmax()]) for parameter, row in bringing for leaf in parameter.leaves}
     try:
         return (state_of(with_values(state.machine, brought)) if brought else state).left_out
-    except InputError:  # links are warmer, but nothing says how they grow: nobody can leave that out
+    except InputError:  # links get warmer, but no expansion is given: an effect that is unknown cannot be left out
         return state.left_out
 
 
@@ -60,8 +59,8 @@ def resolve_quantities(
     """Names of quantities, with groups replaced by their members and repetitions dropped.
 
     Args:
-        names: of quantities or groups.
-        components: that the machine has: rx ry rz x y z, or rz x y of a planar one.
+        names: names of quantities or groups.
+        components: components that the machine has: rx ry rz x y z, or rz x y of a planar one.
         cables: number of cables that it has, so that "tension" stands for so many.
 
     Raises:
@@ -86,24 +85,27 @@ def _groups(components: tuple[str, ...], cables: int) -> dict[str, list[str]]:
 
 
 def cable_count(machine: Machine) -> int:
-    """Count the cables of a machine; all that there can be if its legs are no cables, which is refused elsewhere."""
+    """Count the cables of a machine; the most that there can be if legs are no cables, which is refused elsewhere."""
     return len(cable_signs(machine)) or MOST_CABLES
 
 
 def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
-    """The sentence about an unknown quantity: which was probably meant, or what there is."""
+    """The sentence about an unknown quantity: the name that was probably meant, or all that there are."""
     members = [member for group in groups.values() for member in group]
     others = [other for other, quantity in QUANTITIES.items() if not quantity.components and other not in members]
     matrix, _, parts = name.partition("_")
-    turned = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
-    there = turned != name and turned in QUANTITIES and _exists(turned, components)
-    near = [turned] if there else difflib.get_close_matches(name, [*groups, *members, *others], 1)
+    swapped = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
+    if swapped != name and swapped in QUANTITIES and _exists(swapped, components):
+        near = [swapped]
+    else:
+        near = difflib.get_close_matches(name, [*groups, *members, *others], 1)
+    if near:
+        return f'"{name}" is not a quantity; did you mean {near[0]}?'
     first, last = components[0], components[-1]
-    every = (
-        f"choose a group ({', '.join(groups)}), one of its members such as compliance_{first} or frequency_1, an entry "
-        f"such as compliance_{first}_{last}, or one of {', '.join(others)}."
+    return (
+        f'"{name}" is not a quantity; choose a group ({", ".join(groups)}), one of its members such as '
+        f"compliance_{first} or frequency_1, an entry such as compliance_{first}_{last}, or one of {', '.join(others)}."
     )
-    return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
 
 def _exists(name: str, components: Sequence[str]) -> bool:
@@ -117,53 +119,51 @@ def usual_quantities(machine: Machine, usual: str) -> list[str]:
 
 
 def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> str | None:
-    """The first quantity about loaded machines or cuts whose derivatives are not known; None if there is none.
+    """The first quantity of cables, of cuts or of the loaded machine that has no derivatives; None if all have.
 
     Args:
-        machine: with its loads.
-        names: of quantities.
+        machine: the machine with its loads.
+        names: names of quantities.
         varied: leaf paths of parameters that vary.
     """
     known = [name for name in names if name in QUANTITIES]
-    unknown = [name for name in known if QUANTITIES[name].cut or QUANTITIES[name].cables]
-    if unknown:
-        return unknown[0]
+    for name in known:
+        if QUANTITIES[name].cut or QUANTITIES[name].cables:
+            return name
     loaded = [name for name in known if rest_numbers(machine, [name], limited=False)]
     machine_cut = cut_machine(machine, varied) if loaded else None
     return None if machine_cut is not None and not machine_cut.legs else next(iter(loaded), None)
 
 
-def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> None:
-    """Refuse derivatives of the loaded machine where they are not known; arguments as for `without_derivatives`.
+def refuse_without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> None:
+    """Refuse derivatives of quantities that have none; arguments as for `without_derivatives`.
 
     Raises:
-        InputError: names the first such quantity.
+        InputError: names the first such quantity, and says why it has none.
     """
     name = without_derivatives(machine, names, varied)
-    if name is not None and QUANTITIES[name].cables:
-        raise InputError(
-            f'"{name}" has no derivatives: which tensions are at their bounds changes from pose to pose; look at it in '
-            "a sweep or map, or search without derivatives, optimizer.method = genetic."
-        )
-    if name is not None and QUANTITIES[name].cut:
-        raise InputError(
-            f'"{name}" has no derivatives: its frequency is looked for at each pose; look at it in a sweep or map, or '
-            "search without derivatives, optimizer.method = genetic."
-        )
-    if name is not None:
-        raise InputError(
+    if name is None:
+        return
+    if QUANTITIES[name].cables:
+        reason = f'"{name}" has no derivatives: which tensions are at their bounds changes from pose to pose'
+    elif QUANTITIES[name].cut:
+        reason = f'"{name}" has no derivatives: its frequency is looked for at each pose'
+    else:
+        reason = (
             f'"{name}" of {machine.name} has no derivatives: those of a loaded machine are known where at most a '
-            "single leg is more than a rod between two joints and no tensions are to be chosen; look at it in a sweep "
-            "or a map, or search without derivatives, optimizer.method = genetic."
+            "single leg is more than a rod between two joints and no tensions are to be chosen"
         )
+    raise InputError(
+        f"{reason}; look at it in a sweep or map, or search without derivatives, optimizer.method = genetic."
+    )
 
 
 def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:
     """Refuse quantities that have no value for a machine, whatever its pose.
 
     Args:
-        state: of the machine as its file has it.
-        names: of quantities.
+        state: state of the machine as its file has it.
+        names: names of quantities.
         varied: parameters that take other values than the file's.
 
     Raises:
@@ -180,10 +180,10 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
     if not wanted:
         return
     placed = state.configuration
-    driven = [(spring, 0.0) for spring in springs(placed) if spring.actuated and not is_zero(spring.stiffness)]
+    driven = [(spring, 0.0) for spring in driven_springs(placed)]
     parts = Parts(placed.legs, placed.platform.rotation.z, machine.family.planar, actuators=driven)
     for name in wanted:
-        if not any(True for _ in LIMITS[name].measure(parts)):
+        if next(iter(LIMITS[name].measure(parts)), None) is None:
             raise InputError(
                 f'"{name}" has no meaning here: {machine.name} lacks {QUANTITIES[name].needs}; leave it out.'
             )
@@ -216,33 +216,31 @@ def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence
 
 
 LIMITS_OF_DRIVES = {
-    "load": ("limits.actuator_force", '"2 kN"', "limits.actuator_moment", '"20 N*m"'),
-    "speed": ("limits.actuator_speed", '"0.5 m/s"', "limits.actuator_turning_speed", '"3 rad/s"'),
+    "load": {True: ("limits.actuator_force", '"2 kN"'), False: ("limits.actuator_moment", '"20 N*m"')},
+    "speed": {True: ("limits.actuator_speed", '"0.5 m/s"'), False: ("limits.actuator_turning_speed", '"3 rad/s"')},
 }
-"""By what is limited of a drive: the field for linear and for rotary ones, each with an example."""
+"""By what is limited of a drive, and by whether the drive is linear: the field that limits it, with an example."""
 
 
 def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: Sequence[Parameter]) -> None:
     """Refuse quantities about what drives can do where the file of a machine limits none of them."""
-    driven = [name for name in names if QUANTITIES[name].driven]
+    driven, chosen = [name for name in names if QUANTITIES[name].driven], [parameter.path for parameter in varied]
     given = values(state.machine) if driven else {}
     for name in driven:
-        what = QUANTITIES[name].driven
-        if what == "reversal":
+        limited = QUANTITIES[name].driven
+        if limited == "reversal":
             _refuse_without_lost_motion(state, name, varied)
             continue
         drives = drive_limits(state.machine, state.configuration)
-        what = "load" if what in CARRYING else what
-        linear, first, rotary, second = LIMITS_OF_DRIVES[what]
-        fields = [(linear, first)] * any(d.spring.joint.point is None for d in drives)
-        fields += [(rotary, second)] * any(d.spring.joint.point is not None for d in drives)
-        pulled = what == "load" and any(np.isfinite(d.lower) for d in drives)
-        chosen = [parameter.path for parameter in varied]
-        if not pulled and all(field not in chosen and np.isinf(given[field]) for field, _ in fields):
-            wanted = " and ".join(f"{field} = {example}" for field, example in fields) or "an actuator"
+        limited = "load" if limited in CARRYING else limited
+        linear = sorted({drive.spring.joint.point is None for drive in drives}, reverse=True)
+        fields = dict(LIMITS_OF_DRIVES[limited][is_linear] for is_linear in linear)
+        bounded = limited == "load" and any(np.isfinite(drive.lower) for drive in drives)
+        if not bounded and all(field not in chosen and np.isinf(given[field]) for field in fields):
+            examples = " and ".join(f"{field} = {example}" for field, example in fields.items()) or "an actuator"
             raise InputError(
-                f'"{name}" is not known: nothing limits the {what} of the drives of {state.machine.name}; write '
-                f"{wanted}, say."
+                f'"{name}" is not known: nothing limits the {limited} of the drives of {state.machine.name}; write '
+                f"{examples}, say."
             )
 
 
@@ -250,18 +248,18 @@ def refuse_unknown_mass(machine: Machine, what: str, configuration: Configuratio
     """Refuse what needs masses where the machine has none.
 
     Args:
-        machine: as its file has it.
-        what: needs them, as people wrote it.
-        configuration: of the machine at its pose.
+        machine: the machine as its file has it.
+        what: the name of what needs them, as people wrote it.
+        configuration: the machine placed at its pose.
 
     Raises:
         InputError: says what to give.
     """
     masses = moving_masses(machine, configuration)
     tool = machine.tables["tool"]
-    turning = [tool.payload, *values_of_drives(machine, "drives.rotor_inertia"), *tool.inertia, *tool.payload_inertia]
-    vibrates = what != "mass" and any(turning)
-    if all(part.mass is None for part in masses) and not vibrates:
+    others = [tool.payload, *values_of_drives(machine, "drives.rotor_inertia"), *tool.inertia, *tool.payload_inertia]
+    has_inertia = what != "mass" and any(others)
+    if all(part.mass is None for part in masses) and not has_inertia:
         raise InputError(
             f'"{what}" is not known: the file of {machine.name} does not say what it weighs; give links a '
             'cross-section with a density or material, or its table [tool] mass = "12 kg".'
@@ -288,16 +286,16 @@ def _refuse_without_cables(machine: Machine, names: Sequence[str]) -> None:
 
 def _refuse_unknown_cut(machine: Machine, names: Sequence[str], varied: Sequence[str]) -> None:
     """Refuse quantities of a cut of which the file says too little."""
-    across = [name for name in names if QUANTITIES[name].cut]
-    if not across:
+    wanted = [name for name in names if QUANTITIES[name].cut]
+    if not wanted:
         return
     table = machine.tables["cutting"]
     if not any(table.direction) and not any(path.startswith("cutting.direction") for path in varied):
         raise InputError(
-            f'"{across[0]}" is not known: nothing says the direction across the cut; write direction = [1, 0, 0], say, '
+            f'"{wanted[0]}" is not known: nothing says the direction across the cut; write direction = [1, 0, 0], say, '
             f"in the table [cutting] of {machine.name}."
         )
-    if "stable_width" in across and not table.pressure and "cutting.pressure" not in varied:
+    if "stable_width" in wanted and not table.pressure and "cutting.pressure" not in varied:
         raise InputError(
             '"stable_width" is not known: nothing says the cutting force per area of the chip; write pressure = '
             f'"2000 N/mm**2", say, in the table [cutting] of {machine.name}.'

@@ -136,17 +136,17 @@ def motor_requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
 
 def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
     """Judge whether a motor can do a motion: it uses at most its limits, a share of 1."""
-    known = motors.read_catalogue()
+    catalogue = motors.read_catalogue()
     if requirement.catalogue:
         motions.check_lines("catalogue", requirement.catalogue)
-        known = motors.catalogue_of(parse(requirement.catalogue, "catalogue"), "catalogue")
-    motor = choice(requirement.fits, known.motors, "fits")
+        catalogue = motors.catalogue_of(parse(requirement.catalogue, "catalogue"), "catalogue")
+    motor = choice(requirement.fits, catalogue.motors, "fits")
     motion = motions.motion_of(requirement, machine)
-    geared, beside = motors.with_transmission(machine, known, requirement.gear, requirement.screw)
-    loads = motors.loads_with(geared, known.motors[motor], beside, motion)
+    geared, inertia = motors.with_transmission(machine, catalogue, requirement.gear, requirement.screw)
+    loads = motors.loads_with(geared, catalogue.motors[motor], inertia, motion)
     worst, place, words, pose = None, "", loads.message, dict[str, float]()
     if loads.curves is not None:
-        fit = motors.fit_of(known, motor, loads)
+        fit = motors.fit_of(catalogue, motor, loads)
         worst, place = fit.greatest_share, fit.drive
         row = [drive.name for drive in loads.drives].index(fit.drive)
         speeds = fit.hardest[0] == "speed"

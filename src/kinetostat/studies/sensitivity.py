@@ -34,7 +34,13 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
-from kinetostat.studies.quantities import cable_count, refuse_absent, refuse_loaded, resolve_quantities, uncounted_loads
+from kinetostat.studies.quantities import (
+    cable_count,
+    refuse_absent,
+    refuse_without_derivatives,
+    resolve_quantities,
+    uncounted_loads,
+)
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
 
@@ -199,7 +205,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     names = tuple(resolve_quantities(quantities, machine.family.component_names, cable_count(machine)))
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
-    refuse_loaded(machine, names)
+    refuse_without_derivatives(machine, names)
     refuse_absent(state, names)
     uncounted = uncounted_loads(state, names)
     response = state.response

@@ -24,13 +24,15 @@ from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
 from kinetostat.views.levels import usual_range
 
-LENGTHS = ("m", "mm")
-"""Units of axes that have one scale if both have the same."""
-LOADED = "loaded_"
-"""Beginnings of the names of quantities of the machine under its loads."""
-MARGIN, WORTH = 2, 0.8
-"""Points of margin about what can be reached, and the share of a range above which it is left as it is."""
-RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for where the machine can be'
+UNITS_OF_LENGTH = ("m", "mm")
+"""Units of axes that are drawn to one scale if both axes have the same."""
+LOADED_PREFIX = "loaded_"
+"""Beginning of the names of quantities of the machine under its loads."""
+MARGIN_POINTS = 2
+"""Points of the map that are kept about the part of a range that can be reached."""
+MOSTLY_REACHED = 0.8
+"""Share of a range from which on it is left as it is."""
+RANGE_HINT = 'range of the {} axis, such as "-5 to 8 cm"; empty for where the machine can be'
 
 
 class MapPanel:
@@ -57,15 +59,15 @@ class MapPanel:
         self.view.on("pick", self._pick, throttle=THROTTLE)
         self.view.on("settle", self._settle)
         self.time = ui.label("").classes("server-time").mark("map-time")
-        self._asking = False
+        self._choices_count = False  # whether a change of a choice is the user's, and asks for a new map
         self._chosen_ranges: dict[str, tuple[float, float]] = {}
         self._reached: dict[str, tuple[float, float]] = {}
-        self._fits = True
+        self._is_first_map = True  # of these axes: its ranges may still be narrowed
         self.fill()
 
     def fill(self) -> None:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
-        self._asking = False
+        self._choices_count = False
         self._chosen_ranges.clear()
         self._fit_anew()
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
@@ -73,19 +75,19 @@ class MapPanel:
         self._offer_quantities()
         self.across.set_options(fields, value=first)
         self.up.set_options(fields, value=second)
-        self._asking = True
+        self._choices_count = True
 
     def _offer_quantities(self) -> None:
-        """Offer what the machine has now: it may have got a mass, or be shown under its loads."""
-        quantities, asking = map_quantities(self._session.machine), self._asking
+        """Offer the quantities that the machine has now: it may have got a mass, or be shown under its loads."""
+        quantities, counted = map_quantities(self._session.machine), self._choices_count
         if self.quantity.options == quantities:
             return
         present = str(self.quantity.value)
-        other = present.removeprefix(LOADED) if present.startswith(LOADED) else f"{LOADED}{present}"
+        other = present.removeprefix(LOADED_PREFIX) if present.startswith(LOADED_PREFIX) else LOADED_PREFIX + present
         kept = next((name for name in (present, other) if name in quantities), "compliance_x")
-        self._asking = False
+        self._choices_count = False
         self.quantity.set_options(quantities, value=kept)
-        self._asking = asking
+        self._choices_count = counted
 
     def _mappable(self) -> list[Control]:
         """List the controls over whose range a map can be drawn, the pose first."""
@@ -122,18 +124,18 @@ class MapPanel:
     def _fit_anew(self) -> None:
         """Let the next map open on what can be reached: its ranges are narrowed if it is mostly empty."""
         self._reached.clear()
-        self._fits = True
+        self._is_first_map = True
 
     def _narrow(self, request: MapRequest, values: Array) -> bool:
-        """Narrow the ranges of axes to where a first map has values, with a margin; whether that is worth a new one."""
+        """Narrow the ranges of axes to where a first map has values, with a margin; return whether any has changed."""
         points = math.isqrt(values.size)
         known = np.isfinite(values).reshape(points, points)
         if not known.any():
             return False
         for ends, inside in ((request.across, known.any(axis=1)), (request.up, known.any(axis=0))):
             places = np.flatnonzero(inside)
-            first, last = max(places[0] - MARGIN, 0), min(places[-1] + MARGIN, points - 1)
-            if last - first <= WORTH * (points - 1) and ends.path not in self._chosen_ranges:
+            first, last = max(places[0] - MARGIN_POINTS, 0), min(places[-1] + MARGIN_POINTS, points - 1)
+            if last - first <= MOSTLY_REACHED * (points - 1) and ends.path not in self._chosen_ranges:
                 step = (ends.high - ends.low) / (points - 1)
                 self._reached[ends.path] = (ends.low + first * step, ends.low + last * step)
         return bool(self._reached)
@@ -147,11 +149,11 @@ class MapPanel:
         quantity = str(self.quantity.value)
         refused = isinstance(maps, str) and request.quantity == quantity
         if (request.across, request.up) != self._ends() or not (refused or quantity in maps):
-            return  # the designer has chosen other axes meanwhile, and that map is on its way
+            return  # other axes have been chosen meanwhile, and their map is being computed
         (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
         values = np.full(4, np.nan) if isinstance(maps, str) else maps[quantity]
-        if self._fits and not isinstance(maps, str):
-            self._fits = False
+        if self._is_first_map and not isinstance(maps, str):
+            self._is_first_map = False
             if self._narrow(request, values):
                 self.refresh(request.since)
                 return
@@ -167,7 +169,7 @@ class MapPanel:
                 "values": finite(values * scale.factor),
                 "ends": (ends * scale.factor).tolist(),
                 "unit": scale.unit,
-                "alike": x == y and x.unit in LENGTHS,
+                "alike": x == y and x.unit in UNITS_OF_LENGTH,
                 "x": {**_axis(request.across, x), "label": x.label(full_label(across.parameter))},
                 "y": {**_axis(request.up, y), "label": y.label(full_label(up.parameter))},
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
@@ -177,7 +179,7 @@ class MapPanel:
         self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {took:.0f} ms")
 
     def _range_field(self, side: str) -> ui.input:
-        field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE.format(side))
+        field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE_HINT.format(side))
         field.on("keydown.enter", self._take_ranges).on("blur", self._take_ranges)
         return field.mark(f"map-range-{side}")
 
@@ -223,11 +225,11 @@ class MapPanel:
         return low, high
 
     def _choose(self) -> None:
-        if self._asking:
+        if self._choices_count:
             self.refresh()
 
     def _choose_axis(self) -> None:
-        if self._asking:
+        if self._choices_count:
             self._fit_anew()
             self.refresh()
 

@@ -1,11 +1,11 @@
 """An analysis for people: the answer first, in a few lines; then its reasons and matrices, as tables with units.
 
-Nothing is computed but 1/C, lengths of vectors, rounding, percent and sums of shares. Every view that begins with the
-answer takes its lines from here.
+Nothing is computed but 1/C, lengths of vectors, percentages and sums of shares. Every view that begins with the answer
+takes its lines from here.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import FittedTable, numeric_table
 
 BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
+"""Blocks of C, each with the word for its directions and the unit of its stiffness."""
 
 
 def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
@@ -32,18 +33,18 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     pose = pose_of(analysis.machine)
     lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
     if analysis.compliance_diagonal.size:
-        felt = stiffness_sentence(analysis.components, analysis.compliance_diagonal.tolist(), analysis.machine.display)
-        lines.append(("Stiffness", f"{felt} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
+        text = stiffness_sentence(analysis.components, analysis.compliance_diagonal.tolist(), analysis.machine.display)
+        lines.append(("Stiffness", f"{text} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
     if analysis.softest:
         lines.append(("Softest", softest_sentence(analysis.softest, analysis.machine.display)))
     if analysis.singularity_margin is not None:
-        lines.append(("Margin", margins(analysis)))
+        lines.append(("Margin", margin_sentence(analysis)))
     if analysis.load:
         lines.append(("To first order" if analysis.machine.loaded else "Load", _load_sentence(analysis, analysis.load)))
     return lines
 
 
-def margins(analysis: Analysis) -> str:
+def margin_sentence(analysis: Analysis) -> str:
     """Return a sentence with the singularity margin of an analysed pose and the two of which it is the least."""
     number = analysis.machine.display.number
     legs, platform = number(analysis.leg_singularity_margin), number(analysis.platform_singularity_margin)
@@ -73,34 +74,29 @@ def stiffness_sentence(components: Sequence[str], compliances: Sequence[float], 
 
 def softest_sentence(softest: Mapping[str, Softest], display: Display) -> str:
     """Say for forces and for moments in which direction the machine is softest, how soft, and what makes it so."""
-    return "; ".join(_softest(softest, display)) + "."
-
-
-def _softest(softest: Mapping[str, Softest], display: Display) -> Iterator[str]:
+    clauses = []
     for block, word, unit in BLOCKS:
         if (direction := softest.get(block)) is not None:
             stiffness = display.show(direction.stiffness, unit, "rigid") if direction.stiffness else "free"
-            yield f"{word} {_where(direction)} {stiffness}{_mainly(direction)}"
+            contributors = largest_contributors(direction.shares, direction.kinds)
+            reason = f", mainly from {contributors}" if contributors else ""
+            clauses.append(f"{word} {_direction_name(direction)} {stiffness}{reason}")
+    return "; ".join(clauses) + "."
 
 
-def _where(direction: Softest) -> str:
+def _direction_name(direction: Softest) -> str:
     """Name the softest direction: an axis, a vector, or the plane or space of all that are equally soft."""
     if len(direction.directions) == 3:
         return "any direction"
-    vectors = [_vector(way) for way in direction.directions]
+    vectors = [_axis_name(way) for way in direction.directions]
     return vectors[0] if len(vectors) == 1 else f"any direction between {' and '.join(vectors)}"
 
 
-def _vector(way: Sequence[float]) -> str:
+def _axis_name(way: Sequence[float]) -> str:
     """Return an axis by its name, any other unit vector by its components; a direction has no sign."""
     largest = max(range(3), key=lambda i: abs(way[i]))
     rounded = [round(c * math.copysign(1.0, way[largest]), 2) + 0.0 for c in way]
     return "xyz"[largest] if abs(rounded[largest]) == 1.0 else f"({', '.join(f'{c:g}' for c in rounded)})"
-
-
-def _mainly(direction: Softest) -> str:
-    named = largest_contributors(direction.shares, direction.kinds)
-    return f", mainly from {named}" if named else ""
 
 
 def _load_sentence(analysis: Analysis, load: LoadCase) -> str:
@@ -157,10 +153,10 @@ def matrix_table(
     """K ("stiffness") or C ("compliance"), each entry in the unit of its block; one row is the diagonal.
 
     Args:
-        title: to which the units are added.
-        kind: of the matrix.
-        names: of its rows and columns.
-        rows: of the matrix, SI [n x n], or of its diagonal [1 x n].
+        title: title, to which the units are added.
+        kind: "stiffness" or "compliance".
+        names: names of rows and columns.
+        rows: the matrix, SI [n x n], or its diagonal [1 x n].
         display: units and digits.
         endless: word for infinity.
     """
@@ -219,19 +215,20 @@ def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> Fitte
 
 
 def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[str]:
-    """Least and largest and their directions; once where there is but one."""
-    values = [display.number(value, unit, "rigid") for value in (block.stiffnesses[0], block.stiffnesses[-1])]
-    directions = [_directions(block, block.stiffnesses[0]), _directions(block, block.stiffnesses[-1])]
+    """The least and the largest stiffness and their directions; a block of one stiffness has two empty cells."""
+    ends = block.stiffnesses[0], block.stiffnesses[-1]
+    values = [display.number(stiffness, unit, "rigid") for stiffness in ends]
+    directions = [_directions(block, stiffness) for stiffness in ends]
     return [*values, *directions] if len(block.stiffnesses) > 1 else [values[0], "", directions[0], ""]
 
 
 def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     """The direction of a principal stiffness; where several are alike, all that have it."""
-    pairs = list(zip(block.stiffnesses, block.directions, strict=True))
-    others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES)]
-    alike = len(pairs) - len(others)
-    if alike == 1:
-        return next(direction_words(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES))
+    alike, others = [], []
+    for k, direction in zip(block.stiffnesses, block.directions, strict=True):
+        (alike if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES) else others).append(direction)
+    if len(alike) == 1:
+        return direction_words(alike[0])
     return f"any ⊥ {direction_words(others[0])}" if others else "any"
 
 
@@ -241,7 +238,7 @@ def direction_words(vector: Sequence[float] | Array) -> str:
 
 
 def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Display = ENGINEERING) -> FittedTable:
-    """Eigenvalue, pitch, direction and point of each, the point from the reference point."""
+    """Eigenvalue, pitch, direction and point of each eigenscrew, the point as seen from the reference point."""
     length = display.scale("m")
     heads = [
         display.scale("N/rad").label("eigenvalue"),
@@ -258,7 +255,7 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
 
 
 def _point_text(point: Array, display: Display) -> str:
-    """A point given in m, without round-off."""
+    """The coordinates of a point in m, with 0 for those that are round-off."""
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
 
@@ -325,7 +322,7 @@ def remarks(analysis: Analysis) -> list[str]:
             f"rotations are scaled by the characteristic length, {display.show(analysis.characteristic_length, 'm')}."
         )
     if analysis.masses:
-        lines.append(_moving(analysis))
+        lines.append(_mass_sentence(analysis))
     return lines
 
 
@@ -338,7 +335,7 @@ def _internal_loads_sentence(undecided: int) -> str:
     return f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
 
 
-def _moving(analysis: Analysis) -> str:
+def _mass_sentence(analysis: Analysis) -> str:
     """Return the moving mass, and name the parts that are not counted because their mass is unknown."""
     unknown = [part.name for part in analysis.masses if part.mass is None]
     if analysis.moving_mass is None:

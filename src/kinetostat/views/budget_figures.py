@@ -1,4 +1,4 @@
-"""Figures of an error budget: bars of what contributes, and the error over a path, a sweep or a map."""
+"""Figures of an error budget: bars of the contributions, and the error over a path, a sweep or a map."""
 
 from functools import partial
 
@@ -15,11 +15,11 @@ from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 
 MOST_BARS = 15
-"""Single tolerances that have bars."""
+"""Single tolerances that have bars, at most."""
 LEAST_LABEL_WIDTH = 4.0
-"""Inches for what bars are about, at least."""
+"""Inches for the labels of bars, at least."""
 BAR_HEIGHT = 0.8
-"""Height of all bars of a row together."""
+"""Height of all bars of a row together, as a share of the distance between rows."""
 
 
 def budget_figures(budget: Budget) -> dict[str, Drawing]:
@@ -48,8 +48,8 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
     """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance.
 
     Args:
-        budget: of a machine with tolerances.
-        title: over the figure, with braces for the name of the machine.
+        budget: budget of a machine with tolerances.
+        title: title of the figure, with braces for the name of the machine.
     """
     names = ranked_by(budget)
     rows = budget.shares[[budget.measures.index(name) for name in names]]
@@ -73,6 +73,7 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
 
 
 def _sums(budget: Budget, key: str, names: list[str]) -> dict[str, list[float]]:
+    """Shares of the variance of each measure in `names`, added up by "line" or "leg"."""
     sums = [budget.shares_by(key, name) for name in names]
     return {label: [each[label] for each in sums] for label in sums[0]}
 

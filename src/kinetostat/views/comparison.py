@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.text import Text
 
-from kinetostat.display import Display, Scale, number
+from kinetostat.display import DASH, Display, Scale, number
 from kinetostat.studies.comparison import Comparison, SoftDirection
 from kinetostat.studies.design_numbers import Better, DesignRow
 from kinetostat.studies.requirements import Verdict
@@ -14,8 +14,11 @@ from kinetostat.views.question import Description, Field, Lines
 from kinetostat.views.tables import FittedTable, numeric_table, readable, text_table
 
 MOST_SHARES = 3
-NO_FIELD = "–"
-"""Shown for a design that has no such field."""
+"""Parts that are named for a direction."""
+LEAST_SHARE = 0.005
+"""Share below which a part is not named: it would read 0 %."""
+SAME_PERCENT = 0.05
+"""Percent of difference up to which two values are shown as equal."""
 
 
 def letters_of(comparison: Comparison) -> str:
@@ -33,7 +36,7 @@ def _lines(comparison: Comparison) -> Lines:
         concerned = ", ".join(letter for letter, sentence in zip(letters, uncounted, strict=True) if sentence == text)
         yield "Loads", f"{concerned}: {text}"
     yield "Percent", "Percentages are changes against A; the best value of each row is bold."
-    if not _differing(comparison):
+    if not differing_fields(comparison):
         yield "Files", "The files have equal values."
     if len(_families(comparison)) > 1:
         yield "Files", "Fields that only one design has are omitted."
@@ -66,11 +69,11 @@ def condition_of(row: Sequence[Verdict | None]) -> tuple[str, str]:
 def verdict_text(verdict: Verdict | None, display: Display) -> str:
     """Whether a requirement is met, by which worst value, and by how much."""
     if verdict is None:
-        return NO_FIELD
+        return DASH
     word = "met" if verdict.met else "missed"
     if verdict.worst is None:
         return f"{word}: no result"
-    margin = "" if verdict.margin is None else f" ({_percent(100.0 * verdict.margin)})"
+    margin = "" if verdict.margin is None else f" ({change_text(100.0 * verdict.margin)})"
     return f"{word}: {display.show(verdict.worst, verdict.unit)}{margin}"
 
 
@@ -78,9 +81,7 @@ def _verdict_table(comparison: Comparison, letters: str) -> FittedTable:
     table = text_table("Requirements, with the worst value and its distance from the bound", "", *letters)
     for row in comparison.verdicts:
         cells = [verdict_text(verdict, comparison.machine.display) for verdict in row]
-        styled = [
-            Text(cell, "red" if cell.startswith("missed") else "green" if cell != NO_FIELD else "") for cell in cells
-        ]
+        styled = [Text(cell, "red" if cell.startswith("missed") else "green" if cell != DASH else "") for cell in cells]
         table.add_row(": ".join(condition_of(row)), *styled)
     return table
 
@@ -89,14 +90,14 @@ def _families(comparison: Comparison) -> set[str]:
     return {design.machine.family.name for design in comparison.designs}
 
 
-def _differing(comparison: Comparison) -> dict[str, list[str]]:
-    """The values of the designs for each field in which they differ, by its path."""
+def differing_fields(comparison: Comparison) -> dict[str, list[str]]:
+    """The values of the designs for each field in which they differ, by its path; a dash where a design lacks it."""
     families = [design.machine.family.name for design in comparison.designs]
     rows = {"family": families} if len(set(families)) > 1 else {}
     for difference in comparison.differences:
         pairs = zip(difference.parameters, difference.values, strict=True)
         rows[difference.path] = [
-            readable(row, parameter.quantity, comparison.machine.display) if parameter else NO_FIELD
+            readable(row, parameter.quantity, comparison.machine.display) if parameter else DASH
             for parameter, row in pairs
         ]
     return rows
@@ -104,7 +105,7 @@ def _differing(comparison: Comparison) -> dict[str, list[str]]:
 
 def _tables(comparison: Comparison, _full: bool) -> Iterator[FittedTable]:
     letters, display = letters_of(comparison), comparison.machine.display
-    if rows := _differing(comparison):
+    if rows := differing_fields(comparison):
         table = text_table("Where the files differ", "field", *letters)
         for path, cells in rows.items():
             table.add_row(path, *cells)
@@ -142,13 +143,20 @@ def _cell(row: DesignRow, i: int, scale: Scale, digits: int) -> Text:
     shown = Text(number(value and value * scale.factor, endless, digits), "bold" if i in row.best else "")
     if i == 0 or percent is None:
         return Text.assemble(shown, "" if i == 0 else " " * 9)
-    better = (percent < 0.0) == (row.better is Better.LESS)
-    colour = "default" if abs(percent) < 0.05 or row.better is None else "green" if better else "red"
-    return Text.assemble(shown, (f" {_percent(percent):>8}", colour))
+    colour = {"better": "green", "worse": "red", "": "default"}[change_kind(row, percent)]
+    return Text.assemble(shown, (f" {change_text(percent):>8}", colour))
 
 
-def _percent(percent: float) -> str:
-    if abs(percent) < 0.05:
+def change_kind(row: DesignRow, percent: float) -> str:
+    """Return whether a change of a row's value is "better" or "worse"; empty if it is neither."""
+    if row.better is None or abs(percent) < SAME_PERCENT:
+        return ""
+    return "better" if (percent < 0.0) == (row.better is Better.LESS) else "worse"
+
+
+def change_text(percent: float) -> str:
+    """Return a change in percent, such as "+3.2 %"; a large one as a factor, and "=" if there is none to speak of."""
+    if abs(percent) < SAME_PERCENT:
         return "="
     return f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
 
@@ -156,17 +164,22 @@ def _percent(percent: float) -> str:
 def _softest_table(comparison: Comparison) -> FittedTable:
     table = text_table("Largest contributions in the softest directions", "", "rotation", "translation")
     for letter, softest in zip(letters_of(comparison), comparison.softest, strict=True):
-        turning = next((contribution for contribution in softest if contribution.direction.startswith("r")), None)
-        sliding = next((contribution for contribution in softest if not contribution.direction.startswith("r")), None)
-        table.add_row(letter, _contributions(turning), _contributions(sliding))
+        table.add_row(letter, *softest_texts(softest))
     return table
 
 
-def _contributions(attribution: SoftDirection | None) -> str:
-    if attribution is None:
-        return "–"
-    parts = [f"{name} {100 * share:.0f} %" for name, share in attribution.shares[:MOST_SHARES] if share >= 0.005]
-    return f"{attribution.direction}: {', '.join(parts)}"
+def softest_texts(softest: Sequence[SoftDirection]) -> list[str]:
+    """Name the softest rotation and the softest translation of a design, each with the parts that contribute most."""
+    rotation = next((direction for direction in softest if direction.direction.startswith("r")), None)
+    translation = next((direction for direction in softest if not direction.direction.startswith("r")), None)
+    return [_contributions(rotation), _contributions(translation)]
+
+
+def _contributions(softest: SoftDirection | None) -> str:
+    if softest is None:
+        return DASH
+    parts = [f"{name} {100 * share:.0f} %" for name, share in softest.shares[:MOST_SHARES] if share >= LEAST_SHARE]
+    return f"{softest.direction}: {', '.join(parts)}"
 
 
 def _designs(comparison: Comparison) -> list[dict[str, Any]]:

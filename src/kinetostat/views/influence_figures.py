@@ -1,6 +1,6 @@
-"""Figures of what parameters do to the stiffness: sensitivities and design guidelines, for print.
+"""Figures of the influence of parameters on the stiffness: sensitivities and design guidelines, for print.
 
-The curves come from `studies.guidelines`; only scales and colours are chosen here.
+Numbers and curves come from `studies`; only scales and colours are chosen here.
 """
 
 import math
@@ -28,17 +28,17 @@ from kinetostat.views.levels import usual_range
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
 
-MOST_LINES = 30
-"""Parameters that are shown."""
-NAMES = 2.1
-"""Inches for their names, at least."""
+MOST_ROWS = 30
+"""Parameters that a table of coloured cells shows."""
+LEAST_NAME_WIDTH = 2.1
+"""Inches for the names of parameters, at least."""
 LEAST_SCALE = 0.1
-"""Percent per percent at the end of the colour scale, at least: what is small everywhere stays pale."""
-LETTERS = 12
+"""Percent per percent at the end of the colour scale, at least: influences that are all small stay pale."""
+LETTERS_PER_INCH = 12
 """Characters of the label of a colour bar, per inch of its height."""
 BAR_SHARE = 0.75
 """Height of a colour bar as a share of the figure's, about."""
-DARK = 0.6
+DARK_SHARE = 0.6
 """Share of the colour scale beyond which text on it is white."""
 
 
@@ -61,18 +61,18 @@ def coloured_table(
     """Draw numbers in cells coloured by sign and size; the first rows, as many as a page takes.
 
     Args:
-        titles: over the figure, and below it where its numbers hold.
+        titles: title over the figure, and below it the settings for which its numbers hold.
         rows: percent per percent in each column, by parameter; NaN is grey.
-        heads: of the columns.
+        heads: heads of the columns.
         colours: name of a diverging colour map.
-        label: of its bar.
+        label: label of the colour bar.
     """
-    shown = list(rows)[:MOST_LINES]
+    shown = list(rows)[:MOST_ROWS]
     cells = np.array([rows[path] for path in shown], dtype=float)
-    beside = max(NAMES, width_of(shown))
+    beside = max(LEAST_NAME_WIDTH, width_of(shown))
     with new_figure((beside + 0.5 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), titles[0], titles[1]) as figure:
         panel = figure.subplots()
-        room = int(LETTERS * BAR_SHARE * figure.get_figheight())
+        room = int(LETTERS_PER_INCH * BAR_SHARE * figure.get_figheight())
         _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))
         panel.set_yticks(range(len(shown)), shown)
         panel.set_xticks(range(len(heads)), heads)
@@ -89,11 +89,11 @@ def _draw_cells(panel: Axes, cells: Array, colours: str, label: str) -> None:
     panel.tick_params(length=0, top=False)
     for (row, column), value in np.ndenumerate(cells):
         if np.isfinite(value):
-            dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK
+            dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK_SHARE
             text = f"{value:.2g}" if abs(value) >= NEGLIGIBLE else "0"
             colour = "white" if dark else "black"
             cell = panel.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
-            cell.set_in_layout(False)  # it is inside of the panel
+            cell.set_in_layout(False)  # it lies inside of the panel, so that the layout need not measure it
     ends = [(cells < -most).any(), (cells > most).any()]
     extend = ("neither", "min", "max", "both")[int(ends[0]) + 2 * int(ends[1])]
     bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=extend)
@@ -102,8 +102,8 @@ def _draw_cells(panel: Axes, cells: Array, colours: str, label: str) -> None:
 
 
 MOST_PANELS = 6
-"""Number of elements that are shown."""
-POINTS = 161
+"""Number of elements whose curves are shown, a panel each."""
+CURVE_POINTS = 161
 """Number of points along each curve."""
 DECADES = 1.0
 """Powers of ten by which curves go beyond the limits of rigidity and the present stiffness."""
@@ -124,7 +124,7 @@ def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:
 
 
 def _elements_with_limits(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
-    """Return the elements that have a limit of rigidity, with its multiples of the present stiffness; the last ones."""
+    """Return the last elements that have a limit of rigidity, with their limits in multiples of their stiffness."""
     if guidelines.here is None:
         return []
     limits = [
@@ -160,7 +160,7 @@ def rigid_figure(
     ) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, (element, limits) in zip(panels, shown, strict=False):
-            _curves(panel, guidelines, element, limits)
+            _draw_curves(panel, guidelines, element, limits)
         for unused in list(figure.axes)[len(shown) :]:
             unused.remove()
         styles = zip(guidelines.components, COLOURS, DASHES, strict=False)
@@ -170,11 +170,12 @@ def rigid_figure(
     return figure
 
 
-def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.ndarray) -> None:
+def _draw_curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.ndarray) -> None:
+    """Draw the stiffness of each direction over the stiffness of an element, with a dot at each limit of rigidity."""
     finite = limits[np.isfinite(limits) & (limits > 0.0)]
     rigid_now = element.stiffness == math.inf
     ends = np.log10([*finite, *([] if rigid_now else [1.0])])
-    factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
+    factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, CURVE_POINTS)
     scale = guidelines.machine.display.scale(element.unit)
     present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0) * scale.factor
     stiff = stiffening(guidelines.state, element, factors)

@@ -1,6 +1,6 @@
-"""An optimisation study: its question on a terminal, and the description of its answer beside the initial machine.
+"""An optimisation study on a terminal, and the description of its answer: the best design beside the initial one.
 
-Nothing is computed here but rounding.
+Nothing is computed here; numbers are only rounded.
 """
 
 import math
@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinetostat.arrays import Array
-from kinetostat.display import ENGINEERING, Display, number
+from kinetostat.display import DASH, ENGINEERING, Display, number
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.late import LateModule
 from kinetostat.machine.saving import as_file
@@ -48,7 +48,7 @@ def print_study(console: Console, problem: Problem) -> None:
 
 
 def aims(problem: Problem) -> list[str]:
-    """Objectives and constraints, a line each."""
+    """Return the objectives and constraints of a study, a line each."""
     objectives = [
         f"Objective: {term.goal} {plain_name(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
         for term in problem.objectives
@@ -81,7 +81,7 @@ MOST_ROWS = 25
 LEAST_PERCENT = 1e-4
 """Percent per percent below which a 0 is printed."""
 LEAST_STIFFNESS_LEFT = 0.01
-"""Stiffness that is left, as a share, below which the loss is pointed out."""
+"""Share of the initial stiffness of a direction; a sentence says so if less than this is left."""
 
 
 def worth_table(result: Result) -> Table:
@@ -120,7 +120,7 @@ def variable_table(result: Result) -> Table:
     values, display = result.problem.space.values(result.genes), result.problem.machine.display
     for variable, value in zip(result.problem.space.searched_variables, values, strict=True):
         influence = influences.get(variable.name)
-        percents = [_percent_text(p) for p in influence.percents] if influence else [""] * len(objectives)
+        percents = [percent_text(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
         shown = (variable.in_words(number, display) for number in (variable.initial, value))
         table.add_row(variable.name, *shown, bound, *percents)
@@ -206,7 +206,7 @@ def _exact(value: float) -> str:
 
 
 def _times(gain: float) -> str:
-    return "–" if math.isnan(gain) else f"{gain:.4g}"
+    return DASH if math.isnan(gain) else f"{gain:.4g}"
 
 
 def times_stiffer(gain: float) -> str:
@@ -216,9 +216,10 @@ def times_stiffer(gain: float) -> str:
     return f"{_times(gain)} times stiffer" if gain >= 1.0 else f"{_times(1.0 / gain)} times softer"
 
 
-def _percent_text(value: float) -> str:
-    if math.isnan(value):
-        return "–"
+def percent_text(value: float | None) -> str:
+    """Return a sensitivity in percent per percent: 0 where it is negligible, a dash where there is none."""
+    if value is None or math.isnan(value):
+        return DASH
     return "0" if abs(value) < LEAST_PERCENT else f"{value:.3g}"
 
 
@@ -240,9 +241,9 @@ def _tables(result: Result, _full: bool) -> Iterator[Table | str]:
     yield from remarks(result)
 
 
-def _of_solved(take: Callable[[Result], Any]) -> Callable[[Result], Any]:
-    """Return what takes a value from a study with a solution, and nothing from another."""
-    return lambda result: take(result) if result.solved else None
+def _if_solved(value_of: Callable[[Result], Any]) -> Callable[[Result], Any]:
+    """Return a function that gives a value of a study with a solution, and None for a study without one."""
+    return lambda result: value_of(result) if result.solved else None
 
 
 def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
@@ -267,8 +268,8 @@ def _numbers_of(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
 
 
 def _best(key: str) -> Field:
-    """A field of the best design that `_numbers_of` gives."""
-    return Field(key, _of_solved(lambda result: _numbers_of(result.problem, result.outcome, 0)[key]), optional=True)
+    """A field of the answer that has this key in `_numbers_of` the best design."""
+    return Field(key, _if_solved(lambda result: _numbers_of(result.problem, result.outcome, 0)[key]), optional=True)
 
 
 def _objective(result: Result) -> float | None:
@@ -386,21 +387,21 @@ RESULT = Description(
         _best("constraints"),
         _best("verdict"),
         Field("initial", _initial),
-        Field("directions", _of_solved(_directions), optional=True),
+        Field("directions", _if_solved(_directions), optional=True),
         Field(
             "at_bounds",
-            _of_solved(lambda result: {item.name: item.bound for item in result.influences if item.bound}),
+            _if_solved(lambda result: {item.name: item.bound for item in result.influences if item.bound}),
             optional=True,
         ),
-        Field("sensitivity", _of_solved(_sensitivity), optional=True),
-        Field("ridges", _of_solved(_ridges), optional=True),
+        Field("sensitivity", _if_solved(_sensitivity), optional=True),
+        Field("ridges", _if_solved(_ridges), optional=True),
         Field(
             "ridges_text",
-            _of_solved(lambda result: ridge_sentences(result.ridges, result.problem) or [result.no_ridges]),
+            _if_solved(lambda result: ridge_sentences(result.ridges, result.problem) or [result.no_ridges]),
             optional=True,
         ),
         Field("robustness", _scatter),
-        Field("convergence", _of_solved(_convergence), optional=True),
+        Field("convergence", _if_solved(_convergence), optional=True),
         Field("front", _front),
     ),
     lines=_lines,

@@ -23,7 +23,7 @@ from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, re
 from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.studies.optimisation.space import PoseSet, Space, read_poses, read_space
 from kinetostat.studies.optimisation.terms import Aggregate, Term, known_terms, parse_aggregate, read_term, usual_goal
-from kinetostat.studies.quantities import refuse_loaded, without_derivatives
+from kinetostat.studies.quantities import refuse_without_derivatives, without_derivatives
 
 if TYPE_CHECKING:
     from kinetostat.studies import workspace_verdicts
@@ -275,7 +275,7 @@ def _check(problem: Problem) -> None:
                 f"{MOST_DIFFERENTIATED:,}; lower the counts of [poses], or take optimizer.method = genetic."
             )
         stepped = [term.label for term in problem.terms if not term.differentiable]
-        refuse_loaded(problem.machine, problem.names, problem.paths)
+        refuse_without_derivatives(problem.machine, problem.names, problem.paths)
         if stepped:
             raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")
         if problem.method == "gradient" and not (problem.space.catalogue == 0).any():

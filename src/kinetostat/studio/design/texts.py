@@ -4,7 +4,6 @@ The numbers are those of `optimize --json` and of `studies.comparison`; here the
 """
 
 import math
-import string
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
@@ -12,23 +11,30 @@ from typing import Any
 
 from kinetostat.display import DASH, Display, Scale, number
 from kinetostat.kinetostatics.quantities import plain_name
-from kinetostat.studies.comparison import Comparison, SoftDirection
-from kinetostat.studies.design_numbers import Better, DesignRow
+from kinetostat.studies.comparison import Comparison
+from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import EXACT, Progress
 from kinetostat.studio.question_process import figure_html
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
-from kinetostat.views.comparison import COMPARISON, condition_of, verdict_text
-from kinetostat.views.tables import readable
+from kinetostat.views.comparison import (
+    COMPARISON,
+    change_kind,
+    change_text,
+    condition_of,
+    differing_fields,
+    letters_of,
+    softest_texts,
+    verdict_text,
+)
+from kinetostat.views.optimisation import percent_text
 
 SACRIFICED = 0.01
 """A remark says so if a direction keeps less than this share of its initial stiffness."""
-NEGLIGIBLE = 1e-4
-"""A sensitivity below this, in percent per percent, is shown as 0."""
 
 
 def result_text(progress: Progress) -> str:
-    """Return all tables of a search that has ended, or the best design so far of one that has not."""
+    """Return all tables of a search that has ended, or the best design so far of one that has not, as HTML."""
     result = progress.result
     if result is None:
         return _so_far(progress)
@@ -80,7 +86,7 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
         else:
             before, after = (variable.in_words(v, problem.machine.display) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
-        rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
+        rows.append([path, before, after, bounds.get(path, ""), ", ".join(map(percent_text, percents))])
     note = paragraph(
         "% per %: by how many percent the objective changes if the variable grows by 1 % (an angle by 0.01 rad).",
         "note",
@@ -123,34 +129,21 @@ def _exact(scale: Scale, *values: float | None) -> list[str]:
 
 
 def _ratio(before: float | None, after: float | None) -> str:
-    return DASH if before is None or not after else f"{after / before:.4g}" if before else DASH
-
-
-def _percent(value: float | None) -> str:
-    return DASH if value is None else "0" if abs(value) < NEGLIGIBLE else f"{value:.3g}"
-
-
-SAME = 0.05
-"""Percent of difference up to which two values are shown as equal."""
-MOST_SHARES = 3
-"""Parts that are named for a direction."""
-LEAST_SHARE = 0.005
-"""Share below which a part is not named: it would read 0 %."""
+    return f"{after / before:.4g}" if before and after else DASH
 
 
 def comparison_text(comparison: Comparison) -> str:
     """Return the whole comparison: gains, values at the pose of each design, differences, contributions."""
-    letters = string.ascii_uppercase[: len(comparison.designs)]
+    letters = letters_of(comparison)
     parts = [
         _legend(comparison, letters),
         heading("Stiffness, times that of A (logarithmic bars; orange: less stiff)"),
         _gains(comparison, letters),
     ]
-    parts += [heading("At the pose of each design"), _rows(comparison, comparison.rows, letters)]
+    parts += _rows("At the pose of each design", comparison, comparison.rows)
     if comparison.where:
         over = [replace(row, name=f"{row.group} {row.name}") for row in comparison.over]
-        title = f"{comparison.where[0].upper()}{comparison.where[1:]}"
-        parts += [heading(title), _rows(comparison, over, letters)]
+        parts += _rows(f"{comparison.where[0].upper()}{comparison.where[1:]}", comparison, over)
     if comparison.verdicts:
         display = comparison.machine.display
         judged = [[": ".join(condition_of(row)), *(verdict_text(each, display) for each in row)]
@@ -159,9 +152,9 @@ def comparison_text(comparison: Comparison) -> str:
         parts += [heading(title), table(title, ["", *letters], judged, "words")]
     parts += [heading("Where they differ"), _differences(comparison, letters)]
     if any(comparison.softest):
-        parts_of = [[letter, *_softest(weakest)] for letter, weakest in zip(letters, comparison.softest, strict=True)]
+        named = [[letter, *softest_texts(each)] for letter, each in zip(letters, comparison.softest, strict=True)]
         title = "Largest contributions in the softest directions"
-        parts += [heading(title), table(title, ["", "rotation", "translation"], parts_of, "words")]
+        parts += [heading(title), table(title, ["", "rotation", "translation"], named, "words")]
     return "".join([*parts, *map(figure_html, COMPARISON.drawings(comparison).values())])
 
 
@@ -191,11 +184,11 @@ def _gain(row: DesignRow, k: int) -> float | None:
     return first / other
 
 
-def _rows(comparison: Comparison, rows: Sequence[DesignRow], letters: str) -> str:
-    head = "".join(f'<th scope="col">{letter}</th>' for letter in letters)
+def _rows(title: str, comparison: Comparison, rows: Sequence[DesignRow]) -> list[str]:
+    head = "".join(f'<th scope="col">{letter}</th>' for letter in letters_of(comparison))
     body = "".join(_row(row, comparison.machine.display) for row in rows)
-    caption = "<caption>At the pose of each design</caption>"
-    return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
+    columns = f"<caption>{escape(title)}</caption><thead><tr><th></th>{head}</tr></thead>"
+    return [heading(title), f'<table class="figures">{columns}<tbody>{body}</tbody></table>']
 
 
 def _row(row: DesignRow, display: Display) -> str:
@@ -210,40 +203,9 @@ def _row(row: DesignRow, display: Display) -> str:
 def _change(row: DesignRow, percent: float | None) -> str:
     if percent is None:
         return ""
-    if abs(percent) < SAME:
-        return ' <span class="change">=</span>'
-    if row.better is None:
-        return f' <span class="change">{percent:+.1f} %</span>'
-    kind = "better" if (percent < 0.0) == (row.better is Better.LESS) else "worse"
-    shown = f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
-    return f' <span class="change {kind}">{shown}</span>'
+    return f' <span class="change {change_kind(row, percent)}">{change_text(percent)}</span>'
 
 
 def _differences(comparison: Comparison, letters: str) -> str:
-    rows = []
-    for difference in comparison.differences:
-        pairs = zip(difference.values, difference.parameters, strict=True)
-        rows.append(
-            [
-                difference.path,
-                *(readable(values, p.quantity, comparison.machine.display) if p else DASH for values, p in pairs),
-            ]
-        )
-    families = [design.machine.family.name for design in comparison.designs]
-    if len(set(families)) > 1:
-        rows = [["family", *families], *rows]
+    rows = [[path, *values] for path, values in differing_fields(comparison).items()]
     return table("Where they differ", ["", *letters], rows) if rows else paragraph("The designs do not differ.")
-
-
-def _softest(weakest: tuple[SoftDirection, ...]) -> list[str]:
-    """Write the most compliant rotation and translation of a design, each with the parts that contribute most."""
-    turning = next((each for each in weakest if each.direction.startswith("r")), None)
-    sliding = next((each for each in weakest if not each.direction.startswith("r")), None)
-    return [_contributions(turning), _contributions(sliding)]
-
-
-def _contributions(weakest: SoftDirection | None) -> str:
-    if weakest is None:
-        return DASH
-    parts = [f"{name} {100 * share:.0f} %" for name, share in weakest.shares[:MOST_SHARES] if share >= LEAST_SHARE]
-    return f"{weakest.direction}: {', '.join(parts)}"

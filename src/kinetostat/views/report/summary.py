@@ -23,7 +23,7 @@ from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
-from kinetostat.views.analysis_tables import first_lines, margins
+from kinetostat.views.analysis_tables import first_lines, margin_sentence
 from kinetostat.views.drawing import three_views
 from kinetostat.views.loaded_tables import actuator_loads, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
@@ -174,7 +174,7 @@ def _drawing(analysis: Analysis) -> Figure:
 def _pose_kind(analysis: Analysis, mobility: Mobility) -> str:
     """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
     kind = f"{mobility.kind} pose" if mobility.kind is SortOfPose.REGULAR else mobility.kind
-    return f"{_first_upper(kind)} {margins(analysis)}"
+    return f"{_first_upper(kind)} {margin_sentence(analysis)}"
 
 
 def _mobility(analysis: Analysis) -> tuple[Block, ...]:
