@@ -224,7 +224,8 @@ def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[s
 
 def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     """The direction of a principal stiffness; where several are alike, all that have it."""
-    alike, others = [], []
+    alike: list[Sequence[float]] = []
+    others: list[Sequence[float]] = []
     for k, direction in zip(block.stiffnesses, block.directions, strict=True):
         (alike if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES) else others).append(direction)
     if len(alike) == 1:

@@ -11,7 +11,7 @@ from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guideline_sentences import LEAST_EFFECT, MATTERS, limit_of, statements
+from kinetostat.studies.guideline_sentences import DECIDING_SHARE, LEAST_EFFECT, limit_of, statements
 from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guidelines
 from kinetostat.views.data_forms import stiffness_of_spring
 from kinetostat.views.question import (
@@ -104,7 +104,7 @@ def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
 def _share(part: float) -> Text:
     if math.isnan(part) or part == 0.0:
         return Text("–" if part else "·")
-    return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= MATTERS else "dim")
+    return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= DECIDING_SHARE else "dim")
 
 
 def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
