@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 
 from kinetostat.frozen import dataclass
+from kinetostat.tolerances import ROUND_OFF_OF_COLUMN
 from kinetostat.units import UnitError, multiple_of_unit
 
 SI = "si"
@@ -18,6 +19,7 @@ DIGITS = (2, 12)
 DASH = "–"
 """Stands where there is no number."""
 INFINITE = "∞"
+_VALUE = re.compile(r"([-+]?[\d.]+(?:e-?\d+)?) (\S+)")
 _HYPHEN_OF_NUMBER = re.compile(r"(?<![\w.,)-])-(?=[\d.∞])")
 MOST_DECIMALS = 6
 """Decimals with which a number stands beside its uncertainty at most."""
@@ -182,6 +184,25 @@ def number(value: float | None, endless: str = INFINITE, digits: int = 4) -> str
 def with_minus_signs(text: str) -> str:
     """Return a text with a minus sign in front of negative numbers instead of a hyphen, for pages and print."""
     return _HYPHEN_OF_NUMBER.sub("\N{MINUS SIGN}", text)
+
+
+def without_round_off(cells: Sequence[str]) -> list[str]:
+    """Return the cells of a column, in which values that are round-off beside the greatest of their unit are 0.
+
+    So "-2.4e-8 N" is "0 N" below "8822 N". Cells without a unit stay as they are: of ratios, 1 and 3e-13 beside each
+    other both say something.
+    """
+    if not any("e-" in cell for cell in cells):
+        return list(cells)
+    values = [_VALUE.fullmatch(cell) for cell in cells]
+    greatest: dict[str, float] = {}
+    for value in values:
+        if value:
+            greatest[value[2]] = max(abs(float(value[1])), greatest.get(value[2], 0.0))
+    return [
+        f"0 {value[2]}" if value and abs(float(value[1])) < ROUND_OFF_OF_COLUMN * greatest[value[2]] else cell
+        for cell, value in zip(cells, values, strict=True)
+    ]
 
 
 def number_and_uncertainty(value: float, uncertainty: float) -> tuple[str, str]:

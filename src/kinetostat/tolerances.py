@@ -177,6 +177,9 @@ ZERO_LENGTH = 1e-9
 """Share of the characteristic length below which a length counts as zero, and no percent of it means anything."""
 ROUND_OFF_OF_ENTRY = 1e-12
 """Share of what an entry of a screw, of K or of C is compared with below which it is only round-off."""
+ROUND_OFF_OF_COLUMN = 1e-10
+"""Share of the greatest value of a printed column below which a value of the same unit is round-off: states of rest
+leave some 1e-12 of the load, and nobody needs two numbers of one column that are ten decades apart."""
 EQUAL_DESIGNS = 1e-9
 """Relative difference up to which a number is the same for two designs, so that neither is the better one."""
 EQUAL_ROUTES = 1e-9

@@ -1,14 +1,28 @@
 """Results in the units that people read: one scale a dimension, chosen once, and numbers that lose nothing."""
 
 import math
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
-from kinetostat.display import DASH, ENGINEERING, UNIT_OF, Display, number, number_and_uncertainty, read_display
+from kinetostat.display import (
+    DASH,
+    ENGINEERING,
+    UNIT_OF,
+    Display,
+    number,
+    number_and_uncertainty,
+    read_display,
+    without_round_off,
+)
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.studies.analysis import analyze
+from kinetostat.studio import wording
 from kinetostat.units import UnitError, multiple_of_unit, parse
 from kinetostat.views.answers import plain_of
+from kinetostat.views.report.content import as_table, typeset
+from kinetostat.views.tables import numeric_table
 from refusals import refused
 
 
@@ -145,3 +159,20 @@ def test_a_machine_carries_its_display_through_files_and_answers_stay_si(name):
     assert load(name).in_units("N/mm").display.units == "N/mm"
     with refused("furlong"):
         machine.in_units("furlong")
+
+
+def test_round_off_beside_a_large_value_is_zero_in_every_table():
+    """Of the same unit only: a small moment beside a large force may be what is asked for; ratios have no unit."""
+    loads = ["8822 N", "-2.382e-8 N", "1.5e-5 N", "2.4e-8 N·m", "–", "rigid"]
+    shown = ["8822 N", "0 N", "1.5e-5 N", "2.4e-8 N·m", "–", "rigid"]
+    assert without_round_off(loads) == shown
+    assert without_round_off(["1", "3e-13"]) == ["1", "3e-13"]
+    table = numeric_table("Springs", "spring", ["load"])
+    for name, load_text in zip("abcdef", loads, strict=True):
+        table.add_row(name, load_text)
+    assert [row[1] for row in as_table(table, "").rows] == [typeset(cell) for cell in shown]
+    told = StringIO()
+    Console(file=told, width=80).print(table)
+    assert "e-8 N " not in told.getvalue()
+    page = wording.table("springs", ["", "load"], [*map(list, zip("abcdef", loads, strict=True))])
+    assert "<td>0 N</td>" in page and "e-8 N<" not in page

@@ -175,8 +175,9 @@ class MapPanel:
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
-        took = 1e3 * (time.perf_counter() - request.since)
-        self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {took:.0f} ms")
+        took = time.perf_counter() - request.since
+        words = f"{1e3 * took:.0f} ms" if took < 1.0 else f"{took:.1f} s"
+        self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {words}")
 
     def _range_field(self, side: str) -> ui.input:
         field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE_HINT.format(side))

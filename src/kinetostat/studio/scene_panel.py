@@ -12,6 +12,7 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
 from kinetostat.algebra.vector import Displacement
+from kinetostat.display import with_minus_signs
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
@@ -216,7 +217,7 @@ def headline(report: Report) -> str:
 
 
 def _tile(name: str, value: str, unit: str) -> str:
-    return f"<div><dt>{name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>"
+    return f"<div><dt>{name}</dt><dd>{with_minus_signs(value)} <small>{unit or '&nbsp;'}</small></dd></div>"
 
 
 class Handles:

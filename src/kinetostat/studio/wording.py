@@ -7,10 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from kinetostat.display import ENGINEERING, Display, with_minus_signs
+from kinetostat.display import ENGINEERING, Display, with_minus_signs, without_round_off
 from kinetostat.machine.parameters import Parameter, entry_name
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
+from kinetostat.views.page import breakable
 
 FIELD_DIGITS = 6
 """Significant digits of a value in a field that may be typed over."""
@@ -79,13 +80,15 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind
         rows: rows of texts.
         kind: further class for the style sheet.
     """
+    columns = [without_round_off(column) for column in zip(*rows, strict=True)]
+    columns[1:] = [[*map(with_minus_signs, column)] for column in columns[1:]]
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(
         f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'
-        for first, *rest in ((name, *map(with_minus_signs, cells)) for name, *cells in rows)
+        for first, *rest in zip(*columns, strict=True)
     )
-    columns = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
-    return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{columns}<tbody>{body}</tbody></table>'
+    heads = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
+    return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{heads}<tbody>{body}</tbody></table>'
 
 
 def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str, str] | None = None) -> str:
@@ -100,7 +103,7 @@ def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str
         return paragraph("There is nothing to show.")
     of_leg = {name: f' data-leg="{escape(leg)}"' for name, leg in (legs or {}).items()}
     items = "".join(
-        f'<li{of_leg.get(name, "")}><span class="bar-name" title="{escape(name)}">{escape(name)}</span>'
+        f'<li{of_leg.get(name, "")}><span class="bar-name" title="{escape(name)}">{breakable(name)}</span>'
         f'<span class="bar-track"><span class="bar-fill {"negative" if share < 0 else ""}" '
         f'style="width:{100 * min(abs(share), 1.0):.2f}%"></span></span>'
         f'<span class="bar-value">{escape(with_minus_signs(text))}</span></li>'
@@ -123,4 +126,4 @@ def heading(text: str) -> str:
 
 def paragraph(text: str, kind: str = "note") -> str:
     """Return a paragraph of the class `kind`."""
-    return f'<p class="{kind}">{escape(text)}</p>'
+    return f'<p class="{kind}">{escape(with_minus_signs(text))}</p>'

@@ -336,12 +336,18 @@ def _internal_loads_sentence(undecided: int) -> str:
     return f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
 
 
+def first_names(parts: Sequence[str]) -> str:
+    """Return the names of parts, of many the first ones: "leg 1, leg 2, leg 3, leg 4 and 2 more"."""
+    more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
+    return f"{', '.join(parts[:MOST_NAMED])}{more}"
+
+
 def _mass_sentence(analysis: Analysis) -> str:
     """Return the moving mass, and name the parts that are not counted because their mass is unknown."""
     unknown = [part.name for part in analysis.masses if part.mass is None]
     if analysis.moving_mass is None:
         return "Moving mass: unknown; give links a cross-section, and the platform a mass in [tool]."
-    shown = ", ".join(unknown[:MOST_NAMED])
-    more = f" and {len(unknown) - MOST_NAMED} more" if len(unknown) > MOST_NAMED else ""
-    without = f"; not counted, as no mass is given: {shown}{more}" if unknown else ", all links and the platform"
+    without = (
+        f"; not counted, as no mass is given: {first_names(unknown)}" if unknown else ", all links and the platform"
+    )
     return f"Moving mass: {analysis.machine.display.show(analysis.moving_mass, 'kg')}{without}."

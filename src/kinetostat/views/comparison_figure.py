@@ -127,7 +127,10 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     if logarithmic:
         panel.set_yscale("log")
         panel.margins(y=0.15)
-    panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
+    if len(bars) == 1 and not bars[0][0]:  # there is room for the letter of each design below its bar
+        panel.set_xticks((np.arange(count) - (count - 1) / 2) * width, [*string.ascii_uppercase[:count]])
+    else:
+        panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
     panel.grid(visible=False, axis="x")
     panel.set_axisbelow(True)
     panel.tick_params(axis="x", length=0)

@@ -21,12 +21,12 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from kinetostat.arrays import Array
-from kinetostat.display import Scale, number, with_unit
+from kinetostat.display import Scale, number, with_minus_signs, with_unit
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.late import LateModule
 from kinetostat.studies.storage import replacing
-from kinetostat.views.lettering import letter
+from kinetostat.views.lettering import letter, width_of
 from kinetostat.views.levels import levels_of
 
 if TYPE_CHECKING:
@@ -75,6 +75,8 @@ TITLE_CHARACTERS = 12
 """Of the title over a figure, per inch."""
 MARGIN = 0.04
 """Inches around a figure that stands in a page."""
+MAP_SIZE, LONG_NUMBER = 1.8, 0.3
+"""Width of a map among others without its scales, and of a number that is long below it, inches."""
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""
 MOST_COUNTS = 12
@@ -127,6 +129,8 @@ def contour_maps(dataset: "xr.Dataset", names: Sequence[str], title: str) -> Fig
             lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
             _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
+            _thin_numbers(panel)
+        flatten(figure, figure.axes[0], 1.4 * rows)
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
     with mpl.rc_context(STYLE):
@@ -283,7 +287,7 @@ def set_title(figure: Figure, title: str) -> None:
 def note_setting(figure: Figure, *lines: str) -> None:
     """Small lines below a figure: where its numbers hold, and what is missing; wrapped to its width."""
     room = int(CHARACTERS * figure.get_figwidth())
-    shown = [part for line in lines if line for part in textwrap.wrap(line, room)]
+    shown = [with_minus_signs(part) for line in lines if line for part in textwrap.wrap(line, room)]
     figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
 
 
@@ -317,6 +321,26 @@ def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) ->
         panel.set_xscale("log")
     if dataset[up].attrs["log"]:
         panel.set_yscale("log")
+
+
+def flatten(figure: Figure, panel: Axes, height: float) -> None:
+    """Take out of a figure what panels of equal scales leave empty above and below them.
+
+    Args:
+        figure: whose layout is not fixed yet.
+        panel: one of the panels, which are all alike.
+        height: of all rows of panels together if they were square, inches.
+    """
+    if panel.get_aspect() == 1.0:
+        (left, right), (low, high) = panel.get_xlim(), panel.get_ylim()
+        figure.set_figheight(figure.get_figheight() - height * max(0.0, 1.0 - (high - low) / (right - left)))
+
+
+def _thin_numbers(panel: Axes) -> None:
+    """Let long numbers below a map stand apart; Matplotlib counts on three digits, and lets longer ones meet."""
+    wide = width_of(f"{end:.6g}" for end in panel.get_xlim())
+    if wide > LONG_NUMBER and panel.get_xscale() == "linear":
+        panel.locator_params(axis="x", nbins=max(2, int(MAP_SIZE / (1.4 * wide))))
 
 
 def _contour_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale: Scale) -> list[QuadContourSet]:

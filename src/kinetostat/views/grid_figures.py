@@ -16,6 +16,7 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.machine import setting_of
+from kinetostat.machine.parameters import named_entry
 from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
@@ -127,7 +128,9 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
         for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
             shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
             scale = answers.machine.display.scale(shown[0][0].unit)
-            _draw_panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
+            _draw_panel(
+                panel, answers, {named_entry(f.shown): values * scale.factor for f, values in shown}, scale.label(kind)
+            )
         panels[-1].set_xlabel("pose")
     return figure
 

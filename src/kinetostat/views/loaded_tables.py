@@ -9,7 +9,6 @@ import numpy as np
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.under_load import LoadedState, SpringState
-from kinetostat.tolerances import NO_REACTION
 from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiffness_sentence
 from kinetostat.views.question import Lines
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -156,9 +155,8 @@ def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
     for spring in state.springs:
         kinds.setdefault((spring.name.removeprefix(f"{spring.leg} "), spring.turning), []).append(spring)
     table = numeric_table("Springs by kind", "spring", ["least load", "greatest load", "deformation", "slack"])
-    most_of = {turns: max((abs(s.load) for s in state.springs if s.turning is turns), default=0.0) for turns in (0, 1)}
     for (kind, turning), members in kinds.items():
-        loads = [s.load if abs(s.load) > NO_REACTION * most_of[turning] else 0.0 for s in members]
+        loads = [spring.load for spring in members]
         ends = (display.show(end, "N·m" if turning else "N") for end in (min(loads), max(loads)))
         most = max((spring.deformation for spring in members), key=abs)
         name = f"{kind} ×{len(members)}" if len(members) > 1 else members[0].name

@@ -23,6 +23,8 @@ PATH_SIZE = 6.0
 """Size of the letters of these paths, points."""
 LEAST_PATH_WIDTH = 1.4
 """Least room for these paths, inches."""
+LEAST_HEIGHT = 0.3
+"""Least height of a panel of places as a share of its width: places on a bed lie on a line, seen from the front."""
 FIT_CAPTIONS = {
     "residuals": "What is left of every measured value, as drawn and as identified.",
     "correlations": "Correlations of the numbers: which ones were found together.",
@@ -102,6 +104,9 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
                 places = [answer.next.poses[f"pose.{'xyz'[axis]}"] * scale.factor for axis in (across, up)]
                 panel.plot(*places, "o", mfc="none", color=COLOURS[1], label="to be measured next (platform point)")
             panel.set(title=view, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
+            low, high = panel.get_ylim()
+            lacking = max(0.0, LEAST_HEIGHT * float(np.ptp(panel.get_xlim())) - (high - low))
+            panel.set_ylim(low - lacking / 2.0, high + lacking / 2.0)
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

@@ -1,5 +1,6 @@
 """The frame, the style and the tables of all HTML pages. Texts are escaped here; HTML itself is a `Markup`."""
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
@@ -11,6 +12,8 @@ class Markup(str):
     __slots__ = ()
 
 
+_OPTION = re.compile(r"(?<![\w-])--[a-z-]+")
+_NAME = re.compile(r"(?<=[a-z])([._])(?=[a-z])")
 STYLE = Path(__file__).with_name("page.css").read_text("utf-8")
 """Style of every page: light and dark, screen and paper."""
 
@@ -48,7 +51,13 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], num
 
 def _row(tag: str, cells: Sequence[str], numeric: Sequence[bool]) -> str:
     kinds = (' class="n"' if number else "" for number in numeric)
-    return f"<tr>{''.join(f'<{tag}{kind}>{as_markup(c)}</{tag}>' for c, kind in zip(cells, kinds, strict=True))}</tr>"
+    written = (as_markup(cell) if i or tag == "th" else breakable(cell) for i, cell in enumerate(cells))
+    return f"<tr>{''.join(f'<{tag}{kind}>{cell}</{tag}>' for cell, kind in zip(written, kinds, strict=True))}</tr>"
+
+
+def breakable(text: str) -> str:
+    """A text as HTML whose names may be broken after dots and underscores, such as "geometry.base_radius"."""
+    return text if isinstance(text, Markup) else _NAME.sub(r"\1<wbr>", escape(text))
 
 
 def figure(picture: str, caption: str) -> str:
@@ -57,5 +66,5 @@ def figure(picture: str, caption: str) -> str:
 
 
 def as_markup(text: str) -> str:
-    """A text as HTML."""
-    return text if isinstance(text, Markup) else escape(text)
+    """A text as HTML, in which no line ends within a word of the command line, such as "--loaded"."""
+    return text if isinstance(text, Markup) else _OPTION.sub(r'<span class="option">\g<0></span>', escape(text))

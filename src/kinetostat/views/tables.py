@@ -21,7 +21,7 @@ from rich.measure import Measurement
 from rich.table import Column, Table
 from rich.text import Text
 
-from kinetostat.display import ENGINEERING, Display
+from kinetostat.display import ENGINEERING, Display, without_round_off
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts, parameters, values
@@ -82,9 +82,10 @@ class _ColumnWidths:
     """A column with the widths that it may have."""
 
     def __init__(self, column: Column) -> None:
-        self.texts = [
-            cell.copy() if isinstance(cell, Text) else Text(str(cell)) for cell in (column.header, *column.cells)
-        ]
+        cells = [*column.cells]
+        self.texts = [cell.copy() if isinstance(cell, Text) else Text(str(cell)) for cell in (column.header, *cells)]
+        for text, shown in zip(self.texts[1:], without_round_off([*map(str, cells)]), strict=True):
+            text.plain = shown
         self.numeric = column.justify == "right"
         lines = [line for text in self.texts for line in text.plain.split("\n")]
         parts = lines if column.no_wrap else [word for line in lines for word in line.split(" ")]

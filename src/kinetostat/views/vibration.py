@@ -11,6 +11,7 @@ from kinetostat.machine.machine import pose_of
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
 from kinetostat.vibration.coupling import FreeTool
+from kinetostat.views.analysis_tables import first_names
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 
@@ -27,7 +28,7 @@ def masses_of(answer: Vibration) -> str:
     text = f"{answer.machine.display.show(answer.moving_mass, 'kg')} move."
     if not answer.uncounted:
         return text
-    return f"{text} Nothing says the mass of {', '.join(answer.uncounted)}: they count as massless."
+    return f"{text} Nothing says the mass of {first_names(answer.uncounted)}: they count as massless."
 
 
 def loads_of(answer: Vibration) -> str:

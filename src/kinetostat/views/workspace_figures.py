@@ -33,7 +33,7 @@ from kinetostat.studies.workspace_verdicts import (
     phrase,
     surface,
 )
-from kinetostat.views.figures import COLOURS, Drawings, fill_regions, new_figure, set_axis_scales, slim_bar
+from kinetostat.views.figures import COLOURS, Drawings, fill_regions, flatten, new_figure, set_axis_scales, slim_bar
 from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.levels import WIDE_RATIO, usual_range
 from kinetostat.views.question import Drawing
@@ -120,6 +120,7 @@ def _sections(
                 panel.set_title(_at(cut, _varied_coordinate(cuts, across)))
         for panel in panels[len(cuts) :]:
             panel.remove()
+        flatten(figure, panels[0], 0.85 * wide * rows)
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(
             handles=[*_patches(cuts, labels), *_lines(conditions, edges)],

@@ -62,7 +62,7 @@ class DrivesPanel(Panel):
                 CurveView("curves of the drives over the time of the motion").classes("tall").mark("drives-curves")
             )
             self.further = ui.html("", sanitize=False).style("flex: none").mark("drives-further")
-        self.content.set_visibility(False)
+        self._show_content(False)
 
     def shows(self, report: Report) -> bool:
         return report.answered
@@ -103,7 +103,7 @@ class DrivesPanel(Panel):
 
     def _deliver(self, _request: MotionRequest, new: DriveLoads | str) -> None:
         self._answer = None if isinstance(new, str) or new.curves is None else new
-        self.content.set_visibility(self._answer is not None)
+        self._show_content(self._answer is not None)
         self.further.set_content("")
         if isinstance(new, str) or new.curves is None:
             self.about.set_content(paragraph((new if isinstance(new, str) else new.message) or NO_MOTION))
@@ -113,6 +113,11 @@ class DrivesPanel(Panel):
         self.further.set_content("".join(paragraph(text) for text in others))
         self.place.set_value(0)
         self._draw()
+
+    def _show_content(self, shown: bool) -> None:
+        """Show the curves with what chooses them, where there is a motion."""
+        self.content.set_visibility(shown)
+        self.kind.set_visibility(shown)
 
     def _draw(self) -> None:
         """Draw the curves that are chosen, and mark the time."""

@@ -23,7 +23,14 @@ from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import actuator_table, entry_unit, matrix_units
-from kinetostat.views.loaded_tables import leg_loads, springs_of, stability_of, tangent_table
+from kinetostat.views.loaded_tables import (
+    actuator_sentence,
+    leg_loads,
+    sag_sentence,
+    springs_of,
+    stability_of,
+    tangent_table,
+)
 from kinetostat.views.report.content import as_table
 from kinetostat.views.tables import headline, requirement_lines
 
@@ -198,9 +205,9 @@ def load_text(analysis: Analysis) -> str:
     actuators = as_table(actuator_table(load, display), "")
     return (
         heading("Tool point")
-        + table("tool point", ["", "load", "deflection"], tool)
+        + table("tool point", ["", "load", "deflection"], tool, "aligned")
         + heading("Actuators")
-        + table("actuators", actuators.heads, actuators.rows)
+        + table("actuators", actuators.heads, actuators.rows, "aligned")
     )
 
 
@@ -214,11 +221,12 @@ def loaded_text(state: LoadedState) -> str:
     ]
     springs = as_table(springs_of(state, display), "")
     return (
-        paragraph(f"{state.message} {stability_of(state)}", "lead")
+        paragraph(" ".join([state.message, sag_sentence(state), actuator_sentence(state)]).rstrip(), "lead")
         + heading("Which legs carry")
         + tension_bars(state)
+        + paragraph(stability_of(state))
         + heading("Displacement of the tool point")
-        + table("displacement", ["", "under load", "to first order"], moved)
+        + table("displacement", ["", "under load", "to first order"], moved, "aligned")
         + _tangents(state)
         + heading("Springs")
         + table("springs", springs.heads, springs.rows)
@@ -228,7 +236,9 @@ def loaded_text(state: LoadedState) -> str:
 def tension_bars(state: LoadedState) -> str:
     """A bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
     shown = leg_loads(state)
-    largest = {turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (0, 1)}
+    largest = {
+        turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (False, True)
+    }
     rows, legs = [], {}
     for name, spring in shown:
         load = "slack" if spring.slack else state.machine.display.show(spring.load, "N·m" if spring.turning else "N")

@@ -31,6 +31,7 @@ MODES, RESPONSE = "Modes", "Response"
 CUT = "the cut"
 """Name of the direction across the cut, in the place of a component."""
 HEADS = ["frequency", "tool", "modal mass", "most strain energy", "most kinetic energy"]
+COMPUTING = "Natural frequencies, modes and the response of the tool are being computed ..."
 MASS = "tool.mass"
 NO_MASS = "Nothing says what this machine weighs, and so its natural frequencies are not known."
 MASS_HINT = (
@@ -90,6 +91,11 @@ class VibrationPanel(Panel):
 
     def show(self, report: Report, session: Session) -> None:
         self._report, self._session, self._front = report, session, True
+        if self._name != session.machine.name:  # numbers of the same machine change in their places
+            self._name = ""
+            self.mass.set_visibility(False)
+            self.content.set_visibility(False)
+            self.about.set_content(paragraph(COMPUTING, "lead"))
         self._modes.ask(session.machine)
 
     def leave(self) -> None:

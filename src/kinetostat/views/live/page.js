@@ -323,13 +323,14 @@ const addressFields = () => new URLSearchParams(location.hash.slice(1));
 async function openAddress() {
   const own = JSON.parse($("machine").textContent), given = addressFields().get(MACHINE);
   if (!given && !own) {
-    $("status").textContent = "This page shows the machine that its address describes, and this address describes none.";
+    $("status").textContent = "This page shows the machine that its address describes, and this address describes none: kinetostat export MACHINE --to link writes one.";
+    document.body.classList.add("closed");
     return;
   }
   try {
     openMachine(globalThis.opened = await functionsOf(given ? await inflated(given) : own));
-    document.body.classList.remove("closed");
   } catch (error) {
+    document.body.classList.add("closed");
     $("status").textContent = `The machine in this address cannot be opened: ${error.message}.`;
     $("status").classList.add("bad");
   }

@@ -5,7 +5,7 @@ function pictureOf(canvas, { drawing, planar, length }, first) {
   const start = { ...view }, SIDES = 14, LIGHT = unit([0.35, -0.5, 0.8]);
   const PLATES = { base: { rim: 3.6, thick: 1.7, away: 2.3 }, platform: { rim: 2.9, thick: 1.3, away: 2.3 } };
   const radius = drawing.radius;
-  let middle = [0, 0, 0], reach = 1, places = null;
+  let middle = [0, 0, 0], reach = 1, places = null, corners = [];
 
   function unit(a) { const size = Math.hypot(...a); return a.map((value) => value / size); }
   const plus = (a, b, factor = 1) => a.map((value, k) => value + factor * b[k]);
@@ -26,6 +26,20 @@ function pictureOf(canvas, { drawing, planar, length }, first) {
     const [low, high] = [Math.min, Math.max].map((end) => [0, 1, 2].map((k) => end(...seen.map((p) => p[k]))));
     middle = mean([low, high]);
     reach = Math.hypot(...plus(high, low, -1)) / 2 || length;
+    corners = seen;
+  }
+  // Pixels from the middle to the reach, so that all points of the first pose fit with what surrounds them, seen as at first.
+  function fitting(box, far) {
+    const [ca, sa, ce, se] = [Math.cos(start.azimuth), Math.sin(start.azimuth), Math.cos(start.elevation), Math.sin(start.elevation)];
+    const edge = (4.5 * radius) / reach; // of plates, beyond the joints
+    let [wide, high] = [0.3, 0.3];
+    for (const p of corners) {
+      const d = plus(p, middle, -1).map((value) => value / reach), out = ca * d[0] + sa * d[1];
+      const nearer = far / (far - reach * (ce * out + se * d[2]));
+      wide = Math.max(wide, nearer * (Math.abs(ca * d[1] - sa * d[0]) + edge));
+      high = Math.max(high, nearer * (Math.abs(ce * d[2] - se * out) + edge));
+    }
+    return Math.min((0.46 * box.width) / wide, (0.46 * box.height) / high);
   }
 
   function draw(at) {
@@ -35,7 +49,7 @@ function pictureOf(canvas, { drawing, planar, length }, first) {
     pen.scale(ratio, ratio);
     const ink = getComputedStyle(document.documentElement), named = (name) => ink.getPropertyValue(name).trim();
     const accent = rgb(named("--accent")), steel = rgb(named("--steel")), dark = rgb(named("--joint")), plates = rgb(named("--plate"));
-    const size = (Math.min(box.width, box.height) / 2) * 1.05 * view.zoom, far = 5 * reach;
+    const far = 5 * reach, size = fitting(box, far) * view.zoom;
     const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
     const toEye = [ca * ce, sa * ce, se], eye = plus(middle, toEye, far);
     const project = (p) => {

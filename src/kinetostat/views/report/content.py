@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from rich.table import Table as TerminalTable
 
-from kinetostat.display import with_minus_signs
+from kinetostat.display import with_minus_signs, without_round_off
 from kinetostat.frozen import dataclass
 
 
@@ -161,7 +161,7 @@ def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:
         caption: in place of its title.
         split: see `content.Table`.
     """
-    columns = [[str(cell) for cell in column.cells] for column in table.columns]
+    columns = [without_round_off([*map(str, column.cells)]) for column in table.columns]
     numeric = tuple(column.justify == "right" for column in table.columns)
     shown = [
         [typeset(cell) if i or other or _PLAIN_NUMBER.fullmatch(cell) else cell for cell in column]

@@ -9,7 +9,7 @@ from html import escape
 from itertools import count
 from pathlib import Path
 
-from kinetostat.views.page import Markup, whole_page
+from kinetostat.views.page import Markup, as_markup, whole_page
 from kinetostat.views.page import table as plain_table
 from kinetostat.views.report.content import (
     Block,
@@ -76,7 +76,7 @@ class _Writer:
     def _block(self, block: Block) -> str:
         match block:
             case Paragraph(text, lead):
-                return f"<p>{f'<b>{escape(lead)}</b> ' if lead else ''}{escape(text)}</p>"
+                return f"<p>{f'<b>{escape(lead)}</b> ' if lead else ''}{as_markup(text)}</p>"
             case Bullets(items):
                 return f"<ul>{''.join(_point(text, aside) for text, aside in items)}</ul>"
             case Table():
@@ -107,14 +107,14 @@ class _Writer:
             self._live = live_html(block.live)
             stage = f'<div id="live" data-label="{escape(block.caption)} Drag, or use arrow keys, to turn it."></div>'
         caption = f"<b>Figure {next(self._figures)}.</b> {escape(block.caption)}"
-        style = f"max-width:{100 * block.width:g}%"
+        style = f"max-width:{100 * block.width:g}%;--share:{block.width:g}"
         still = f'<div class="still" style="{style}">{picture}</div>'
         return f"<figure>{stage}{still}<figcaption>{caption}</figcaption></figure>"
 
 
 def _point(text: str, aside: str) -> str:
     softer = f' <span class="soft">({escape(aside)})</span>' if aside else ""
-    return f"<li>{escape(text)}{softer}</li>"
+    return f"<li>{as_markup(text)}{softer}</li>"
 
 
 def _png(picture: bytes, caption: str) -> str:

@@ -28,7 +28,7 @@ from kinetostat.views.analysis_tables import (
     shares_table,
     stiffness_table,
 )
-from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.figures import contour_maps, curves, missing_line
 from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.report.content import (
     Block,
@@ -260,9 +260,7 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
         for values, label in (axis_values(maps, d) for d in dims)
     ]
     count = " by ".join(str(maps.sizes[dim]) for dim in dims)
-    failed = failures(maps)
-    without = ", ".join(f"{count:,} {status.word.replace('_', ' ')}" for status, count in failed.items())
-    outcome = f"of {maps['status'].size:,} poses {without}" if failed else "every pose has an answer"
+    outcome = missing_line(failures(maps), maps["status"].size) or "every pose has an answer"
     about = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
     if (maps["status"] != int(Status.OK)).all():
         return [Paragraph(about)]

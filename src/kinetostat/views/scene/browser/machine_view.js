@@ -13,6 +13,7 @@ const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02
 const HANDLES = "handles"; // the layer of what can be pulled
 const TOUCH = "pan-y"; // a finger turns the machine by moving aside, and scrolls the page by moving up or down
 const FILLED = 0.84; // share of the canvas across which the machine may reach
+const SHIFTS = [0, -1, 1, -2, 2, -3, 3, -4, 4]; // by which names of legs may move, in halves of their height
 const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 
 const SLOW = 120; // ms of a frame from which pictures are coarse while something moves, and fine at rest
@@ -358,6 +359,25 @@ export default {
       const frame = this.$el.getBoundingClientRect();
       return [frame.left + ((point.x + 1) / 2) * frame.width, frame.top + ((1 - point.y) / 2) * frame.height];
     },
+    // Moves names of legs up or down that would lie on other labels, the nearest to the camera first; letters of frames stay.
+    spreadLabels() {
+      const { clientWidth: width, clientHeight: height } = this.$el;
+      const shown = Object.values(this.groups).flatMap((group) => group.labels).filter((label) => label.visible);
+      const places = shown.map((label) => {
+        const at = label.getWorldPosition(new THREE.Vector3()).project(this.camera), { userData } = label;
+        userData.size ??= [label.element.offsetWidth, label.element.offsetHeight];
+        const [wide, high] = userData.size, fixed = userData.layer === "frames";
+        return { label, fixed, wide, high, near: fixed ? -2 : at.z, x: ((at.x + 1) / 2) * width, y: ((1 - at.y) / 2) * height };
+      });
+      const placed = [];
+      for (const place of places.sort((a, b) => a.near - b.near)) {
+        const isFree = (shift) => placed.every((other) => Math.abs(place.x - other.x) >= (place.wide + other.wide) / 2
+          || Math.abs(place.y + shift - other.y) >= (place.high + other.high) / 2);
+        const step = place.high / 2, shift = place.fixed ? 0 : (SHIFTS.find((steps) => isFree(steps * step)) ?? 0) * step;
+        place.label.element.style.marginTop = `${shift}px`;
+        placed.push({ ...place, y: place.y + shift });
+      }
+    },
     // Saves the picture as it is, labels included, as a PNG of twice its size on the page.
     save(name) {
       const ratio = this.renderer.getPixelRatio();
@@ -435,7 +455,6 @@ export default {
     span(axis, back, slope) {
       let [low, high] = [-Infinity, -Infinity];
       for (const mesh of this.groups.machine.meshes.values()) {
-        if (UNLIT.has(mesh.userData.layer)) continue;
         mesh.geometry.computeBoundingBox();
         const { min, max } = mesh.geometry.boundingBox;
         for (let corner = 0; corner < 8; corner++) {
@@ -519,6 +538,7 @@ export default {
       this.handles.scale(this.camera, this.size);
       this.renderer.render(this.world, this.camera);
       this.labelRenderer.render(this.world, this.camera);
+      this.spreadLabels();
       this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
       this.$el.dataset.solids = this.groups.machine?.meshes.size ?? 0;
     },
