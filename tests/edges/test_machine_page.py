@@ -174,9 +174,11 @@ def test_a_viewer_without_a_machine_says_what_it_is_for(viewer_page, new_tab):
     watched.tab.goto(viewer_page.as_uri())
     watched.tab.wait_for_function("document.querySelector('#status').textContent")
     assert "the machine that its address describes" in watched.text("#status")
+    assert not watched.tab.locator("main").is_visible(), "controls of no machine"
     watched.tab.goto("about:blank")
     watched.tab.goto(f"{viewer_page.as_uri()}#m=abc")
     watched.tab.wait_for_function("document.querySelector('#status').classList.contains('bad')")
+    assert not watched.tab.locator("main").is_visible(), "controls of no machine"
     assert not watched.complaints
 
 

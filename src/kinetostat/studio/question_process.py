@@ -24,7 +24,7 @@ from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
 from kinetostat.views.question import Description, Drawing, Option, Question, late
 from kinetostat.views.questions import QUESTIONS
-from kinetostat.views.report.content import as_table
+from kinetostat.views.report.content import as_table, typeset
 
 ASKING_PROGRAM = "kinetostat.studio.question_process"
 SECONDS_TO_ANSWER = 3600
@@ -97,7 +97,7 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
     if not description.answered(answer):
         return paragraph(str(answer.message), "lead")
     parts = [
-        f'<p class="note"><b>{escape(head)}</b> {escape(sentence)}</p>'
+        f'<p class="note"><b>{escape(head)}</b> {escape(typeset(sentence))}</p>'
         for head, sentence in description.sentences(answer)
     ]
     parts += [paragraph(f"Note: {doubt}") for doubt in doubts(description.machine_of(answer))]

@@ -213,6 +213,8 @@ class AskTab:
         request = {"word": str(self.choice.value), "options": form.entries(), EVERY_ROW: form.full}
         sent = {name: data for files in form.files.values() for name, data in files.items()}
         self._show_busy(True)
+        if self._folder is None:  # nothing has been answered yet
+            self.answer.set_content("")
         background_tasks.create(self._answer(request, sent), name="studio question")
 
     async def _answer(self, request: dict[str, Any], sent: dict[str, bytes]) -> None:
@@ -236,6 +238,8 @@ class AskTab:
             folder.cleanup()
             self._refuse(problem)
             self._asked = None
+            if self._folder is None:
+                self.answer.set_content(paragraph(NOTHING_ASKED))
             return
         self._forget()
         self._folder = folder

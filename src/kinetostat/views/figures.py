@@ -26,8 +26,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.late import LateModule
 from kinetostat.studies.storage import replacing
-from kinetostat.views.lettering import letter, width_of
+from kinetostat.views.lettering import letter
 from kinetostat.views.levels import levels_of
+from kinetostat.views.map_scales import set_axis_scales, thin_numbers, trim_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,8 +76,6 @@ TITLE_CHARACTERS = 12
 """Of the title over a figure, per inch."""
 MARGIN = 0.04
 """Inches around a figure that stands in a page."""
-MAP_SIZE, LONG_NUMBER = 1.8, 0.3
-"""Width of a map among others without its scales, and of a number that is long below it, inches."""
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""
 MOST_COUNTS = 12
@@ -129,8 +128,8 @@ def contour_maps(dataset: "xr.Dataset", names: Sequence[str], title: str) -> Fig
             lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
             _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
-            _thin_numbers(panel)
-        flatten(figure, figure.axes[0], 1.4 * rows)
+            thin_numbers(panel)
+        trim_height(figure, figure.axes[0], 1.4 * rows)
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
     with mpl.rc_context(STYLE):
@@ -309,38 +308,6 @@ def setting_lines(dataset: "xr.Dataset") -> tuple[str, str, str]:
     missing = missing_line(grid.failures(dataset), dataset["status"].size)
     where = "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text)
     return where, dataset.attrs.get(datasets.LOADS_LEFT_OUT, ""), missing
-
-
-def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) -> None:
-    """Equal scales for two lengths of similar range, logarithmic ones where the grid is."""
-    lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
-    spans = [np.ptp(dataset[name].values) for name in (across, up)]
-    if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:
-        panel.set_aspect("equal")
-    if dataset[across].attrs["log"]:
-        panel.set_xscale("log")
-    if dataset[up].attrs["log"]:
-        panel.set_yscale("log")
-
-
-def flatten(figure: Figure, panel: Axes, height: float) -> None:
-    """Take out of a figure what panels of equal scales leave empty above and below them.
-
-    Args:
-        figure: whose layout is not fixed yet.
-        panel: one of the panels, which are all alike.
-        height: of all rows of panels together if they were square, inches.
-    """
-    if panel.get_aspect() == 1.0:
-        (left, right), (low, high) = panel.get_xlim(), panel.get_ylim()
-        figure.set_figheight(figure.get_figheight() - height * max(0.0, 1.0 - (high - low) / (right - left)))
-
-
-def _thin_numbers(panel: Axes) -> None:
-    """Let long numbers below a map stand apart; Matplotlib counts on three digits, and lets longer ones meet."""
-    wide = width_of(f"{end:.6g}" for end in panel.get_xlim())
-    if wide > LONG_NUMBER and panel.get_xscale() == "linear":
-        panel.locator_params(axis="x", nbins=max(2, int(MAP_SIZE / (1.4 * wide))))
 
 
 def _contour_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale: Scale) -> list[QuadContourSet]:

@@ -29,10 +29,10 @@ from kinetostat.views.figures import (
     missing_line,
     new_figure,
     region_colours,
-    set_axis_scales,
     setting_lines,
 )
 from kinetostat.views.grid import axis_values, frequent_sets, quantities_of
+from kinetostat.views.map_scales import set_axis_scales
 from kinetostat.views.question import Drawing
 
 LEGEND_ROW = 0.17

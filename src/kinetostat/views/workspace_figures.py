@@ -33,9 +33,10 @@ from kinetostat.studies.workspace_verdicts import (
     phrase,
     surface,
 )
-from kinetostat.views.figures import COLOURS, Drawings, fill_regions, flatten, new_figure, set_axis_scales, slim_bar
+from kinetostat.views.figures import COLOURS, Drawings, fill_regions, new_figure, slim_bar
 from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.levels import WIDE_RATIO, usual_range
+from kinetostat.views.map_scales import set_axis_scales, trim_height
 from kinetostat.views.question import Drawing
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
@@ -120,7 +121,7 @@ def _sections(
                 panel.set_title(_at(cut, _varied_coordinate(cuts, across)))
         for panel in panels[len(cuts) :]:
             panel.remove()
-        flatten(figure, panels[0], 0.85 * wide * rows)
+        trim_height(figure, panels[0], 0.85 * wide * rows)
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(
             handles=[*_patches(cuts, labels), *_lines(conditions, edges)],
