@@ -11,6 +11,7 @@ from kinetostat.engine.moving import Path, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import POSE, values, with_values
+from kinetostat.motion.forces import PARTS
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import Motion, read_motion
@@ -123,6 +124,33 @@ def test_forces_change_evenly_over_time_from_line_to_line(tmp_path):
     assert motion.path.loads["load.force.2"] == pytest.approx(expected, abs=1e-13)
 
 
+def test_forces_swing_about_those_of_the_file_as_in_a_table_of_times(tmp_path):
+    """Beside a coordinate that swings twice as fast; the motion goes on for ever; drives feel the same forces."""
+    machine = load("hexapod", [*MASSES, "load.force=[7, 8, 9]"])
+    sines = "field, amplitude, frequency [Hz], phase [deg]\nforce.x, 30 N, 1, 0\nx, 2 mm, 2, 90\nforce.x, 5 N, 2, 90\n"
+    swinging = read(tmp_path, machine, sines)
+    turned = 2.0 * np.pi * swinging.times
+    assert swinging.periodic
+    assert swinging.path.loads.keys() == {"load.force.0"}
+    assert swinging.path.loads["load.force.0"] == pytest.approx(
+        7.0 + 30.0 * np.sin(turned) + 5.0 * np.cos(2.0 * turned)
+    )
+    assert swinging.path.pose["x"] == pytest.approx(0.002 * np.cos(2.0 * turned))
+    answer = drives(machine, swinging)
+    for point in (0, 100, 250):
+        there = {POSE + name: float(rows[point]) for name, rows in swinging.path.pose.items()}
+        held = with_values(machine, {**there, "load.force.0": float(swinging.path.loads["load.force.0"][point])})
+        process = answer.curves.parts[:, PARTS.index("process"), point]
+        assert process == pytest.approx(drives(held, still(swinging, point)).curves.parts[:, PARTS.index("process"), 0])
+
+
+def still(motion, point):
+    """The machine at rest at one point of a motion, twice, with the forces of its file."""
+    pose = {name: np.full(2, rows[point]) for name, rows in motion.path.pose.items()}
+    rest = {name: np.zeros(2) for name in pose}
+    return Motion("rest", np.array([0.0, 1.0]), Path(pose, rest, rest))
+
+
 def test_a_motion_that_ends_with_another_force_does_not_go_on_for_ever(tmp_path):
     rows = ["0, 0, 0", "0.1, 3, 1", "0.2, 5, 1", "0.3, 3, 1", "0.4, 0, 1", "0.5, -2, 1", "0.6, 0, {}"]
     texts = ("\n".join(["time, x [mm], force.z", *rows]).format(last) for last in (0, 2))
@@ -213,11 +241,11 @@ def test_a_named_load_may_vary_and_a_required_motor_feels_it(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time, x, force.w\n0, 0, 1\n1, 0.01, 1\n", 'force.w" is not a field'),
+        ("time, x, force.w\n0, 0, 1\n1, 0.01, 1\n", r'force.w" is not a field .* did you mean force\.[xyz]\?'),
         ("time, x, force.x [mm]\n0, 0, 1\n1, 0.01, 1\n", "line 2, column force.x.*not a unit of force"),
         ("time, x, tool.mass\n0, 0, 1\n1, 0.01, 1\n", "tool.mass does not move; .* forces and moments"),
         ("time, x, gravity_angle\n0, 0, 1\n1, 0.01, 1\n", "does not move"),
-        ("field, amplitude, frequency, force.x\nx, 0.01, 1, 3\n", 'no column "force.x".*with times'),
+        ("field, amplitude, frequency, force.x\nx, 0.01, 1, 3\n", 'no column "force.x".*in the column field'),
         (
             "feed, acceleration, shape, x, force.x\n1, 1, line, 0, 0\n1, 1, through, 0.01, 0\n1, 1, arc, 0.02, 0\n",
             "a line",

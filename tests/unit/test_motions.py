@@ -103,7 +103,9 @@ def test_quaternions_turn_on_past_half_a_turn(tmp_path):
         ("feed, acceleration, shape, x\n1, 1, line, 0\n1, 1, spline, 1\n", "not a shape"),
         ("feed, acceleration, x\n1, 1, 0\n1, 1, 0\n", "nothing moves"),
         ("time, base_radius\n0, 0.1\n1, 0.2\n", "does not move"),
-        ("field, amplitude, frequency\nw, 1, 1\n", "not a coordinate"),
+        ("field, amplitude, frequency\nw, 1, 1\n", '"w" is not a field.*its pose are x, y, z'),
+        ("field, amplitude, frequency\ntool.mass, 1, 1\n", "tool.mass does not swing; write a coordinate"),
+        ("field, amplitude [mm], frequency\nforce.x, 1, 1\n", "amplitude of force.x is .* not a unit of force"),
         ("field, amplitude\nx, 1\n", "no column frequency"),
     ],
 )

@@ -131,13 +131,18 @@ POSE = "pose."
 
 
 def shown(path: str) -> str:
-    """Return a path as people read it: coordinates of the pose by their names alone (x), all others in full."""
+    """Return a path as people read it: coordinates of the pose by their names alone (x), entries by their axes."""
+    return named_entry(path.removeprefix(POSE))
+
+
+def data_name(path: str) -> str:
+    """Return a path as data have it, where entries have numbers: x, load.force.2."""
     return path.removeprefix(POSE)
 
 
 def dimension(path: str) -> str:
     """Return the name of a field in datasets, which has no dots and so can be an attribute: x, geometry_base_angle."""
-    return shown(path).replace(".", "_")
+    return data_name(path).replace(".", "_")
 
 
 def parameters(family: HasFields) -> tuple[Parameter, ...]:
@@ -206,7 +211,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
     near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
-    hint = f"did you mean {near[0]}?" if near else rest
+    hint = f"did you mean {named_entry(near[0])}?" if near else rest
     raise InputError(f'"{given}" is not a field of family {family.name}; {hint}')
 
 

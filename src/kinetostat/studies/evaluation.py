@@ -19,6 +19,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import data_name
 from kinetostat.spec.errors import several
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
@@ -113,7 +114,7 @@ def as_csv(answers: PoseAnswers) -> str:
     """
     columns: dict[str, Sequence[Any]] = {"pose": range(1, answers.poses.count + 1)}
     for field, values in zip(answers.poses.fields, answers.poses.values, strict=True):
-        columns[_head(field.shown, field.unit)] = values.tolist()
+        columns[_head(data_name(field.path), field.unit)] = values.tolist()
     columns["status"] = [Status(code).word for code in answers.status.tolist()]
     for name, values in answers.values.items():
         columns[_head(name, QUANTITIES[name].unit)] = ["" if math.isnan(value) else value for value in values.tolist()]

@@ -23,7 +23,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
-from kinetostat.machine.parameters import POSE, named_entry, values
+from kinetostat.machine.parameters import POSE, find, named_entry, values
 from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
@@ -357,30 +357,29 @@ def _moves(
 
 
 def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
-    """Sines about the pose of the machine: of shakers and flight simulators, theory (96)."""
+    """Sines about the pose of the machine and about its loads: of shakers and flight simulators, theory (96)."""
     for name in given:
         if name not in (FIELD, "amplitude", "frequency", "phase"):
             raise InputError(
-                f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase. "
-                "Forces that vary are columns of a motion with times or a feed rate."
+                f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase. What "
+                "swings, a coordinate of the pose or a force, stands in the column field of its line."
             )
     for name in ("amplitude", "frequency"):
         if name not in given:
             raise InputError(f"a motion of sines has no column {name}; add one, e.g. amplitude, frequency [Hz].")
-    here = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
-    names = [path.removeprefix(POSE) for path in here]
+    here = {
+        path: float(value) for path, value in values(machine).items() if path.startswith(POSE) or _LOAD.fullmatch(path)
+    }
     rows = []
     for number, word in enumerate(given[FIELD].entries):
-        name = str(word).strip().removeprefix(POSE)
-        if name not in names:
-            raise InputError(f"{shorten(word)} is not a coordinate of the pose; write one of {', '.join(names)}.")
-        unit = given["amplitude"].unit
+        word = str(word).strip()
+        path = _swinging(machine, word)
         one_row = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in given.items()}
-        field = GivenColumn(name, one_row["amplitude"].entries, unit)
-        amplitude = read_columns(machine, [field], _place).values[0][0]
+        field = GivenColumn(word, one_row["amplitude"].entries, given["amplitude"].unit)
+        amplitude = read_columns(machine, [field], lambda name, _: f"amplitude of {name}").values[0][0]
         frequency = column_values(one_row["frequency"], Quantity("frequency", "", positive=True), _place)[0]
         phase = column_values(one_row["phase"], Quantity("angle", ""), _place)[0] if "phase" in given else 0.0
-        rows.append((name, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
+        rows.append((path, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
     fastest, slowest = max(row[2] for row in rows), min(row[2] for row in rows)
     if fastest > MOST_PERIODS * slowest:
         raise InputError(
@@ -388,15 +387,34 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
         )
     count = max(points, int(np.ceil(AROUND_SINES * fastest / slowest)))
     times = np.linspace(0.0, 2.0 * np.pi / slowest, count + 1)
-    pose = {name: np.full(times.shape, here[POSE + name]) for name in names}
-    rates, gains = ({name: np.zeros(times.shape) for name in names} for _ in range(2))
-    for name, amplitude, turning, phase in rows:
+    swinging = {path for path, *_ in rows}
+    moved = {
+        path: np.full(times.shape, value) for path, value in here.items() if path.startswith(POSE) or path in swinging
+    }
+    rates, gains = ({path: np.zeros(times.shape) for path in moved} for _ in range(2))
+    for path, amplitude, turning, phase in rows:
         angle = turning * times + phase
-        pose[name] = pose[name] + amplitude * np.sin(angle)
-        rates[name] = rates[name] + amplitude * turning * np.cos(angle)
-        gains[name] = gains[name] - amplitude * turning**2 * np.sin(angle)
+        moved[path] = moved[path] + amplitude * np.sin(angle)
+        rates[path] = rates[path] + amplitude * turning * np.cos(angle)
+        gains[path] = gains[path] - amplitude * turning**2 * np.sin(angle)
     closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
-    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(pose, rates, gains), closes)
+    parts = [
+        {path.removeprefix(POSE): part[path] for path in part if path.startswith(POSE)}
+        for part in (moved, rates, gains)
+    ]
+    loads = {path: column for path, column in moved.items() if not path.startswith(POSE)}
+    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(*parts, loads), closes)
+
+
+def _swinging(machine: Machine, word: str) -> str:
+    """The path of what swings: a coordinate of the pose, or a component of a force or moment on the platform."""
+    field = find(machine.family, word)
+    if not (field.path.startswith(POSE) or _LOAD.fullmatch(field.path)):
+        raise InputError(
+            f"{field.shown} does not swing; write a coordinate of the pose, or a component of a force or moment such "
+            "as force.x."
+        )
+    return field.path
 
 
 def _number_of(number: int, what: str) -> str:

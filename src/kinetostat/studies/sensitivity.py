@@ -28,7 +28,7 @@ from kinetostat.kinetostatics.quantities import (
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, parameters, shown, values
+from kinetostat.machine.parameters import Parameter, data_name, parameters, values
 from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
@@ -180,7 +180,7 @@ class Sensitivity(ImmutableAnswer):
         import pandas as pd  # takes long to load
 
         heads = [f"{name} {what}" for what in ("derivative", "percent") for name in self.quantities]
-        rows = [[shown(p.path), p.value, *p.derivatives, *p.percents] for p in self.parameters]
+        rows = [[data_name(p.path), p.value, *p.derivatives, *p.percents] for p in self.parameters]
         return pd.DataFrame(rows, columns=["parameter", "value", *heads]).set_index("parameter")
 
     def __repr__(self) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.display import DASH, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter
+from kinetostat.machine.parameters import Parameter, data_name
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
@@ -68,7 +68,7 @@ def command_csv(answer: Command, corrections: bool = False) -> str:
     columns: dict[str, Any] = {"pose": range(1, len(answer.coordinates) + 1)}
     if answer.poses is not None:
         for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
-            columns[f"{field.shown} [{field.unit}]"] = values
+            columns[f"{data_name(field.path)} [{field.unit}]"] = values
     tables = {"": answer.coordinates} | ({" correction": answer.corrections} if corrections else {})
     for what, table in tables.items():
         for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=True):
