@@ -18,7 +18,7 @@ from kinetostat import load
 from kinetostat.engine import kernel, program_files
 from kinetostat.engine.batch import function_of
 from kinetostat.engine.form import Specimen, form_of, objectives_of
-from kinetostat.engine.kernel import Recipe, program_of
+from kinetostat.engine.kernel import Recipe, program_of, recipe_of
 from kinetostat.engine.machine_code import SELF_LINKED, MachineCode, Program, machine_code_of
 from kinetostat.engine.native import host_lanes, object_file_of
 from kinetostat.engine.program_files import HASH_SIZE, SECRET, read_program, write_program
@@ -329,7 +329,7 @@ def test_a_system_that_does_not_say_its_processor_keeps_nothing(folder, monkeypa
 
 def recipe(machine) -> Recipe:
     form, _ = form_of(machine, ["pose.z"])
-    return Recipe(objectives_of, Specimen(machine), form, (((("stiffness_x", 1.0),),), None, False))
+    return recipe_of(objectives_of, Specimen(machine), form, objectives=((("stiffness_x", 1.0),),), closed=False)
 
 
 def test_families_that_a_program_registers_stay_off_the_disk(folder):

@@ -23,10 +23,10 @@ from kinetostat.engine.kernel import (
     FallingBack,
     Fill,
     Identical,
-    Recipe,
     closes_inside,
     program_columns,
     program_of,
+    recipe_of,
 )
 from kinetostat.engine.loaded import StatePrograms
 from kinetostat.engine.modes import modes_at_rest
@@ -326,14 +326,22 @@ class _Routes:
 
     def _program(self, weights: tuple[Weights, ...], closed: bool) -> Runnable:
         """The program of the objectives and their derivatives, or without weights that of the closing equations."""
-        limited, stepping, judged = False, False, True
-        known = self._modes, limited, self._plan, stepping, judged, self._mode_counts
-        trace, arguments = (
-            (objectives_of, (weights, self._differentiated, closed, *known))
-            if weights
-            else (equations_of, (self._differentiated,))
+        kind, paths = Specimen(self._machine), self._differentiated
+        if not weights:
+            return program_of(recipe_of(equations_of, kind, self._form, paths=paths), self._native)
+        recipe = recipe_of(
+            objectives_of,
+            kind,
+            self._form,
+            objectives=weights,
+            paths=paths,
+            closed=closed,
+            modes=self._modes,
+            limited=False,
+            plan=self._plan,
+            mode_counts=self._mode_counts,
         )
-        return program_of(Recipe(trace, Specimen(self._machine), self._form, arguments), self._native)
+        return program_of(recipe, self._native)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:

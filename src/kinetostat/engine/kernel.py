@@ -84,27 +84,32 @@ class Recipe:
     """All that decides what a program is, before anything is traced: programs of equal recipes are the same.
 
     Attributes:
-        trace: the function of `form` that traces it.
-        kind: of the machine.
+        trace: the function that traces it, such as `objectives_of`.
+        kind: the kind of machine.
         form: how its parameters enter.
-        arguments: of the function, after these two.
+        arguments: names and values of the further arguments of the function, by name.
     """
 
     trace: Callable[..., TracedFormula]
     kind: Specimen
     form: Form
-    arguments: tuple[Any, ...]
+    arguments: tuple[tuple[str, Any], ...]
 
     @property
     def text(self) -> str | None:
-        """All of it in a text that is the same in every process; None of families that programs have registered."""
+        """The recipe as a text that is the same in every process; None for families that programs have registered."""
         machine = self.kind.machine
         family = family_text(machine.family)
         return family and repr((self.trace.__name__, family, machine.loaded, self.form, self.arguments))
 
     def formula(self) -> TracedFormula:
         """Trace it."""
-        return self.trace(self.kind, self.form, *self.arguments)
+        return self.trace(self.kind, self.form, **dict(self.arguments))
+
+
+def recipe_of(trace: Callable[..., TracedFormula], kind: Specimen, form: Form, **arguments: Any) -> Recipe:
+    """Return the recipe of the program that `trace(kind, form, **arguments)` traces."""
+    return Recipe(trace, kind, form, tuple(sorted(arguments.items())))
 
 
 @lru_cache(PROGRAMS_KEPT)
@@ -186,13 +191,10 @@ def program_fill(
     """
     form, fixed = form_of(machine, varying)
     objectives = tuple(((name, 1.0),) for name in quantities)
-    arguments: tuple[Any, ...] = (objectives, None, closed)
-    plan = plan_for(machine, quantities, varying)
-    if plan is not None or not judged:
-        arguments = (*arguments, 0, True, plan, False, judged)
     kind = Specimen(at_home(machine, varying) if closed else machine)
-    program = program_of(Recipe(objectives_of, kind, form, arguments))
-    return ProgramFill(machine, form, fixed, program, closed)
+    plan = plan_for(machine, quantities, varying)
+    recipe = recipe_of(objectives_of, kind, form, objectives=objectives, closed=closed, plan=plan, judged=judged)
+    return ProgramFill(machine, form, fixed, program_of(recipe), closed)
 
 
 def program_columns(

@@ -19,11 +19,11 @@ from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
     FallingBack,
     Fill,
-    Recipe,
     closes_inside,
     program_columns,
     program_fill,
     program_of,
+    recipe_of,
 )
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cables import cable_numbers
@@ -241,10 +241,13 @@ class RestFill:
         kind = Specimen(at_home(machine, paths))
         objectives = tuple(((name, 1.0),) for name in quantities)
         self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
-        self._first = program_of(Recipe(step_of, kind, self._form, (closed, True)))
-        self._chord = program_of(Recipe(step_of, kind, self._form, (closed, False, True))) if legs else None
-        arguments = (objectives, None, closed, 0, True, plan_for(machine, quantities, paths), legs)
-        self._step = program_of(Recipe(objectives_of, kind, self._form, arguments))
+        step = partial(recipe_of, step_of, kind, self._form, closed=closed)
+        self._first = program_of(step(first=True))
+        self._chord = program_of(step(chord=True)) if legs else None
+        plan = plan_for(machine, quantities, paths)
+        self._step = program_of(
+            recipe_of(objectives_of, kind, self._form, objectives=objectives, closed=closed, plan=plan, stepping=legs)
+        )
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
@@ -333,7 +336,8 @@ class StatePrograms:
 
     def _step(self, first: bool) -> Runnable:
         with self._making:  # threads that need a program at the same time wait until it is there
-            return program_of(Recipe(step_of, self._kind, self._form, (self._closed, first)), self._native)
+            recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, first=first)
+            return program_of(recipe, self._native)
 
     def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
         """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.

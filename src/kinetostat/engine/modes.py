@@ -18,7 +18,7 @@ from kinetostat.engine.form import (
     traced_joints,
     traced_machine,
 )
-from kinetostat.engine.kernel import Recipe, program_of
+from kinetostat.engine.kernel import program_of, recipe_of
 from kinetostat.engine.trace import Traced
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinetostatics.response import respond
@@ -42,7 +42,7 @@ def modes_at_rest(
     Returns:
         The modes as further columns of programs of quantities: an array [points] for each of their numbers.
     """
-    program = program_of(Recipe(spring_parts_of, Specimen(machine), form, (closed, True)), native=False)
+    program = program_of(recipe_of(spring_parts_of, Specimen(machine), form, closed=closed, at_rest=True), native=False)
     points, sizes = len(given[0]), sizes_over_springs(machine)
     parts = np.empty((program.rows, points))
     program.run(fixed, given, parts, np.empty(points, dtype=np.int8))

@@ -22,7 +22,7 @@ from kinetostat.engine.form import (
     traced_joints,
     traced_machine,
 )
-from kinetostat.engine.kernel import Recipe, closes_inside, program_columns, program_of
+from kinetostat.engine.kernel import closes_inside, program_columns, program_of, recipe_of
 from kinetostat.equilibrium.state import MachineState, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import within_reach
@@ -215,7 +215,8 @@ def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
 def _run(form: RigidForm, path: Path, joints: bool, closed: bool) -> tuple[Array, Codes]:
     machine, varying = form.machine, path.columns
     shape, fixed = form_of(machine, list(varying))
-    program = program_of(Recipe(motion_of, Specimen(machine), shape, (form.plan, len(form.masses), joints, closed)))
+    options = {"plan": form.plan, "links": len(form.masses), "joints_too": joints, "closed": closed}
+    program = program_of(recipe_of(motion_of, Specimen(machine), shape, **options))
     given = program_columns(machine, shape, varying, path.size, closed)
     given += [
         np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in path.pose
