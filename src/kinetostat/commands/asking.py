@@ -149,16 +149,14 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     files = options.output if question.suffixes else []
     for path in files:
         choice(path.suffix.lower(), question.suffixes, f'the suffix of "{path}"')
-    given = {option.name: getattr(options, option.name) for option in question.options}
-    settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
-    machine = load_machine(options, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
-    given = {name: value for name, value in given.items() if value not in (None, [])}  # else the function's defaults
+    overrides, arguments = question.arguments({each.name: getattr(options, each.name) for each in question.options})
+    machine = load_machine(options, overrides)
     try:
         if question.reports_progress:
             with search_bar(question.slow) as update:
-                answer = question.answer(machine, **given, progress=partial(_advance, update))
+                answer = question.answer(machine, **arguments, progress=partial(_advance, update))
         else:
-            answer = question.answer(machine, **given)
+            answer = question.answer(machine, **arguments)
     except InputError as error:
         raise InputError(_in_words(question, str(error))) from None
     return show_answer(options, answer, to_files=bool(question.suffixes))

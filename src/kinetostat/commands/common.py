@@ -135,12 +135,11 @@ def takes_settings(command: Parser, meaning: str) -> None:
     command.add_argument("--set", metavar="PATH=VALUE", action="append", default=[], dest="settings", help=meaning)
 
 
-def takes_ranges(command: Parser, meaning: str, required: bool = False) -> None:
+def takes_ranges(command: Parser, meaning: str) -> None:
     """Give a command `--over`: coordinates of the pose and their ranges."""
     command.add_argument(
-        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges", required=required,
-        help=meaning,
-    )  # fmt: skip
+        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges", help=meaning
+    )
 
 
 def takes_output(command: Parser, what: str) -> None:

@@ -1,7 +1,5 @@
 """The results of an analysis as a labelled dataset, and as files: NetCDF, CSV and MATLAB. Nothing is computed here."""
 
-import csv
-import io
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -26,7 +24,7 @@ from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.units import KINDS
-from kinetostat.views.data_forms import no_formula
+from kinetostat.views.data_forms import csv_text, no_formula
 
 UNITS = {
     "stiffness": ("N·m/rad", "N/rad", "N/m"),
@@ -205,15 +203,11 @@ def write_lines(path: Path, dataset: xr.Dataset, unit: Unit) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CSV_HEADER)
-    for key in ABOUT:
-        writer.writerow(("about", key, no_formula(str(dataset.attrs[key])), "", ""))
+    rows = [("about", key, no_formula(str(dataset.attrs[key])), "", "") for key in ABOUT]
     for quantity, row, column, value in _lines(dataset):
         shown = "" if value != value else repr(value)
-        writer.writerow((quantity, no_formula(row), no_formula(column), shown, unit(quantity, row, column)))
-    write_text(path, text.getvalue())
+        rows.append((quantity, no_formula(row), no_formula(column), shown, unit(quantity, row, column)))
+    write_text(path, csv_text(CSV_HEADER, rows))
 
 
 def _lines(dataset: xr.Dataset) -> Iterator[Line]:

@@ -382,8 +382,8 @@ def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int
     rate: Scalar = math.inf
     for wrench, speed in zip(given.wrenches, speeds, strict=True):
         part = abs(wrench.components()[row])
-        square, whole = _components_in_newtons(wrench, shrink)[row], _components_in_newtons(wrench, shrink)
-        felt = square * square > UNREACHED_COMPONENT * total([c * c for c in whole])
+        components = _components_in_newtons(wrench, shrink)
+        felt = components[row] * components[row] > UNREACHED_COMPONENT * total([c * c for c in components])
         rate = smaller(where(felt, speed * reciprocal(where(felt, part, 1.0)), math.inf), rate)
     return _where_structure_allows(given, row, rate)
 

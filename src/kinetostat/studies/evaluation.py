@@ -1,11 +1,7 @@
-"""Quantities of a machine at poses that a user gives: arrays and CSV. `datasets` makes labelled arrays of them."""
+"""Quantities of a machine at poses that a user gives, as arrays. `datasets` makes labelled arrays of them."""
 
-import csv
-import io
-import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +13,7 @@ from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import data_name
 from kinetostat.spec.errors import several
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
@@ -104,26 +98,3 @@ def answers_at(
 def _state_and_cables(machine: Identical) -> tuple[MachineState, int]:
     """The state of a machine at its pose, kept with everything that it has computed, and the number of cables."""
     return state_of(machine.value), cable_count(machine.value)
-
-
-def as_csv(answers: PoseAnswers) -> str:
-    """Write answers as CSV in SI, which `kinetostat path` can read again.
-
-    A row has the number of the pose (from 1), its fields, its status in a word, and its quantities. A quantity is
-    empty where the status is not ok; infinity, of a rigid or a free direction, is "inf".
-    """
-    columns: dict[str, Sequence[Any]] = {"pose": range(1, answers.poses.count + 1)}
-    for field, values in zip(answers.poses.fields, answers.poses.values, strict=True):
-        columns[_head(data_name(field.path), field.unit)] = values.tolist()
-    columns["status"] = [Status(code).word for code in answers.status.tolist()]
-    for name, values in answers.values.items():
-        columns[_head(name, QUANTITIES[name].unit)] = ["" if math.isnan(value) else value for value in values.tolist()]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue()
-
-
-def _head(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit not in ("", "1") else name

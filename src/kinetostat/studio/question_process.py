@@ -130,12 +130,9 @@ def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
     """
     question: Question = late(QUESTIONS[choice(request["word"], QUESTIONS, "the question")][1])
     reports = {"progress": tell} if question.reports_progress else {}
-    given = values_of(question, request["options"])
-    settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
-    given = {name: value for name, value in given.items() if value not in (None, [])}  # else the function's defaults
+    overrides, arguments = question.arguments(values_of(question, request["options"]))
     try:
-        machine = load(MACHINE_FILE, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
-        answer = question.answer(machine, **given, **reports)
+        answer = question.answer(load(MACHINE_FILE, overrides), **arguments, **reports)
     except InputError as error:
         raise InputError(in_words_of_the_page(question, str(error))) from None
     description = description_of(answer)

@@ -74,11 +74,16 @@ def columns_csv(columns: Mapping[str, Iterable[Any]]) -> str:
 
     Texts that a spreadsheet would take for a formula have an apostrophe before them.
     """
+    heads = [no_formula(head) for head in columns]
+    return csv_text(heads, (map(_cell, row) for row in zip(*columns.values(), strict=True)))
+
+
+def csv_text(heads: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Write rows of cells as CSV below a row of heads."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([no_formula(head) for head in columns])
-    for row in zip(*columns.values(), strict=True):
-        writer.writerow([_cell(value) for value in row])
+    writer.writerow(heads)
+    writer.writerows(rows)
     return text.getvalue()
 
 
@@ -117,12 +122,11 @@ def csv_of(description: Description, answer: Any) -> str:
     shown, items = [part for part in records.fields if "csv" in part.forms], records.of(answer)
     entries = {part.key: _entries(part, items) for part in shown}
     heads = [head for part in shown for head in _heads(part, entries[part.key])]
-    rows = io.StringIO(newline="")
-    writer = csv.writer(rows, lineterminator="\n")
-    writer.writerow([records.axis, *heads])
-    for number, item in enumerate(items, 1):
-        writer.writerow([number, *(cell for part in shown for cell in _cells(part, item, entries[part.key]))])
-    return rows.getvalue()
+    rows = (
+        [number, *(cell for part in shown for cell in _cells(part, item, entries[part.key]))]
+        for number, item in enumerate(items, 1)
+    )
+    return csv_text([records.axis, *heads], rows)
 
 
 def _entries(part: Field, items: Sequence[Any]) -> list[str] | None:

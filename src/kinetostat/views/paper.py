@@ -3,8 +3,6 @@
 The page stands alone: no script, no request, pictures inside. Numbers and verdicts come from `studies.paper`.
 """
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
@@ -28,6 +26,7 @@ from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVe
 from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
 from kinetostat.studies.storage import write_text
 from kinetostat.views.answers import write_files
+from kinetostat.views.data_forms import csv_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import Tell, as_svg, contour_maps, curves, save
 from kinetostat.views.optimisation import designs_dataset
@@ -158,11 +157,7 @@ def _numbers_table(comparisons: Sequence[PaperNumber]) -> Any:
 
 
 def _csv(rows: Sequence[PaperNumber | EquationCheck | Claim]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(rows[0])])
-    writer.writerows(astuple(row) for row in rows)
-    return text.getvalue()
+    return csv_text([field.name for field in fields(rows[0])], map(astuple, rows))
 
 
 VERDICT_MARKS = {

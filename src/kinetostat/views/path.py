@@ -1,5 +1,6 @@
 """Quantities at the poses of a file: the question, and the description of its answer. Nothing is computed here."""
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,11 @@ from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import data_name
 from kinetostat.studies.evaluation import PoseAnswers, answers_at
 from kinetostat.studies.poses import read_poses
 from kinetostat.studies.quantities import usual_quantities
+from kinetostat.views.data_forms import csv_text
 from kinetostat.views.question import (
     DISPLACED,
     LOADS_LEFT_OUT,
@@ -74,6 +77,25 @@ def at_poses_of(machine: Machine, poses: Path, progress: Progress, quantities: S
     return answers_at(machine, read_poses(machine, poses), wanted, progress)
 
 
+def _csv(answer: PoseAnswers) -> str:
+    """Write answers as CSV in SI, which `kinetostat path` can read again.
+
+    A row has the number of the pose (from 1), its fields, its status in a word, and its quantities. A quantity is
+    empty where the status is not ok; infinity, of a rigid or a free direction, is "inf".
+    """
+    columns: dict[str, Sequence[Any]] = {"pose": range(1, answer.poses.count + 1)}
+    for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
+        columns[_head(data_name(field.path), field.unit)] = values.tolist()
+    columns["status"] = [Status(code).word for code in answer.status.tolist()]
+    for name, values in answer.values.items():
+        columns[_head(name, QUANTITIES[name].unit)] = ["" if math.isnan(value) else value for value in values.tolist()]
+    return csv_text(columns, zip(*columns.values(), strict=True))
+
+
+def _head(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
 PATH = Description(
     title="Along the poses",
     fields=(
@@ -88,7 +110,7 @@ PATH = Description(
     lines=_lines,
     tables=_tables,
     figures="views.grid_figures.path_figures",
-    makers={"csv": "studies.evaluation.as_csv", "nc": "studies.datasets.as_dataset"},
+    makers={"csv": _csv, "nc": "studies.datasets.as_dataset"},
     state=lambda _answer: "",
     answered=lambda answer: answer.answered,
 )
