@@ -398,12 +398,13 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
         rates[path] = rates[path] + amplitude * turning * np.cos(angle)
         gains[path] = gains[path] - amplitude * turning**2 * np.sin(angle)
     closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
-    parts = [
+    coordinates, coordinate_rates, accelerations = (
         {path.removeprefix(POSE): part[path] for path in part if path.startswith(POSE)}
         for part in (moved, rates, gains)
-    ]
+    )
     loads = {path: column for path, column in moved.items() if not path.startswith(POSE)}
-    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, MovedPath(*parts, loads), closes)
+    moved_path = MovedPath(coordinates, coordinate_rates, accelerations, loads)
+    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, moved_path, closes)
 
 
 def _swinging(machine: Machine, word: str) -> str:

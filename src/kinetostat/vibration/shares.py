@@ -71,7 +71,7 @@ def _moving_parts(
 ) -> Iterator[tuple[Masses, list[PartRates], Array, ElasticLeg | None]]:
     """The masses of the platform and of each leg, their rates, and the modes over the coordinates of these rates.
 
-    Yields:
+    Returns:
         Masses, rates, modes [coordinates x modes], and the leg; None for the platform.
     """
     mechanism, state, shapes = equations.mechanism, equations.state, solution.shapes[:, : solution.ringing]
