@@ -1,5 +1,6 @@
 """The command as a process: `kinetostat`, or `python -m kinetostat`. What it does is in `cli`."""
 
+import gc
 import os
 import signal
 import sys
@@ -7,6 +8,9 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Matrices of machines are small: threads of the linear algebra wait for each other longer than they compute, and forty
 # times as long where the processor has other work. Batches are spread over threads by the engine.
+gc.set_threshold(100_000, *gc.get_threshold()[1:])
+# Libraries make half a million objects that stay as long as the process. Python would look through them for garbage
+# hundreds of times, which takes a sixth of their import.
 CODE = 130
 """Exit code of a command that Ctrl-C has stopped."""
 

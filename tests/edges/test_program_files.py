@@ -301,8 +301,8 @@ def test_every_source_that_formulas_are_made_of_counts():
         for path, _, _ in program_files._sources(str(Path(folder) / room), deep=bool(room))
     }
     assert {"tolerances.py", "algebra/solve.py", "machine/written/family.py", "machine/catalogue/hexapod.py"} <= names
-    tree = ast.parse(Path(kernel.__file__).read_text("utf-8"))
-    imported = {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    trees = [ast.parse(path.read_text("utf-8")) for path in Path(kernel.__file__).parent.glob("*.py")]
+    imported = {str(node.module) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     rooms = {name.split(".")[1] for name in imported if name.startswith("kinetostat.")}
     assert rooms <= {*program_files.ROOMS, *(name.removesuffix(".py") for name in names)}
 

@@ -11,21 +11,28 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.kernel import FallingBack, Fill, Identical, ProgramFill, fill_some, slab_fill
-from kinetostat.engine.loaded import Way, loaded_fill, way_of
 from kinetostat.engine.points import ConsecutivePoints, Points, Population
-from kinetostat.equilibrium.numbers import states_of_rest
-from kinetostat.equilibrium.state import states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinetostatics.quantities import needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
+
+if TYPE_CHECKING:
+    from kinetostat.engine import loaded
+    from kinetostat.equilibrium import numbers
+    from kinetostat.equilibrium import state as machine_state
+else:
+    loaded, numbers = LateModule("kinetostat.engine.loaded"), LateModule("kinetostat.equilibrium.numbers")
+    machine_state = LateModule("kinetostat.equilibrium.state")
 
 NUMPY_SLAB = 4096
 """Points per NumPy call, so that intermediate arrays stay in the second level of the cache."""
@@ -135,7 +142,7 @@ def function_of(
     key, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)
     if not _needs_state(key, quantities):
         return _function(key, paths, quantities, judged=judged)
-    return _function(key, paths, quantities, way_of(machine, paths, quantities, count))
+    return _function(key, paths, quantities, loaded.way_of(machine, paths, quantities, count))
 
 
 @lru_cache(FUNCTIONS_KEPT)
@@ -145,9 +152,13 @@ def _needs_state(machine: Identical, quantities: tuple[str, ...]) -> bool:
 
 @lru_cache(FUNCTIONS_KEPT)
 def _function(
-    machine: Identical, paths: tuple[str, ...], quantities: tuple[str, ...], way: Way | None = None, judged: bool = True
+    machine: Identical,
+    paths: tuple[str, ...],
+    quantities: tuple[str, ...],
+    way: "loaded.Way | None" = None,
+    judged: bool = True,
 ) -> Function:
-    method = partial(slab_fill, judged=judged) if way is None else partial(loaded_fill, way=way)
+    method = partial(slab_fill, judged=judged) if way is None else partial(loaded.loaded_fill, way=way)
     fill = by_free_springs(machine.value, paths, quantities, method)
     return Function(fill, paths, len(quantities), way.slab if way else None)
 
@@ -315,11 +326,11 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
 def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
     """The comparisons of points with their limits, slab by slab, with the part of the points that each slab is."""
     size, judged_at_rest = len(next(iter(columns.values()))), "actuators" in rest_numbers(machine, ())
-    slab = Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
+    slab = loaded.Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
     for start in range(0, size, slab):
         part = slice(start, min(start + slab, size))
         with np.errstate(all="ignore"):
             here = {path: column[part] for path, column in columns.items()}
-            state = states_at(machine, here, part.stop - start)
-            loads = states_of_rest(state).loads if judged_at_rest else ()
+            state = machine_state.states_at(machine, here, part.stop - start)
+            loads = numbers.states_of_rest(state).loads if judged_at_rest else ()
             yield part, (*state.free.checks, *load_checks(state.machine, state.configuration, loads))

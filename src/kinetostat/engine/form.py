@@ -6,7 +6,7 @@ Nothing is compiled or evaluated here, and nothing depends on a machine's number
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.engine.trace import ORDINARY_SIZE, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
-from kinetostat.equilibrium.reduced import reduced_machine
-from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, closing_equations, within_reach
 from kinetostat.kinematics.closure import CLOSED_FORMS
@@ -25,6 +23,7 @@ from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, needs_motion, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
 from kinetostat.machine.leg import Leg
@@ -32,11 +31,18 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.motion.response import response_in_motion
-from kinetostat.motion.rigid import MotionPlan, plan_of
 from kinetostat.spec.errors import InputError
-from kinetostat.vibration.reduced import free_frequencies, frequencies_at, lowest_frequencies
-from kinetostat.vibration.slopes import vibrating
-from kinetostat.vibration.springwise import ModeCounts, SpringMotions, motions_without_loads
+
+if TYPE_CHECKING:
+    from kinetostat.equilibrium import reduced
+    from kinetostat.equilibrium import state as machine_state
+    from kinetostat.motion import rigid
+    from kinetostat.vibration import reduced as vibrations
+    from kinetostat.vibration import slopes, springwise
+else:  # most programs are of machines that are free and stand still
+    reduced, machine_state = LateModule("kinetostat.equilibrium.reduced"), LateModule("kinetostat.equilibrium.state")
+    vibrations, slopes = LateModule("kinetostat.vibration.reduced"), LateModule("kinetostat.vibration.slopes")
+    rigid, springwise = LateModule("kinetostat.motion.rigid"), LateModule("kinetostat.vibration.springwise")
 
 
 @dataclass(frozen=True)
@@ -177,10 +183,10 @@ def objectives_of(
     closed: bool = False,
     modes: int = 0,
     limited: bool = True,
-    plan: MotionPlan | None = None,
+    plan: "rigid.MotionPlan | None" = None,
     stepping: bool = False,
     judged: bool = True,
-    mode_counts: ModeCounts | None = None,
+    mode_counts: "springwise.ModeCounts | None" = None,
 ) -> TracedFormula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the code is not OK.
 
@@ -207,37 +213,38 @@ def objectives_of(
     coordinates: tuple[Traced, ...] = ()
     wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights], limited)
     if wanted:
-        equations = reduced_machine(given.machine, response, joints)
+        equations = reduced.reduced_machine(given.machine, response, joints)
         coordinates = new_inputs(given.graph, equations.size)
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
         loaded, status = equations.numbers(there, wanted, response)
         if mode_counts is not None and mode_counts.at_rest:
-            motions = SpringMotions(equations.cut, there)
+            motions = springwise.SpringMotions(equations.cut, there)
             known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
             coordinates = (*coordinates, *(column for mode in known for column in mode))
             status = where(motions.sure, status, int(Status.NOT_CONVERGED))
             if mode_counts.loaded:
-                loaded["frequency"] = lowest_frequencies([motions.square(mode) for mode in known[: mode_counts.loaded]])
+                squares = [motions.square(mode) for mode in known[: mode_counts.loaded]]
+                loaded["frequency"] = vibrations.lowest_frequencies(squares)
             if mode_counts.factor:
                 loaded["factor"] = motions.factor(known[-1])
         if "frequency" in wanted and "frequency" not in loaded:
-            loaded["frequency"] = frequencies_at(equations.cut, there, bool(paths))
+            loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, bool(paths))
         response = replace(response, loaded=loaded, status=status)
     if mode_counts is not None and mode_counts.free:
-        motions = motions_without_loads(given.machine, response, joints)
+        motions = springwise.motions_without_loads(given.machine, response, joints)
         known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
         coordinates = (*coordinates, *(column for mode in known for column in mode))
-        squares = lowest_frequencies([motions.square(mode) for mode in known])
+        squares = vibrations.lowest_frequencies([motions.square(mode) for mode in known])
         status = where(motions.sure, response.status, int(Status.SINGULAR))
         response = replace(response, frequencies=squares, status=status)
     elif modes:
-        vibration = vibrating(given.machine, response, joints, modes)
-        unknowns = new_inputs(given.graph, vibration.columns)
-        coordinates = (*coordinates, *unknowns)
-        response = replace(response, frequencies=lowest_frequencies(vibration.squares(unknowns)))
+        vibration = slopes.vibrating(given.machine, response, joints, modes)
+        coordinates = (*coordinates, *(unknowns := new_inputs(given.graph, vibration.columns)))
+        response = replace(response, frequencies=vibrations.lowest_frequencies(vibration.squares(unknowns)))
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
-        response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
+        squares = vibrations.free_frequencies(given.machine, response, joints, bool(paths))
+        response = replace(response, frequencies=squares)
     names = [name for weights in objectives for name, _ in weights]
     response = response_in_motion(given.machine, response, joints, plan, names)
     code = response.status if judged else response.joint_status
@@ -248,7 +255,7 @@ def objectives_of(
     return formula_of(given, columns, results, result_of(code), paths, coordinates)
 
 
-def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()) -> MotionPlan | None:
+def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()) -> "rigid.MotionPlan | None":
     """Decide at the pose of a machine which motions its programs count with; None where quantities need none.
 
     Args:
@@ -266,13 +273,13 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
         return None
     stiff = {leaf for parameter in parameters(machine.family) if parameter.quantity.stiff for leaf in parameter.leaves}
     free = [path for path in changing if path in stiff and values(machine)[path] == 0.0]
-    state = MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
+    state = machine_state.MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(
             f"{machine.name} has no place at the pose of its file, which needs one for accelerations and friction of "
             f"joints; change [pose]. {state.refusal}"
         )
-    return plan_of(state.machine, state.configuration, state.joints)
+    return rigid.plan_of(state.machine, state.configuration, state.joints)
 
 
 def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False, chord: bool = False) -> TracedFormula:
@@ -289,7 +296,7 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False, chord
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
-    equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
+    equations = reduced.reduced_machine(given.machine, respond(given.machine, joints), joints)
     coordinates = () if first else new_inputs(given.graph, equations.size)
     step = equations.chord_step if chord else equations.step
     stepped, square = equations.start() if first else step([*coordinates])

@@ -236,7 +236,10 @@ def _name(text: str) -> str | None:
     return hashlib.blake2b(f"{surroundings}\n{text}".encode(), digest_size=20).hexdigest()
 
 
-ROOMS = ("spec", "algebra", "machine", "numerics", "kinematics", "kinetostatics", "equilibrium", "vibration", "engine")
+ROOMS = (
+    *("spec", "algebra", "machine", "numerics", "kinematics", "kinetostatics", "equilibrium", "vibration", "motion"),
+    "engine",
+)
 """Folders of kinetostat on which programs depend, beside the files above them."""
 
 

@@ -7,6 +7,7 @@ Source: theory (92) and (105). Over scalars; at the tool point, base axes.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.screw import Twist
@@ -14,15 +15,20 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import needs_masses, needs_motion
 from kinetostat.kinetostatics.response import Response
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.motion.operators import MachineAtPose, at_pose, loads_by_acceleration
-from kinetostat.motion.rigid import MotionPlan, RigidLeg
+
+if TYPE_CHECKING:
+    from kinetostat.motion import operators
+    from kinetostat.motion.rigid import MotionPlan, RigidLeg
+else:
+    operators = LateModule("kinetostat.motion.operators")
 
 SIZE = 6
 
 
 def response_in_motion(
-    machine: Machine, response: Response, joints: Joints | None, plan: MotionPlan | None, names: Collection[str]
+    machine: Machine, response: Response, joints: Joints | None, plan: "MotionPlan | None", names: Collection[str]
 ) -> Response:
     """The response with what quantities need of the rigid parts of the machine in motion.
 
@@ -37,14 +43,14 @@ def response_in_motion(
         return response
     if plan is None:
         return replace(response, lost_motion_of_joints=[0.0] * SIZE)
-    here = at_pose(machine, response.configuration, joints, plan)
+    here = operators.at_pose(machine, response.configuration, joints, plan)
     # Fewer drives than motions hold nothing.
     are_enough = len(here.rigid.drives) >= len(here.rigid.ways or range(SIZE))
-    loads = loads_by_acceleration(here) if needs_masses(names) and are_enough else None
+    loads = operators.loads_by_acceleration(here) if needs_masses(names) and are_enough else None
     return replace(response, acceleration_loads=loads, lost_motion_of_joints=lost_motion_of_joints(here, response))
 
 
-def lost_motion_of_joints(here: MachineAtPose, response: Response) -> list[Scalar]:
+def lost_motion_of_joints(here: "operators.MachineAtPose", response: Response) -> list[Scalar]:
     """Motion of the tool, rx ry rz x y z, that friction of passive joints holds back where all of them reverse.
 
     A joint that moves by q under a unit load on the tool moves the tool by q, along this load, under a unit moment of
@@ -100,7 +106,7 @@ def _halves(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return Vector(*components[:3]), Vector(*components[3:])
 
 
-def _lost_motion_of_leg(leg: RigidLeg, motion: Twist, length: Scalar) -> Scalar:
+def _lost_motion_of_leg(leg: "RigidLeg", motion: Twist, length: Scalar) -> Scalar:
     """Motion, m or rad, that friction of the joints of a leg holds back, whose end moves so far per unit of a load."""
     scaled = [*motion.rotational.components(), *(motion.translational * (1.0 / length)).components()]
     rates = [total([a * b for a, b in zip(row, scaled, strict=True)]) for row in leg.rates_by_twist[: leg.passive]]

@@ -14,7 +14,8 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, set_title
+from kinetostat.views.layout import fix_layout
 
 THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 VIEW_MARGIN = 0.12

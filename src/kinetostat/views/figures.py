@@ -18,7 +18,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
+from PIL import Image
 
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_minus_signs, with_unit
@@ -26,7 +26,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.late import LateModule
 from kinetostat.studies.storage import replacing
-from kinetostat.views.lettering import letter
+from kinetostat.views.layout import fix_layout, steady_ticks
 from kinetostat.views.levels import levels_of
 from kinetostat.views.map_scales import set_axis_scales, thin_numbers, trim_height
 
@@ -41,6 +41,7 @@ else:  # figures of other answers need no xarray, which takes as long to import 
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
+    "text.hinting": "no_hinting",
     "font.size": 8.0,
     "axes.titlesize": 9.0,
     "axes.titley": 1.0,  # no panel has ticks above it; else each one is measured twice more, whenever a title is placed
@@ -201,11 +202,12 @@ def _png_of(figure: Figure) -> bytes:
     made with knows the sizes of all texts.
     """
     canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
-    height, width = pixels.shape[:2]
+    with steady_ticks(figure.axes):
+        canvas.draw()  # type: ignore[no-untyped-call]
+    width, height = canvas.get_width_height()
+    pixels = Image.frombuffer("RGBA", (width, height), canvas.buffer_rgba()).convert("RGB")  # type: ignore[no-untyped-call]
     lines = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each begins with the number of its filter
-    lines[:, 1:] = pixels.reshape(height, 3 * width)
+    lines[:, 1:] = np.asarray(pixels).reshape(height, 3 * width)
     parts = {
         b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),
         b"pHYs": struct.pack(">IIB", *2 * (round(figure.dpi / METRES_PER_INCH),), 1),
@@ -231,49 +233,6 @@ def look_of(place: int) -> dict[str, Any]:
     """Colour and dash of a curve by its place among others; no two of the first 36 look alike."""
     turn, colour = divmod(place, len(COLOURS))
     return {"color": COLOURS[colour], "linestyle": DASHES[(colour + turn) % len(DASHES)]}
-
-
-def fix_layout(figure: Figure) -> None:
-    """Lay out once, not again for each file format, and without drawing anything for it."""
-    FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
-    letter(figure)
-    if layout := figure.get_layout_engine():
-        for panel in figure.axes:
-            panel.get_tightbbox = _Surroundings(panel).box  # type: ignore[method-assign, assignment]
-        layout.execute(figure)
-        for panel in figure.axes:
-            del panel.get_tightbbox
-    figure.set_layout_engine("none")
-    for panel in figure.axes:
-        panel.apply_aspect()
-
-
-class _Surroundings:
-    """The labels and numbers around a panel, measured again only where other numbers come along its axes.
-
-    The layout asks for it three times, of which all but the first find the same labels around another place. Legends
-    and texts need not move with the edges of their panel: where there are some, all is measured each time.
-    """
-
-    def __init__(self, panel: Axes) -> None:
-        self._panel = panel
-        self._measure: Any = panel.get_tightbbox
-        self._moves = bool(panel.get_legend() or panel.texts or panel.artists or panel.child_axes)
-        self._numbers: tuple[bytes, ...] = ()
-        self._beyond = np.zeros((2, 2))
-
-    def box(self, renderer: Any, **options: Any) -> Any:
-        """Return the box of the panel with its labels, pixels; arguments are those of Matplotlib's `get_tightbbox`."""
-        panel = self._panel
-        if self._moves or not panel.get_visible():
-            return self._measure(renderer, **options)
-        locator: Any = panel.get_axes_locator()  # None where the figure has not placed the panel itself
-        panel.apply_aspect(locator(panel, renderer) if locator else None)
-        numbers = tuple(np.asarray(axis.get_majorticklocs()).tobytes() for axis in (panel.xaxis, panel.yaxis))
-        if numbers != self._numbers:
-            self._beyond = self._measure(renderer, **options).get_points() - panel.bbox.get_points()
-            self._numbers = numbers
-        return Bbox(panel.bbox.get_points() + self._beyond)
 
 
 def set_title(figure: Figure, title: str) -> None:
@@ -391,16 +350,17 @@ def slim_bar(bar: Colorbar) -> None:
 
 def _write_levels(lines: QuadContourSet) -> None:
     """Write the values of lines where they fit into the panel; the layout of the figure must be fixed."""
-    frame = lines.axes.get_window_extent()
-    trial = lines.clabel(fontsize=6, fmt="%.6g", inline=False)
-    fitting = []
-    for text in trial:
-        box = text.get_window_extent()
-        if frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1):
-            fitting.append(text.get_position())
-        text.remove()
-    if fitting:
-        lines.clabel(fontsize=6, fmt="%.6g", manual=fitting)
+    frame, uncut = lines.axes.get_window_extent(), [*lines.get_paths()]
+    texts = lines.clabel(fontsize=6, fmt="%.6g")
+    boxes = [text.get_window_extent() for text in texts]
+    fitting = [frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1) for box in boxes]
+    if not all(fitting):
+        for text in texts:
+            text.remove()
+        lines.set_paths(uncut)
+        if any(fitting):
+            places = [text.get_position() for text, fits in zip(texts, fitting, strict=True) if fits]
+            lines.clabel(fontsize=6, fmt="%.6g", manual=places)
 
 
 def _note(panel: Axes, text: str) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -12,11 +12,11 @@ from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
+from kinetostat.late import LateModule
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import named_entry, shown
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.carrying import Carrying, carrying_legs
 from kinetostat.studies.datasets import LOADS_LEFT_OUT as LEFT_OUT_ATTRIBUTE
 from kinetostat.studies.grid import GridQuestion, answer, failures, field_of, grid_question
 from kinetostat.studies.quantities import usual_quantities
@@ -34,6 +34,11 @@ from kinetostat.views.question import (
     ranges_option,
 )
 from kinetostat.views.tables import FittedTable, numeric_table
+
+if TYPE_CHECKING:
+    from kinetostat.studies import carrying as carrying_study
+else:  # it needs states of rest, which most maps do not
+    carrying_study = LateModule("kinetostat.studies.carrying")
 
 MOST_ROWS_OF_A_SWEEP = 60
 """Rows of a sweep that are printed one by one; of longer ones and of maps, the extremes."""
@@ -231,7 +236,7 @@ def _stored_tables(stored: StoredGrid, _full: bool) -> Iterator[FittedTable]:
     yield _extremes_table(size, stored.tally.extremes, question.machine.display)
 
 
-def frequent_sets(carrying: Carrying) -> Iterator[tuple[str, int]]:
+def frequent_sets(carrying: "carrying_study.Carrying") -> Iterator[tuple[str, int]]:
     """Name each frequent set of legs that carry, and how many points it has; all others together."""
     for legs, count in list(zip(carrying.sets, carrying.points, strict=True))[:MOST_NAMED_SETS]:
         yield "all" if legs == carrying.legs else ", ".join(legs) or "none", count
@@ -239,14 +244,14 @@ def frequent_sets(carrying: Carrying) -> Iterator[tuple[str, int]]:
         yield f"{len(rare):,} other sets", sum(rare)
 
 
-def _set_tables(carrying: Carrying, _full: bool) -> Iterator[FittedTable]:
+def _set_tables(carrying: "carrying_study.Carrying", _full: bool) -> Iterator[FittedTable]:
     table = numeric_table(size_of(carrying.dataset), "legs that carry", ["points", "share"])
     for name, count in frequent_sets(carrying):
         table.add_row(name, f"{count:,}", f"{100.0 * count / carrying.dataset['status'].size:.3g} %")
     yield table
 
 
-def _sets(carrying: Carrying) -> list[dict[str, Any]]:
+def _sets(carrying: "carrying_study.Carrying") -> list[dict[str, Any]]:
     return [{"legs": legs, "points": count} for legs, count in zip(carrying.sets, carrying.points, strict=True)]
 
 
@@ -316,7 +321,7 @@ def map_or_carrying_legs(
     progress: Progress,
     quantities: Sequence[str] = (),
     carrying: bool = False,
-) -> xr.Dataset | Carrying:
+) -> "xr.Dataset | carrying_study.Carrying":
     """Evaluate quantities over two parameters or more, or find which legs carry there.
 
     Raises:
@@ -328,7 +333,7 @@ def map_or_carrying_legs(
         raise InputError(TWO_OF_A_MAP)
     if quantities:
         raise InputError(CARRYING_ALONE)
-    return carrying_legs(machine, ranges, progress)
+    return carrying_study.carrying_legs(machine, ranges, progress)
 
 
 SWEEP_QUESTION = Question(

@@ -5,6 +5,7 @@ Nothing is computed here.
 
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -17,7 +18,6 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import named_entry
-from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
@@ -34,6 +34,9 @@ from kinetostat.views.figures import (
 from kinetostat.views.grid import axis_values, frequent_sets, quantities_of
 from kinetostat.views.map_scales import set_axis_scales
 from kinetostat.views.question import Drawing
+
+if TYPE_CHECKING:
+    from kinetostat.studies.carrying import Carrying
 
 LEGEND_ROW = 0.17
 """Height of a line of the legend below a map, inches."""
@@ -69,14 +72,14 @@ def stored_figures(stored: StoredGrid) -> dict[str, Drawing]:
     return grid_figures(dataset, f"{dataset.attrs['machine']} (thinned)")
 
 
-def carrying_figures(carrying: Carrying) -> dict[str, Drawing]:
+def carrying_figures(carrying: "Carrying") -> dict[str, Drawing]:
     """Return the map of which legs carry; a grid over one field has none."""
     caption, title = "Regions in which the same legs carry.", f"{carrying.machine.name}: legs that carry"
     draw = partial(carrying_map, carrying, title=title)
     return {"map": Drawing(caption, draw, file="carrying")} if carrying.is_map else {}
 
 
-def carrying_map(carrying: Carrying, title: str) -> Figure:
+def carrying_map(carrying: "Carrying", title: str) -> Figure:
     """Draw the regions in which each set of legs carries, over the two dimensions of the grid."""
     dataset = carrying.dataset
     across, up = (str(dim) for dim in dataset["status"].dims)

@@ -16,7 +16,8 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import Loop, flat, loop, views_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, new_figure, set_title
+from kinetostat.views.figures import COLOURS, STYLE, look_of, new_figure, set_title
+from kinetostat.views.layout import fix_layout
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.question import Drawing
