@@ -19,8 +19,9 @@ from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import _Surroundings, contour_maps, curves, save_figure
+from kinetostat.views.figures import contour_maps, curves, save_figure
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
+from kinetostat.views.layout import _Surroundings
 from kinetostat.views.levels import levels_of
 from refusals import refused
 

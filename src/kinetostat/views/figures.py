@@ -66,6 +66,8 @@ FORMATS: dict[str, Any] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDa
 PNG_LEVEL = 3
 """Of the compression; a higher one takes twice the time for a tenth of the size."""
 METRES_PER_INCH = 0.0254
+MOST_STEPS = 5
+"""Steps between the numbers along an axis of a map: as many across as up, whatever shape the panel has."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
@@ -276,6 +278,7 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale:
     panel.set_facecolor("#eeeeee")
     panel.grid(visible=False)
     panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
+    panel.locator_params(nbins=MOST_STEPS)
     if values.count() == 0:
         _note(panel, "no result")
         return []
