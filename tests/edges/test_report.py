@@ -13,7 +13,7 @@ from kinetostat import report
 from kinetostat.cli import main
 from kinetostat.commands import report as report_command
 from kinetostat.commands.common import STOPPED
-from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loading import as_toml, bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import extra_command
@@ -21,6 +21,7 @@ from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid import usual_ranges
 from kinetostat.studies.report import REPORT_PARTS
+from kinetostat.studies.requirements import requirements
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.stiffness import Origin
@@ -411,3 +412,19 @@ def test_a_fit_has_a_section_with_its_numbers_and_pictures(tmp_path):
         report(load("hexapod"), tmp_path / "s.html", fit=folder)
     with pytest.raises(InputError, match="cannot be read"):
         report(load("hexapod"), tmp_path / "s.html", fit=tmp_path / "nowhere.json")
+
+
+def test_the_motor_that_a_file_requires_stands_in_its_diagram(tmp_path):
+    """The section shows that motor alone, and says of it what the verdict says."""
+    file = tmp_path / "mine.toml"
+    settings = ["tool.mass=12 kg", "drives.lead=10 mm", "load.gravity=[0, 0, -9.81]"]
+    sines = "field, amplitude, frequency [Hz]\nx, 5 mm, 4\nz, 2 mm, 8\n"
+    required = f'[requirements]\nservo.fits = "yaskawa-sgmp-03b"\nservo.motion = """\n{sines}"""\n'
+    file.write_text(as_toml(load("hexapod", settings)) + required, "utf-8")
+    page = Page(reported(tmp_path / "report.html", str(file), *LESS))
+    motor, fits, *shares, _ratio, _drive = page.table("Share of its limits")[1]
+    (verdict,) = requirements(load(file))
+    assert (motor, fits) == ("yaskawa-sgmp-03b", "yes")
+    assert max(number(share.removesuffix(" %")) for share in shares) == pytest.approx(100.0 * verdict.worst, abs=0.5)
+    assert page.results["motors"]["motors"][0]["fits"] is True
+    assert "Torque and speed of all drives in the diagrams of the motors" in page.text

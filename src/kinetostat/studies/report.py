@@ -37,7 +37,7 @@ from kinetostat.studies.motions import motions_required
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import stored_problem
-from kinetostat.studies.requirements import requirements
+from kinetostat.studies.requirements import required_motors, requirements
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.study_folder import holds_study
 from kinetostat.studies.tensions import tensions
@@ -191,6 +191,12 @@ REPORT_QUESTIONS = (
         "drives",
         lambda known: drives(known.state, known.motion),
         lambda known: known.motion is not None or len(motions_required(known.machine)) == 1,
+        section=True,
+    ),
+    ReportQuestion(
+        "motors",
+        lambda known: required_motors(known.machine),
+        lambda known: any(each.fits for each in known.machine.requirements.values()),
         section=True,
     ),
     ReportQuestion(

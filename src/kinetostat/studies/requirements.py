@@ -33,6 +33,7 @@ from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
 
 if TYPE_CHECKING:
     from kinetostat.studies import motions, motors
+    from kinetostat.studies.drives import DriveLoads
 else:
     motions = LateModule("kinetostat.studies.motions")
     motors = LateModule("kinetostat.studies.motors")
@@ -134,8 +135,24 @@ def motor_requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     return requirements(state_of(replace(state.machine, requirements=about_motors))) if about_motors else ()
 
 
-def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
-    """Judge whether a motor can do a motion: it uses at most its limits, a share of 1."""
+def required_motors(machine: Machine) -> "motors.MotorChoice":
+    """Return the motors that the requirements of a machine's file name, each along its motion.
+
+    The motors are in the order of the file, without its verdicts; none of a motion that the machine cannot make.
+    """
+    pairs = [_motor_along(machine, each)[1:] for each in machine.requirements.values() if each.fits]
+    stuck = next((loads for loads, fit in pairs if fit is None), None)
+    if stuck is not None:
+        return motors.MotorChoice(machine, stuck.status, stuck.message)
+    fits = tuple(fit for _, fit in pairs if fit is not None)
+    told = (f"Of {fit.name}, which is required, the motion uses {motors.share_in_words(fit)}." for fit in fits)
+    return motors.MotorChoice(machine, Status.OK, " ".join(told), fits)
+
+
+def _motor_along(
+    machine: Machine, requirement: Requirement
+) -> "tuple[motions.Motion, DriveLoads, motors.MotorFit | None]":
+    """Return the motion of a requirement, what it asks of the drives, and how the motor fits; None without curves."""
     catalogue = motors.read_catalogue()
     if requirement.catalogue:
         motions.check_lines("catalogue", requirement.catalogue)
@@ -144,9 +161,14 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
     motion = motions.motion_of(requirement, machine)
     geared, inertia = motors.with_transmission(machine, catalogue, requirement.gear, requirement.screw)
     loads = motors.loads_with(geared, catalogue.motors[motor], inertia, motion)
+    return motion, loads, None if loads.curves is None else motors.fit_of(catalogue, motor, loads)
+
+
+def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
+    """Judge whether a motor can do a motion: it uses at most its limits, a share of 1."""
+    motion, loads, fit = _motor_along(machine, requirement)
     worst, place, words, pose = None, "", loads.message, dict[str, float]()
-    if loads.curves is not None:
-        fit = motors.fit_of(catalogue, motor, loads)
+    if loads.curves is not None and fit is not None:
         worst, place = fit.greatest_share, fit.drive
         row = [drive.name for drive in loads.drives].index(fit.drive)
         speeds = fit.hardest[0] == "speed"
@@ -155,7 +177,8 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
         pose = {path: float(rows[point]) for path, rows in motion.path.columns.items()}
         words = f"the motion uses {motors.share_in_words(fit)}, most at {fit.drive}."
     return Verdict(
-        name, f"fits {motor}", "share of the motor's limits", "1", 1.0, motion.path.size, f"along {motion.kind}",
+        name, f"fits {requirement.fits}", "share of the motor's limits", "1", 1.0, motion.path.size,
+        f"along {motion.kind}",
         worst is not None and worst <= 1.0, worst, None if worst is None or math.isinf(worst) else 1.0 - worst, pose,
         place, loads.status.word, int(worst is None or worst > 1.0), words,
     )  # fmt: skip

@@ -438,11 +438,12 @@ export default {
       const back = new THREE.Vector3(...VIEWS[view]).normalize();
       const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
       const up = new THREE.Vector3().crossVectors(back, right);
-      const slope = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+      const whole = Math.tan((this.camera.fov * Math.PI) / 360), slope = whole * FILLED;
+      const below = Number(getComputedStyle(this.$el).getPropertyValue("--below")) || 0; // share that words stand on
       const [aside, wide] = this.span(right, back, slope * this.camera.aspect);
-      const [above, high] = this.span(up, back, slope);
-      const target = this.centre.clone().addScaledVector(right, aside).addScaledVector(up, above);
+      const [above, high] = this.span(up, back, slope * (1 - below));
       const distance = Math.max(wide, high);
+      const target = this.centre.clone().addScaledVector(right, aside).addScaledVector(up, above - below * whole * distance);
       this.camera.position.copy(target).addScaledVector(back, distance);
       this.camera.near = distance / 100;
       this.camera.far = distance * 20;
