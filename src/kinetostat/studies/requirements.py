@@ -145,8 +145,8 @@ def required_motors(machine: Machine) -> "motors.MotorChoice":
     if stuck is not None:
         return motors.MotorChoice(machine, stuck.status, stuck.message)
     fits = tuple(fit for _, fit in pairs if fit is not None)
-    told = (f"Of {fit.name}, which is required, the motion uses {motors.share_in_words(fit)}." for fit in fits)
-    return motors.MotorChoice(machine, Status.OK, " ".join(told), fits)
+    sentences = (f"Of {fit.name}, which is required, the motion uses {motors.share_in_words(fit)}." for fit in fits)
+    return motors.MotorChoice(machine, Status.OK, " ".join(sentences), fits)
 
 
 def _motor_along(
