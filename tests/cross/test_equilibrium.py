@@ -2,13 +2,17 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kinetostat import analyze, build, bundled, command, evaluate, forward, save, sensitivity, under_load
+from kinetostat.equilibrium.balance import balance, free_state, state_after
+from kinetostat.equilibrium.mechanism import FEW_POSES
 from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loads import located_members
 from kinetostat.views.notebook import html_of
@@ -213,6 +217,23 @@ def test_a_table_of_loaded_states_is_each_of_them(name):
             assert float(table[f"tangent_stiffness_{part}"][i]) == pytest.approx(state.tangent[row][row], rel=1e-9)
         assert float(table["load_factor"][i]) == pytest.approx(state.factor, rel=1e-9)
     assert np.isnan(table["slack_springs"][2])
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_legs_of_one_form_together_are_each_of_them_alone(name):
+    """At more than a few poses, legs are evaluated one by one."""
+    mechanism, rng = state_of(load_without_limits(name, [])).mechanism, np.random.default_rng(1)
+    free, many = free_state(mechanism), np.zeros(FEW_POSES + 1, dtype=int)
+    step = rng.uniform(-0.1, 0.1, (1, mechanism.starts[-1]))
+    amounts = rng.uniform(-0.1, 0.1, free.amounts.shape)
+    state = replace(state_after(mechanism, free, step), amounts=amounts)
+    together, alone = balance(mechanism, state), balance(mechanism.at(many), state.at(many))
+    assert together.left[0] == pytest.approx(alone.left[-1], rel=1e-12, abs=1e-14)
+    assert together.by_actuators()[0] == pytest.approx(alone.by_actuators()[-1], rel=1e-12, abs=1e-14)
+    for number in range(len(mechanism.legs)):
+        assert together.leg_rates(number)[0] == pytest.approx(alone.leg_rates(number)[-1], rel=1e-12, abs=1e-14)
+        held, holds = (each.legs[number].holding for each in (together, alone))
+        assert held[0] == pytest.approx(holds[-1], rel=1e-12, abs=1e-14)
 
 
 def test_a_machine_whose_preloads_are_chosen_has_no_derivatives_under_load():

@@ -92,6 +92,26 @@ class LegTerms:
     geometric: Array
     by_given: Array
 
+    def of(self, rows: slice, given: Integers, count: int) -> "LegTerms":
+        """The terms of one of several legs [rows], whose amounts have these numbers among `count` of the machine."""
+
+        def of_machine(values: Array) -> Array:
+            result = np.zeros((*values[rows].shape[:-1], count))
+            result[..., given] = values[rows]
+            return result
+
+        return LegTerms(
+            Motions(self.end.rotation[rows], self.end.translation[rows]),
+            self.rates[rows],
+            of_machine(self.driven),
+            self.loads[rows],
+            of_machine(self.holding),
+            self.carrying[rows],
+            self.left[rows],
+            self.geometric[rows],
+            of_machine(self.by_given),
+        )
+
 
 def leg_terms(
     leg: ElasticLeg,
@@ -295,12 +315,21 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     """Evaluate the equations of equilibrium at a state."""
     ways = mechanism.ways
     load, change = platform_load(mechanism, state.platform)
-    terms, carried, left = [], np.zeros_like(load), []
     amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
-    for leg, coordinates, wrench in zip(mechanism.legs, state.coordinates, state.wrenches, strict=True):
-        terms.append(leg_terms(leg, coordinates, wrench, amounts, mechanism.gravity))
-        carried = carried + wrench
-        left += [terms[-1].left, -closing_gap(state.platform, terms[-1].end) @ ways]
-    return Balance(
-        mechanism, state, tuple(terms), np.concatenate([(carried - load) @ ways, *left], axis=1), load, change
-    )
+    terms: dict[int, LegTerms] = {}
+    gaps: dict[int, Array] = {}
+    for legs in mechanism.like_legs:
+        driven = np.concatenate([amounts[:, given] for given in legs.given])
+        coordinates, wrenches = (
+            np.concatenate([of[k] for k in legs.numbers]) for of in (state.coordinates, state.wrenches)
+        )
+        every = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (len(legs.numbers), 1)))
+        gap = closing_gap(state.platform.at(np.tile(np.arange(len(load)), len(legs.numbers))), every.end)
+        for place, number in enumerate(legs.numbers):
+            rows = slice(len(load) * place, len(load) * (place + 1))
+            terms[number], gaps[number] = every.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
+    numbers = range(len(mechanism.legs))
+    left = [part for k in numbers for part in (terms[k].left, gaps[k])]
+    carried = sum(state.wrenches, np.zeros_like(load))
+    whole = np.concatenate([(carried - load) @ ways, *left], axis=1)
+    return Balance(mechanism, state, tuple(terms[k] for k in numbers), whole, load, change)

@@ -12,6 +12,8 @@ Source: theory (35).
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,65 @@ from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.numerics.motions import of_scalars
+
+FEW_POSES = 64
+"""Number of poses up to which legs of one form are evaluated together; more fill the processor's cache alone."""
+
+
+@dataclass(frozen=True)
+class LikeLegs:
+    """Legs of one form as a single leg: all poses of the first of them, then all of the second, and so on.
+
+    At a few poses, time goes into calls of NumPy more than into numbers: six legs take little longer than one.
+
+    Attributes:
+        numbers: numbers of the legs.
+        leg: the leg at all these poses; its given amounts are numbered by themselves.
+        given: number among the machine's given amounts of each of its own [legs x amounts].
+    """
+
+    numbers: tuple[int, ...]
+    leg: ElasticLeg
+    given: Integers
+
+
+def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
+    """Put the legs of one form together: those whose motions, coordinates, signs and places of masses are the same.
+
+    At many poses each leg is left by itself.
+    """
+    groups: dict[Any, list[int]] = {}
+    amounts = [tuple(dict.fromkeys(number for number in leg.chain.given if number >= 0)) for leg in legs]
+    for number, (leg, driven) in enumerate(zip(legs, amounts, strict=True)):
+        given = tuple(driven.index(amount) if amount >= 0 else amount for amount in leg.chain.given)
+        alone = number if len(leg.stiffness) > FEW_POSES else None
+        form = (alone, given, leg.chain.coordinate, leg.chain.twists.shape, leg.sign.tobytes(), leg.masses.carried)
+        groups.setdefault(form, []).append(number)
+    return [
+        LikeLegs(
+            tuple(numbers),
+            _side_by_side([legs[k] for k in numbers], form[1]),
+            np.array([amounts[k] for k in numbers], dtype=np.int64),
+        )
+        for form, numbers in groups.items()
+    ]
+
+
+def _side_by_side(legs: Sequence[ElasticLeg], given: tuple[int, ...]) -> ElasticLeg:
+    """The springs and masses of legs of one form with the poses of one leg after those of the other."""
+
+    def arrays(of: Sequence[Any], *names: str) -> dict[str, Array]:
+        return {name: np.concatenate([getattr(each, name) for each in of]) for name in names}
+
+    first, masses = legs[0], [leg.masses for leg in legs]
+    return replace(
+        first,
+        chain=replace(first.chain, given=given, **arrays([leg.chain for leg in legs], "twists")),
+        masses=replace(masses[0], **arrays(masses, "point", "mass", "uncoupled", "inertia")),
+        rod=None,
+        spin=None,
+        **arrays(legs, "stiffness", "preload", "idle", "rotors", "dampers"),
+    )
 
 
 @dataclass(frozen=True)
@@ -75,6 +136,11 @@ class Mechanism:
             length=self.length[rows],
             force=self.force[rows],
         )
+
+    @cached_property
+    def like_legs(self) -> list[LikeLegs]:
+        """The legs, those of one form together."""
+        return like_legs(self.legs)
 
     @property
     def starts(self) -> list[int]:

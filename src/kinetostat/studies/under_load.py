@@ -6,6 +6,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 import math
 from collections.abc import Sequence
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class LoadedState(ImmutableAnswer):
         state: the machine's state, at the pose that it has without loads.
         rest: whether it comes to rest; whether it stays there, with stable springs and struts that do not buckle; and
             whether it keeps to its limits, those of the loads of its actuators at rest among them.
-        message: what is special about the state of rest, or why there is none.
+        reason: why there is no state of rest; empty where there is one.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
         displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose [n]; empty
             where it comes to no rest.
@@ -87,7 +88,6 @@ class LoadedState(ImmutableAnswer):
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most in that motion.
         struts: compression of each strut whose E I is known, and Euler's load at which it buckles.
-        snapped: whether the springs are stable, but the machine has snapped over to this state while the loads grew.
         residual: largest residual of the equations, as a share of what the load and the legs carry.
         links: links of all legs, with the exact motions of their ends.
         requirements: verdicts on the requirements of the machine's file, if these were judged.
@@ -95,7 +95,7 @@ class LoadedState(ImmutableAnswer):
 
     state: MachineState
     rest: Rest
-    message: str
+    reason: str
     components: tuple[str, ...]
     displacement: Array = field(default_factory=lambda: np.zeros(0))
     linear: Array | None = None
@@ -108,7 +108,6 @@ class LoadedState(ImmutableAnswer):
     mode: Array = field(default_factory=lambda: np.zeros(0))
     mode_legs: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
-    snapped: bool = False
     residual: float = 0.0
     links: tuple[DeflectedLink, ...] = ()
     requirements: tuple[Any, ...] = ()
@@ -117,6 +116,17 @@ class LoadedState(ImmutableAnswer):
     def machine(self) -> Machine:
         """The machine, at the pose that it has without loads."""
         return self.state.machine
+
+    @cached_property
+    def message(self) -> str:
+        """Sentences on what is special about the state of rest, or the reason why there is none."""
+        return self.reason or _about_rest_and_limits(self)
+
+    @property
+    def snapped(self) -> bool:
+        """Whether the springs are stable, but the machine has snapped over to this state while the loads grew."""
+        state = self.state
+        return self.has_rest and state.stands and state.limit is not None and state.limit.is_passed
 
     @property
     def loaded(self) -> bool:
@@ -245,11 +255,10 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
     slack = tuple(dict.fromkeys(spring.leg for spring in springs if spring.slack))
     checks = _limits_at_rest(state)
     stays = stability.stable and not any(strut.bends_away for strut in state.struts)
-    beyond_limits = [] if within(checks) else [why_beyond(checks, machine.display)]
     return LoadedState(
         state=state,
-        rest=Rest.UNSTABLE if not stays else Rest.JOINT_LIMIT if beyond_limits else Rest.OK,
-        message=" ".join([about_rest(state, stability, slack), *beyond_limits]),
+        rest=Rest.UNSTABLE if not stays else Rest.OK if within(checks) else Rest.JOINT_LIMIT,
+        reason="",
         components=machine.family.component_names,
         displacement=_in_si(mechanism, equations.state.platform.amounts()[0], parts),
         linear=_linear(response, mechanism, parts),
@@ -262,10 +271,18 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
         mode=(stability.mode * units)[parts],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
-        snapped=stability.stable and state.limit is not None and state.limit.is_passed,
         residual=float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
         links=loaded_links(equations, response.configuration.legs, response.reference),
     )
+
+
+def _about_rest_and_limits(answer: LoadedState) -> str:
+    """Say what is special about a state of rest, and beyond which limits it is."""
+    state, stability = answer.state, answer.state.stability
+    checks = _limits_at_rest(state)
+    beyond_limits = [] if within(checks) else [why_beyond(checks, answer.machine.display)]
+    about = [] if stability is None else [about_rest(state, stability, answer.slack_legs)]
+    return " ".join([*about, *beyond_limits])
 
 
 def _limits_at_rest(state: MachineState) -> list[Check]:
