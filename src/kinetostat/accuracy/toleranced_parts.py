@@ -174,16 +174,16 @@ def _part(
     except InputError as reason:
         raise InputError(f"{machine.name}: tolerances.{line.about}: {reason}") from None
     return TolerancedPart(
-        tuple(places),
-        _joint(error) if free else error.path,
-        error.words.partition(" along ")[0] if free else error.words,
-        error.kind,
-        error.group,
-        error.leg,
-        line.about,
-        limit,
-        deviation.spread == "normal",
-        line.cost,
+        errors=tuple(places),
+        path=_joint(error) if free else error.path,
+        words=error.words.partition(" along ")[0] if free else error.words,
+        kind=error.kind,
+        group=error.group,
+        leg=error.leg,
+        line=line.about,
+        limit=limit,
+        normal=deviation.spread == "normal",
+        cost=line.cost,
     )
 
 

@@ -85,18 +85,18 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
     resistances = [leg_resistance(leg) for leg in legs]
     shares_of_k = [share for resistance in resistances for share in resistance.shares]
     return Statics(
-        tuple(mode.wrenches for mode in shared.modes),
-        tuple(shared.sharing),
-        tuple(shared.flexibility),
-        tuple(s for leg in legs for s in leg.compliance),
-        tuple(b for b, _ in shares_of_k),
-        tuple(k for _, k in shares_of_k),
-        tuple(shared.motions),
-        tuple(mode for resistance in resistances for mode in resistance.modes),
-        length,
-        shared.singularity_margin,
-        shared.doubt,
-        shared.round_off,
+        wrenches=tuple(mode.wrenches for mode in shared.modes),
+        sharing=tuple(shared.sharing),
+        flexibility=tuple(shared.flexibility),
+        compliance=tuple(s for leg in legs for s in leg.compliance),
+        resistance=tuple(b for b, _ in shares_of_k),
+        stiffness=tuple(k for _, k in shares_of_k),
+        motions=tuple(shared.motions),
+        actions=tuple(mode for resistance in resistances for mode in resistance.modes),
+        length=length,
+        singularity_margin=shared.singularity_margin,
+        doubt=shared.doubt,
+        round_off=shared.round_off,
     )
 
 

@@ -318,17 +318,17 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         answer: the coordinates found at these poses.
     """
     return Command(
-        machine,
-        poses,
-        tuple(actuator.name for actuator in answer.actuators),
-        tuple(actuator.unit for actuator in answer.actuators),
-        answer.coordinates,
-        answer.unloaded,
-        answer.before,
-        answer.left,
-        answer.turned,
-        answer.settled,
-        _message(machine, answer.settled, answer.before, answer.left),
+        machine=machine,
+        poses=poses,
+        actuators=tuple(actuator.name for actuator in answer.actuators),
+        units=tuple(actuator.unit for actuator in answer.actuators),
+        coordinates=answer.coordinates,
+        unloaded=answer.unloaded,
+        before=answer.before,
+        left=answer.left,
+        turned=answer.turned,
+        settled=answer.settled,
+        message=_message(machine, answer.settled, answer.before, answer.left),
     )
 
 

@@ -192,22 +192,22 @@ def elevation(
     loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
     settled = np.isfinite(loads).all(axis=1)
     return Elevation(
-        state_of(upright),
-        Status(int(statuses[np.argmax(statuses != Status.OK)])),
-        _message(statuses, elevations, upright),
-        elevations,
-        statuses,
-        upright.family.component_names,
-        np.where(settled[:, None], moved, np.nan),
-        np.where(settled, frequency, np.nan),
-        tuple(states.mechanism.actuators),
-        tuple(spring.joint.point is not None for spring in driven),
-        loads,
-        _limit_use(states, loads),
-        _reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
-        tolerated,
-        corrections,
-        _requirements(upright, angles, elevations, lambda done: progress(4 + done, steps)),
+        state=state_of(upright),
+        status=Status(int(statuses[np.argmax(statuses != Status.OK)])),
+        message=_message(statuses, elevations, upright),
+        elevations=elevations,
+        statuses=statuses,
+        components=upright.family.component_names,
+        displacement=np.where(settled[:, None], moved, np.nan),
+        frequency=np.where(settled, frequency, np.nan),
+        actuators=tuple(states.mechanism.actuators),
+        turning=tuple(spring.joint.point is not None for spring in driven),
+        loads=loads,
+        limit_use=_limit_use(states, loads),
+        reversals=_reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
+        budget=tolerated,
+        corrections=corrections,
+        requirements=_requirements(upright, angles, elevations, lambda done: progress(4 + done, steps)),
     )
 
 

@@ -227,20 +227,20 @@ def _answer(
     place = int(np.argmax(widths))
     best = (float(speeds[place]), float(widths[place])) if widths[place] > least else None
     return Lobes(
-        state,
-        Status.OK,
-        "",
-        engagement.teeth,
-        engagement.pressure,
-        speeds,
-        widths,
-        least,
-        frequency,
-        best,
-        any(each.assumed for _, _, each in known),
-        len(known),
-        pose,
-        known[0][2].tool,
+        state=state,
+        status=Status.OK,
+        message="",
+        teeth=engagement.teeth,
+        pressure=engagement.pressure,
+        speeds=speeds,
+        widths=widths,
+        least=least,
+        frequency=frequency,
+        best=best,
+        assumed=any(each.assumed for _, _, each in known),
+        poses=len(known),
+        worst=pose,
+        tool=known[0][2].tool,
     )
 
 

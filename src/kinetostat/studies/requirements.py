@@ -177,11 +177,22 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
         pose = {path: float(rows[point]) for path, rows in motion.path.columns.items()}
         words = f"the motion uses {motors.share_in_words(fit)}, most at {fit.drive}."
     return Verdict(
-        name, f"fits {requirement.fits}", "share of the motor's limits", "1", 1.0, motion.path.size,
-        f"along {motion.kind}",
-        worst is not None and worst <= 1.0, worst, None if worst is None or math.isinf(worst) else 1.0 - worst, pose,
-        place, loads.status.word, int(worst is None or worst > 1.0), words,
-    )  # fmt: skip
+        name=name,
+        condition=f"fits {requirement.fits}",
+        quantity="share of the motor's limits",
+        unit="1",
+        bound=1.0,
+        poses=motion.path.size,
+        where=f"along {motion.kind}",
+        met=worst is not None and worst <= 1.0,
+        worst=worst,
+        margin=None if worst is None or math.isinf(worst) else 1.0 - worst,
+        worst_pose=pose,
+        place=place,
+        status=loads.status.word,
+        failed=int(worst is None or worst > 1.0),
+        words=words,
+    )
 
 
 def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
@@ -203,11 +214,22 @@ def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> li
         holds = condition.holds(amounts)
         judged.append(
             Verdict(
-                name, condition.text, condition.quantity, QUANTITIES[condition.quantity].unit, condition.value,
-                points.size, where, bool(holds.all()), worst, _margin(condition, worst), pose, place,
-                Status(int(answer.status[i])).word, int((~holds).sum()),
+                name=name,
+                condition=condition.text,
+                quantity=condition.quantity,
+                unit=QUANTITIES[condition.quantity].unit,
+                bound=condition.value,
+                poses=points.size,
+                where=where,
+                met=bool(holds.all()),
+                worst=worst,
+                margin=_margin(condition, worst),
+                worst_pose=pose,
+                place=place,
+                status=Status(int(answer.status[i])).word,
+                failed=int((~holds).sum()),
             )
-        )  # fmt: skip
+        )
     return judged
 
 

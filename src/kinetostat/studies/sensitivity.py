@@ -232,16 +232,16 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     without_influence = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
     without_derivative = tuple((path, reason) for path, reason in reasons.items() if reason)
     return Sensitivity(
-        machine,
-        status,
-        status.sentence,
-        names,
-        indices,
-        length,
-        ranked,
-        without_influence,
-        without_derivative,
-        uncounted,
+        machine=machine,
+        status=status,
+        message=status.sentence,
+        quantities=names,
+        indices=indices,
+        characteristic_length=length,
+        parameters=ranked,
+        without_influence=without_influence,
+        without_derivative=without_derivative,
+        loads_left_out=uncounted,
     )
 
 

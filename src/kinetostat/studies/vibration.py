@@ -378,17 +378,17 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
         strain = {name: float(shares[k]) for name, shares in strains.items()}
         result.append(
             Mode(
-                float(solution.frequencies[k]),
-                float(damping.ratios(solution)[k]),
-                twist[parts],
-                _names(machine)[largest],
-                mass,
-                mass * omega**2,
-                np.array(effective[k]),
-                strain,
-                dict(parts_and_kinds(springs, strain)[1]),
-                {name: float(shares[k]) for name, shares in kinetics.items()},
-                _shape(response, equations, solution, k),
+                frequency=float(solution.frequencies[k]),
+                ratio=float(damping.ratios(solution)[k]),
+                tool=twist[parts],
+                direction=_names(machine)[largest],
+                modal_mass=mass,
+                modal_stiffness=mass * omega**2,
+                effective_mass=np.array(effective[k]),
+                strain=strain,
+                kinds=dict(parts_and_kinds(springs, strain)[1]),
+                kinetic={name: float(shares[k]) for name, shares in kinetics.items()},
+                shape=_shape(response, equations, solution, k),
             )
         )
     return result

@@ -213,18 +213,18 @@ def workspace(
     home = _home(question)
     connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
     return Workspace(
-        machine,
-        _dataset(nodes, verdict, connected, judge, volume, edges),
-        judge.labels,
-        {label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
-        volume,
-        float(connected.sum() / inside.sum()) if connected.any() else None,
-        _extents(question, inside),
-        demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
-        judge.conditions,
-        judge.aspect != 0.0,
-        tuple(judge.limits),
-        nodes.attrs.get(LOADS_LEFT_OUT, ""),
+        machine=machine,
+        dataset=_dataset(nodes, verdict, connected, judge, volume, edges),
+        verdicts=judge.labels,
+        nodes={label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
+        volume=volume,
+        connected=float(connected.sum() / inside.sum()) if connected.any() else None,
+        extents=_extents(question, inside),
+        demands=demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
+        conditions=judge.conditions,
+        singularities_divide=judge.aspect != 0.0,
+        limits=tuple(judge.limits),
+        loads_left_out=nodes.attrs.get(LOADS_LEFT_OUT, ""),
     )
 
 

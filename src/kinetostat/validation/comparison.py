@@ -268,16 +268,16 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     uncertainty = _uncertainty(answer, ours, length)
     trusted = max(ROUND_OFF_OF_ENTRY, uncertainty if uncertainty < AGREED else 0.0)
     return Validation(
-        machine,
-        chosen.name,
-        chosen.version or "",
-        np.array(clean_matrix(ours.tolist())),
-        np.array(clean_matrix(answer.compliance.tolist(), trusted)),
-        block_differences(answer.compliance, ours, length),
-        uncertainty,
-        answer.varied,
-        tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
-        frequency_pairs(machine, chosen),
+        machine=machine,
+        engine=chosen.name,
+        version=chosen.version or "",
+        ours=np.array(clean_matrix(ours.tolist())),
+        theirs=np.array(clean_matrix(answer.compliance.tolist(), trusted)),
+        differences=block_differences(answer.compliance, ours, length),
+        uncertainty=uncertainty,
+        varied=answer.varied,
+        trials=tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
+        frequencies=frequency_pairs(machine, chosen),
     )
 
 

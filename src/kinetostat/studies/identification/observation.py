@@ -246,16 +246,16 @@ def observation(
         if not free:
             _check_far(model, data)
     return Observation(
-        model,
-        data,
-        tuple(unknowns),
-        chosen,
-        members,
-        frame,
-        tuple(name for name, _ in pairs),
-        np.array([row for _, row in pairs], dtype=np.int64),
-        np.array([data.sigma[name][row] for name, row in pairs]),
-        np.array([data.values[name][row] for name, row in pairs]),
+        model=model,
+        data=data,
+        unknowns=tuple(unknowns),
+        chosen=chosen,
+        members=members,
+        frame=frame,
+        names=tuple(name for name, _ in pairs),
+        pose=np.array([row for _, row in pairs], dtype=np.int64),
+        sigma=np.array([data.sigma[name][row] for name, row in pairs]),
+        value=np.array([data.values[name][row] for name, row in pairs]),
     )
 
 

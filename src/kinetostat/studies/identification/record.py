@@ -186,27 +186,27 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
     if not np.isfinite([unknown.value for unknown in unknowns]).all():
         raise ValueError("a value that is not finite")
     return FitRecord(
-        path,
-        str(record["machine"]),
-        str(record.get("family", "")),
-        str(record.get("data", "")),
-        int(record.get("poses", 0)),
-        int(record.get("values", 0)),
-        unknowns,
-        covariance,
-        int(record.get("rank", len(unknowns))),
-        float(record.get("scatter", 1.0)),
-        bool(record.get("sigma_known", True)),
-        tuple(
+        path=path,
+        machine=str(record["machine"]),
+        family=str(record.get("family", "")),
+        data=str(record.get("data", "")),
+        poses=int(record.get("poses", 0)),
+        values=int(record.get("values", 0)),
+        unknowns=unknowns,
+        covariance=covariance,
+        rank=int(record.get("rank", len(unknowns))),
+        scatter=float(record.get("scatter", 1.0)),
+        known=bool(record.get("sigma_known", True)),
+        residuals=tuple(
             {str(kind): float(size) for kind, size in record.get(name, {}).items()}
             for name in ("before", "after", "left_out")
         ),
-        tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
-        tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
-        {name: data for name, data in pictures.items() if data.startswith(PNG)},
-        _numbers(record.get("home", {}).get("actuators", {})),
-        _numbers(record.get("home", {}).get("senses", {})),
-        None if record.get("numbers") is None else _numbers(record["numbers"]),
+        outliers=tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
+        unseen=tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
+        pictures={name: data for name, data in pictures.items() if data.startswith(PNG)},
+        home=_numbers(record.get("home", {}).get("actuators", {})),
+        senses=_numbers(record.get("home", {}).get("senses", {})),
+        numbers=None if record.get("numbers") is None else _numbers(record["numbers"]),
     )
 
 

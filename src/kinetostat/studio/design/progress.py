@@ -103,17 +103,17 @@ class Follower:
         several = len(self.problem.objectives) > 1
         front = front_of(log) if several else best_feasible(log)
         return Progress(
-            run,
-            self.problem,
-            len(self._records),
-            self._total,
-            sum(record["designs"] for record in self._records),
-            [] if several else [record["best"] for record in self._records],
-            [] if several else [record["mean"] for record in self._records],
-            log.outcome(front).objectives.tolist(),
-            log.genes(front),
-            knee_of(log, front) if several and len(front) else 0,
-            result,
+            run=run,
+            problem=self.problem,
+            steps=len(self._records),
+            total=self._total,
+            designs=sum(record["designs"] for record in self._records),
+            best=[] if several else [record["best"] for record in self._records],
+            mean=[] if several else [record["mean"] for record in self._records],
+            objectives=log.outcome(front).objectives.tolist(),
+            genes=log.genes(front),
+            knee=knee_of(log, front) if several and len(front) else 0,
+            result=result,
         )
 
 

@@ -130,16 +130,16 @@ def anatomy(leg: Leg) -> Anatomy:
         reading.take(element)
     drives = [spring for spring in leg.springs if spring.actuated]
     return Anatomy(
-        leg.name,
-        leg.label,
-        bool(drives),
-        bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
-        tuple(joint for joint in reading.joints if not _within_bars(joint, reading.links)),
-        tuple(reading.links),
-        tuple(reading.finished_rails()),
-        tuple(reading.springs),
-        reading.first or ZERO,
-        reading.at or ZERO,
+        leg=leg.name,
+        label=leg.label,
+        actuated=bool(drives),
+        removed=bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
+        joints=tuple(joint for joint in reading.joints if not _within_bars(joint, reading.links)),
+        links=tuple(reading.links),
+        rails=tuple(reading.finished_rails()),
+        springs=tuple(reading.springs),
+        foot=reading.first or ZERO,
+        head=reading.at or ZERO,
     )
 
 
