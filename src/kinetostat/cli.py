@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kinetostat.commands.asking import add_other_questions
 from kinetostat.commands.common import (
@@ -35,6 +36,9 @@ from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import as_typed
 from kinetostat.views.questions import QUESTION_GROUPS
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
@@ -161,6 +165,19 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.set_defaults(run=_version_or_help, parser=parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
+    _add_file_commands(commands)
+    add_grid_commands(commands)
+    add_other_questions(commands)
+    add_compare_commands(commands)
+    add_optimize_commands(commands)
+    add_report_commands(commands)
+    add_studio_command(commands)
+    add_doctor_command(commands)
+    return parser
+
+
+def _add_file_commands(commands: "Commands") -> None:
+    """Add `list`, `new`, `schema` and `check`."""
     add_command(commands, "list", _list, "list bundled machines, bundled studies and families", "kinetostat list")
     new = add_command(
         commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
@@ -201,14 +218,6 @@ def _parser() -> Parser:
         "search, whose checksums are then compared",
     )
     check.set_defaults(doing=LOOKING)
-    add_grid_commands(commands)
-    add_other_questions(commands)
-    add_compare_commands(commands)
-    add_optimize_commands(commands)
-    add_report_commands(commands)
-    add_studio_command(commands)
-    add_doctor_command(commands)
-    return parser
 
 
 def _version_or_help(options: argparse.Namespace) -> int:

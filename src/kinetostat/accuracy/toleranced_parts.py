@@ -276,6 +276,23 @@ def _in_ball(cube: Array) -> Array:
     return np.stack([across * np.cos(angle), across * np.sin(angle), radius * height], axis=1)
 
 
+@dataclass(frozen=True)
+class _Block:
+    """Variables of a part that are coordinates of one point.
+
+    Attributes:
+        part: number of the part.
+        variance: variance of each variable.
+        columns: twist of the tool when a variable is 1 [n x 6 x variables].
+        errors: value of each error of the model when a variable is 1, at the first pose [errors x variables].
+    """
+
+    part: int
+    variance: float
+    columns: Array
+    errors: Array
+
+
 def random_inputs(
     parts: Sequence[TolerancedPart],
     rates: Array,
@@ -286,8 +303,8 @@ def random_inputs(
     """State what the tolerances of a machine do at n poses.
 
     Args:
-        parts: what has a tolerance.
-        rates: of the error model, SI [n x 6 x errors].
+        parts: parts with a tolerance.
+        rates: rates of the error model, SI [n x 6 x errors].
         load: wrench at the tool point, base axes, N·m and N [n x 6].
         length: a characteristic length of the machine, m.
         others: whether there are other poses, at which joints that are free here may be pressed and pressed ones free:
@@ -295,47 +312,38 @@ def random_inputs(
     """
     count, _, size = rates.shape
     work = np.einsum("nie,ni->ne", rates, load)
-    # The most that any motion of a length can do: what is far below it is no reaction.
+    # The most work that any motion of a length can do: work far below it is no reaction.
     most = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
-    owner: list[int] = []
-    block: list[int] = []
-    variance: list[float] = []
-    columns: list[Array] = []
-    errors: list[Array] = []
-    shift, drawn = np.zeros((count, 6)), np.zeros(size)
+    shift, drawn, blocks = np.zeros((count, 6)), np.zeros(size), list[_Block]()
     reacting = np.abs(work) > NO_REACTION * most[:, None]
     pressed = np.array([part.free & reacting[:, list(part.errors)].any(axis=1) for part in parts]).T
     for number, part in enumerate(parts):
         places, bears = list(part.errors), pressed[:, number]
-        if bears.any() or (others and part.free):
+        changes = others and part.free
+        if bears.any() or changes:  # a joint that is pressed to one end of its play: the play itself is a variable
             reaction = work[:, places]
             along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), 1e-300)[:, None] * bears[:, None]
             half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], along)
             value = np.zeros(size)
             value[places] = 0.5 * part.limit * along[0]
-            columns.append(half[:, :, None])
-            errors.append(value[:, None])
-            owner.append(number)
-            block.append(block[-1] + 1 if block else 0)
-            variance.append(1.0 / 3.0)
+            blocks.append(_Block(number, 1.0 / 3.0, half[:, :, None], value[:, None]))
             shift += half
             drawn += value
-        if bears.all() and not (others and part.free):
-            continue
-        columns.append(part.limit * rates[:, :, places] * ~bears[:, None, None])
-        errors.append(part.limit * np.eye(size)[:, places] * (not bears[0]))
-        owner += [number] * len(places)
-        block += [block[-1] + 1 if block else 0] * len(places)
-        usual = 1.0 / (len(places) + 2.0)  # of each coordinate of a point in a ball; of a single one, 1/3
-        variance += [SIGMAS**-2 if part.normal and not part.free else usual] * len(places)
+        if not bears.all() or changes:
+            columns = part.limit * rates[:, :, places] * ~bears[:, None, None]
+            errors = part.limit * np.eye(size)[:, places] * (not bears[0])
+            usual = 1.0 / (len(places) + 2.0)  # of each coordinate of a point in a ball; of a single one, 1/3
+            variance = SIGMAS**-2 if part.normal and not part.free else usual
+            blocks.append(_Block(number, variance, columns, errors))
+    sizes = [block.columns.shape[2] for block in blocks]
     return RandomInputs(
-        tuple(parts),
-        np.array(owner),
-        np.array(block),
-        np.array(variance),
-        np.concatenate(columns, axis=2),
-        shift,
-        np.concatenate(errors, axis=1),
-        drawn,
-        pressed,
+        parts=tuple(parts),
+        owner=np.repeat([block.part for block in blocks], sizes),
+        block=np.repeat(np.arange(len(blocks)), sizes),
+        variance=np.repeat([block.variance for block in blocks], sizes),
+        columns=np.concatenate([block.columns for block in blocks], axis=2),
+        shift=shift,
+        errors=np.concatenate([block.errors for block in blocks], axis=1),
+        drawn=drawn,
+        pressed=pressed,
     )

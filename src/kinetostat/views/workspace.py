@@ -18,6 +18,12 @@ SHOWN_ERRORS = 2
 
 
 def _lines(answer: Workspace) -> Lines:
+    yield from _volume_lines(answer)
+    yield from _border_lines(answer)
+
+
+def _volume_lines(answer: Workspace) -> Lines:
+    """How large the workspace is, and how far that may be wrong."""
     volume = answer.volume
     name = "Area" if len(answer.dataset["verdict"].dims) == 2 else "Volume"
     if volume.cells < FEWEST_CELLS:
@@ -42,6 +48,10 @@ def _lines(answer: Workspace) -> Lines:
             "point did not converge or is undecided. Whether it belongs to the workspace is not known; it counts as "
             "outside.",
         )
+
+
+def _border_lines(answer: Workspace) -> Lines:
+    """What bounds the workspace, and whether all of it can be reached."""
     if "assembly_mode" in answer.dataset.attrs:
         yield (
             "Mode",

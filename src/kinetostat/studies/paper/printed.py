@@ -286,69 +286,54 @@ def derivation() -> Iterator[EquationCheck]:
     """The chain of equations at the reference configuration, in the paper's order."""
     machine = load(MACHINE)
     response = respond(machine)
-    a, b, jacobian, virtual = _matrices(response)
+    yield from _velocity_checks(machine, response)
+    yield from _rigid_checks(response)
+    yield from _flexible_checks(response)
+
+
+def _velocity_checks(machine: Machine, response: Response) -> Iterator[EquationCheck]:
+    """Equations 1 to 7, by central differences."""
+    a, b, jacobian, _ = _matrices(response)
     rates, lengths_rate, twist = _velocities(machine)
-    yield EquationCheck(
-        "1-4",
-        "A t = B rho', leg rates by differences",
-        _gap(a @ twist, b @ lengths_rate),
-        STEP_ERROR,
-    )
-    yield EquationCheck(
-        "7",
-        "t = J theta', passive joint rates by differences",
-        _gap(jacobian @ rates, twist),
-        STEP_ERROR,
-    )
+    gap = _gap(a @ twist, b @ lengths_rate)
+    yield EquationCheck("1-4", "A t = B rho', leg rates by differences", gap, STEP_ERROR)
+    gap = _gap(jacobian @ rates, twist)
+    yield EquationCheck("7", "t = J theta', passive joint rates by differences", gap, STEP_ERROR)
+
+
+def _rigid_checks(response: Response) -> Iterator[EquationCheck]:
+    """Equations 5 to 22: statics, and the compliance of the machine with a rigid passive leg."""
+    a, b, jacobian, _ = _matrices(response)
     aj = a @ jacobian
     load_on_tool = np.array([0.3, -0.2, 0.5, 4.0, -3.0, 7.0])
     forces = b.T @ np.linalg.solve(aj.T, jacobian.T @ load_on_tool)
-    work = forces @ np.linalg.solve(b, aj), load_on_tool @ jacobian
-    yield EquationCheck(
-        "5-11",
-        "actuator forces do the work of the wrench on every feasible twist",
-        _gap(*work),
-        ROUND_OFF,
-    )
+    gap = _gap(forces @ np.linalg.solve(b, aj), load_on_tool @ jacobian)
+    yield EquationCheck("5-11", "actuator forces do the work of the wrench on every feasible twist", gap, ROUND_OFF)
     actuator = np.eye(4) / ACTUATOR
     inner = np.linalg.solve(aj, b)
     rigid = jacobian @ inner @ actuator @ inner.T @ jacobian.T
     ours = _rows(respond(load(MACHINE, ["stiffness.passive_links=rigid"])).compliance)
-    yield EquationCheck("12-21", "C of the rigid machine equals W^-T G W^-1", _gap(rigid, ours), ROUND_OFF)
-    deflection = ours @ load_on_tool
-    yield EquationCheck(
-        "13, 16, 22",
-        "C w deflects the actuators by C tau",
-        _gap(a @ deflection, b @ actuator @ forces),
-        ROUND_OFF,
-    )
-    values_of_c = np.linalg.eigvalsh(ours)
-    yield EquationCheck(
-        "21", "rigid machine: C has rank 4, no eigenvalue below 0", _rank_excess(values_of_c, 4), ROUND_OFF
-    )
-    full = np.hstack([jacobian, virtual])
+    gap = _gap(rigid, ours)
+    yield EquationCheck("12-21", "C of the rigid machine equals W^-T G W^-1", gap, ROUND_OFF)
+    gap = _gap(a @ (ours @ load_on_tool), b @ actuator @ forces)
+    yield EquationCheck("13, 16, 22", "C w deflects the actuators by C tau", gap, ROUND_OFF)
+    excess = _rank_excess(np.linalg.eigvalsh(ours), 4)
+    yield EquationCheck("21", "rigid machine: C has rank 4, no eigenvalue below 0", excess, ROUND_OFF)
+
+
+def _flexible_checks(response: Response) -> Iterator[EquationCheck]:
+    """Equations 22 to 32: the stiffness of the machine with its flexible passive leg."""
+    a, b, jacobian, virtual = _matrices(response)
+    back = np.linalg.inv(np.hstack([jacobian, virtual]))
     springs = np.diag([0.0] * 4 + [1000.0, 1000.0])
-    back = np.linalg.inv(full)
     stiffness = back.T @ springs @ back + a.T @ np.linalg.inv(b).T @ (ACTUATOR * np.eye(4)) @ np.linalg.inv(b) @ a
-    ours_k, ours_c = _rows(response.stiffness), _rows(response.compliance)
-    yield EquationCheck(
-        "23-32",
-        "K of the flexible machine equals sum of W G^-1 W^T",
-        _gap(stiffness, ours_k),
-        ROUND_OFF,
-    )
-    yield EquationCheck(
-        "32",
-        "K by springs equals K by legs",
-        _gap(_rows(flexible_stiffness(response.legs)), ours_k),
-        ROUND_OFF,
-    )
-    yield EquationCheck(
-        "22, 31",
-        "K C = 1 for the flexible machine",
-        float(np.abs(ours_k @ ours_c - np.eye(6)).max()),
-        ROUND_OFF,
-    )
+    k, c = _rows(response.stiffness), _rows(response.compliance)
+    gap = _gap(stiffness, k)
+    yield EquationCheck("23-32", "K of the flexible machine equals sum of W G^-1 W^T", gap, ROUND_OFF)
+    gap = _gap(_rows(flexible_stiffness(response.legs)), k)
+    yield EquationCheck("32", "K by springs equals K by legs", gap, ROUND_OFF)
+    gap = float(np.abs(k @ c - np.eye(6)).max())
+    yield EquationCheck("22, 31", "K C = 1 for the flexible machine", gap, ROUND_OFF)
 
 
 def _rows(matrix: Symmetric6) -> Array:
