@@ -188,30 +188,35 @@ def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> 
         weight: weight of a metre of unstretched cable, N/m [n].
         radius: radius of the pulleys, m [n].
     """
-    hung, guides, heavy = cables, cables.near, weight > 0.0
-    rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
+    hung = cables
     for _ in range(MOST_CHANGES):
-        span = hung.near - hung.far
-        rise = np.einsum("nmk,nk->nm", span, up)
-        sideways = span - rise[:, :, None] * up[:, None]
-        level = np.sqrt((sideways * sideways).sum(axis=2))
-        tensions = np.where(np.isnan(hung.tensions[0]), np.inf, hung.tensions[0])
-        known = np.isfinite(tensions) & heavy[:, None] & (tensions > 0.0)
-        shape = hanging_cables(
-            level, rise, np.where(known, tensions, 1.0), np.where(heavy, weight, 1.0)[:, None] + 0.0 * level, rigidity
-        )
-        slope = np.where(known, np.arctan2(shape.up, shape.across), np.arctan2(rise, level))
-        leaving = np.where(known, shape.base_slope, np.arctan2(rise, level))
-        directions = np.cos(slope)[:, :, None] * _units(sideways) + np.sin(slope)[:, :, None] * up[:, None]
-        near, wound = guides, cables.wound
-        if radius.any():
-            near, wound = leaving_points(guides, cables.far, radius, leaving)
-        turned, moved = np.abs(directions - hung.directions), np.abs(near - hung.near)
-        changed = max(np.nan_to_num(turned).max(), np.nan_to_num(moved).max())
-        hung = replace(cables, near=near, directions=directions, wound=wound, shape=shape if heavy.any() else None)
-        if changed < SAME_DIRECTION:
+        last, hung = hung, _cables_with_tensions_of(hung, cables, up, weight, radius)
+        changes = hung.directions - last.directions, hung.near - last.near
+        if max(np.nan_to_num(np.abs(change)).max() for change in changes) < SAME_DIRECTION:
             break
     return hung
+
+
+def _cables_with_tensions_of(hung: Cables, cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
+    """Cables as they hang with the tensions of `hung`; the other arguments as for `_hanging_cables`."""
+    heavy = weight > 0.0
+    span = hung.near - hung.far
+    rise = np.einsum("nmk,nk->nm", span, up)
+    sideways = span - rise[:, :, None] * up[:, None]
+    level = np.sqrt((sideways * sideways).sum(axis=2))
+    tensions = np.where(np.isnan(hung.tensions[0]), np.inf, hung.tensions[0])
+    sags = np.isfinite(tensions) & heavy[:, None] & (tensions > 0.0)
+    rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
+    loads = np.where(heavy, weight, 1.0)[:, None] + 0.0 * level
+    shape = hanging_cables(level, rise, np.where(sags, tensions, 1.0), loads, rigidity)
+    straight = np.arctan2(rise, level)
+    slope = np.where(sags, np.arctan2(shape.up, shape.across), straight)
+    directions = np.cos(slope)[:, :, None] * _units(sideways) + np.sin(slope)[:, :, None] * up[:, None]
+    near, wound = cables.near, cables.wound
+    if radius.any():
+        leaving = np.where(sags, shape.base_slope, straight)
+        near, wound = leaving_points(cables.near, cables.far, radius, leaving)
+    return replace(cables, near=near, directions=directions, wound=wound, shape=shape if heavy.any() else None)
 
 
 def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple[dict[str, Array], Codes]:

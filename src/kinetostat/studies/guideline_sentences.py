@@ -13,7 +13,7 @@ from kinetostat.display import number
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines import Guidelines, Move, Roles
+from kinetostat.studies.guidelines import Guidelines, ParameterEffect, Roles
 from kinetostat.tolerances import NO_ROLE
 
 DECIDING_SHARE = 0.01
@@ -145,8 +145,8 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
 
 def _effects_of_parameters(answer: Guidelines) -> Iterator[Statement]:
     """Statements on the directions that each parameter stiffens or softens."""
-    for move in answer.parameters[:MOST_PARAMETERS]:
-        directions = [(i, p) for i, p in enumerate(move.percents) if not math.isnan(p)]
+    for effect in answer.parameters[:MOST_PARAMETERS]:
+        directions = [(i, p) for i, p in enumerate(effect.percents) if not math.isnan(p)]
         rising = sorted(((i, p) for i, p in directions if p > LEAST_EFFECT), key=lambda pair: -pair[1])
         falling = sorted(((i, p) for i, p in directions if p < -LEAST_EFFECT), key=lambda pair: pair[1])
         none = [answer.components[i] for i, p in directions if abs(p) <= LEAST_EFFECT]
@@ -156,17 +156,22 @@ def _effects_of_parameters(answer: Guidelines) -> Iterator[Statement]:
             if pairs
         ]
         aside = f"; no effect in {', '.join(none)}" if none else ""
-        name = with_leg(answer.machine, move.path)
-        change = f"Turning {name} by 0.01 rad" if move.turning else f"Increasing {name}"
-        yield Statement("design", f"{change}: {'; '.join(clauses)}{aside}.", _same_signs(answer, move))
+        name = with_leg(answer.machine, effect.path)
+        change = f"Turning {name} by 0.01 rad" if effect.turning else f"Increasing {name}"
+        yield Statement("design", f"{change}: {'; '.join(clauses)}{aside}.", share_with_same_signs(effect))
 
 
-def _same_signs(answer: Guidelines, move: Move) -> float | None:
-    """The least share of the poses at which the signs of the file's pose hold, over the directions with an effect."""
-    if answer.everywhere is None or not move.stiffer:
+def share_with_same_signs(effect: ParameterEffect) -> float | None:
+    """The least share of the poses of a grid at which a parameter stiffens, or softens, a direction as it does here.
+
+    None without a grid, or if the parameter has no effect on any direction here.
+    """
+    if not effect.stiffer:
         return None
     shares = [
-        move.stiffer[i] if p > 0.0 else move.softer[i] for i, p in enumerate(move.percents) if abs(p) > LEAST_EFFECT
+        effect.stiffer[i] if p > 0.0 else effect.softer[i]
+        for i, p in enumerate(effect.percents)
+        if abs(p) > LEAST_EFFECT
     ]
     return min(shares, default=None)
 

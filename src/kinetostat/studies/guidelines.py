@@ -30,7 +30,7 @@ from kinetostat.kinetostatics.elements import (
 )
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters, values
+from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
@@ -76,7 +76,7 @@ class Roles(ImmutableAnswer):
 
 
 @dataclass(frozen=True, eq=False)
-class Move(ImmutableAnswer):
+class ParameterEffect(ImmutableAnswer):
     """The effect of a parameter of the design, or of all entries of a stiffness together, on the stiffness 1 / C_ii.
 
     Attributes:
@@ -145,7 +145,7 @@ class Guidelines(ImmutableAnswer):
     here: Roles | None = None
     stiffness_equations: dict[str, Array] | None = None
     meaning: str = ""
-    parameters: tuple[Move, ...] = ()
+    parameters: tuple[ParameterEffect, ...] = ()
     without_influence: tuple[str, ...] = ()
     left_out: tuple[tuple[str, str], ...] = ()
     ranges: tuple[str, ...] = ()
@@ -199,12 +199,13 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     single = elements(response.configuration)
     every = with_links_together(single)
     diagonal = without_rounding(response.compliance.diagonal(), response)[kept, 0]
-    moves = moves_at(sensitivities, diagonal > 0.0)
+    effects = effects_of_parameters(sensitivities, diagonal > 0.0)
     everywhere, poses = None, (0, 0)
     if grid is not None:
         everywhere, poses = roles_over(machine, grid, every, kept, progress)
-        moves = with_signs(state, grid, moves)
-    without_derivative = [pair for pair in sensitivities.without_derivative if designed(machine, pair[0])]
+        effects = with_signs_over_grid(state, grid, effects)
+    known = parameters_by_path(machine)
+    without_derivative = [pair for pair in sensitivities.without_derivative if designed(known[pair[0]])]
     return Guidelines(
         state=state,
         status=sensitivities.status,
@@ -215,8 +216,8 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
         here=roles_at(response, every, kept),
         stiffness_equations=equations_of_k(response, single, kept),
         meaning=next(notes(sensitivities)),
-        parameters=tuple(move for move in moves if move.matters),
-        without_influence=tuple(move.path for move in moves if not move.matters),
+        parameters=tuple(effect for effect in effects if effect.matters),
+        without_influence=tuple(effect.path for effect in effects if not effect.matters),
         left_out=(*without_derivative, *axes_left_out(sensitivities)),
         ranges=tuple(ranges),
         poses=poses,
@@ -317,32 +318,32 @@ def equations_of_k(response: Response, elements: Sequence[Element], kept: Sequen
     return dict(zip(by_element, np.where(rows > NO_ROLE * rows.max(axis=0, initial=0.0), rows, 0.0), strict=True))
 
 
-def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
+def effects_of_parameters(sensitivities: Sensitivity, compliant: Mask) -> list[ParameterEffect]:
     """List the effects of the parameters of the design, the largest first; entries of one stiffness change together.
 
     Args:
         sensitivities: sensitivities of the diagonal of C.
         compliant: whether each direction is neither rigid nor free.
     """
-    machine = sensitivities.machine
+    machine, known = sensitivities.machine, parameters_by_path(sensitivities.machine)
     entries: dict[str, list[Array]] = {}
-    for parameter in sensitivities.parameters:
-        if designed(machine, parameter.path):
-            row = np.where(compliant, -parameter.percents, math.nan)
-            entries.setdefault(_path_of_element(machine, parameter.path), []).append(row)
+    for influence in sensitivities.parameters:
+        if designed(known[influence.path]):
+            row = np.where(compliant, -influence.percents, math.nan)
+            entries.setdefault(_path_of_element(machine, influence.path), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
     zero = np.where(compliant, 0.0, math.nan)
-    without_influence = [path for path in sensitivities.without_influence if designed(machine, path)]
-    for path in without_influence:
-        rows.setdefault(_path_of_element(machine, path), zero)
-    kinds = _kinds(machine)
-    moves = [Move(path, row, turning=kinds[path] == "angle") for path, row in rows.items()]
-    return strongest_first(moves)
+    for path in sensitivities.without_influence:
+        if designed(known[path]):
+            rows.setdefault(_path_of_element(machine, path), zero)
+    return strongest_first(
+        [ParameterEffect(path, row, turning=known[path].quantity.kind == "angle") for path, row in rows.items()]
+    )
 
 
-def designed(machine: Machine, path: str) -> bool:
+def designed(parameter: Parameter) -> bool:
     """Whether a parameter is one that a designer chooses."""
-    return path.split(".")[0] not in NOT_DESIGN and _kinds(machine)[path] != "direction"
+    return parameter.path.split(".")[0] not in NOT_DESIGN and parameter.quantity.kind != "direction"
 
 
 def axes_left_out(sensitivities: Sensitivity) -> list[tuple[str, str]]:
@@ -351,38 +352,41 @@ def axes_left_out(sensitivities: Sensitivity) -> list[tuple[str, str]]:
     return [(path, REASON_WITHOUT_AXES) for path in dict.fromkeys(axes)]
 
 
-def _kinds(machine: Machine) -> dict[str, str]:
-    return {p.path: p.quantity.kind for p in parameters(machine.family)}
+def parameters_by_path(machine: Machine) -> dict[str, Parameter]:
+    """All parameters of a machine by their paths."""
+    return {parameter.path: parameter for parameter in parameters(machine.family)}
 
 
 def _path_of_element(machine: Machine, path: str) -> str:
     """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
     field = path.rpartition(".")[0]
-    whole = {p.path: p for p in parameters(machine.family)}.get(field)
+    whole = parameters_by_path(machine).get(field)
     here = values(machine)
     if whole is None or not (whole.quantity.stiff and whole.quantity.per_leg):
         return path
     return field if len({here[leaf] for leaf in whole.leaves}) == 1 else path
 
 
-def with_signs(state: MachineState, grid: Points, moves: Sequence[Move]) -> list[Move]:
-    """Add to each move at which share of the poses of a grid it stiffens and softens each direction."""
-    machine = state.machine
-    leaves = {p.path: p.leaves for p in parameters(machine.family)}
-    paths = [leaf for move in moves for leaf in leaves[move.path]]
+def with_signs_over_grid(
+    state: MachineState, grid: Points, effects: Sequence[ParameterEffect]
+) -> list[ParameterEffect]:
+    """Add to each effect the shares of the poses of a grid at which it stiffens and at which it softens a direction."""
+    machine, known = state.machine, parameters_by_path(state.machine)
+    paths = [leaf for effect in effects for leaf in known[effect.path].leaves]
     names = [f"compliance_{name}" for name in machine.family.component_names]
     answer = evaluate_gradient(machine, grid, names, paths)
     good = answer.status == Status.OK
     if not good.any():
-        return list(moves)
-    length, here, kinds = float(state.configuration.length), values(machine), _kinds(machine)
+        return list(effects)
+    length, here = float(state.configuration.length), values(machine)
     signed = []
-    for move in moves:
-        rows = [paths.index(leaf) for leaf in leaves[move.path]]
-        sizes = np.array([measure_of(kinds[leaf], here[leaf], length)[0] for leaf in leaves[move.path]])
+    for effect in effects:
+        leaves = known[effect.path].leaves
+        rows = [paths.index(leaf) for leaf in leaves]
+        sizes = np.array([measure_of(known[leaf].quantity.kind, here[leaf], length)[0] for leaf in leaves])
         percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
         change = -np.nansum(percents, axis=1)
         sign = np.where(np.abs(change) > LEAST_INFLUENCE, np.sign(change), 0.0)[:, good]
         stiffer, softer = (tuple((sign == wanted).mean(axis=1).tolist()) for wanted in (1.0, -1.0))
-        signed.append(replace(move, stiffer=stiffer, softer=softer))
+        signed.append(replace(effect, stiffer=stiffer, softer=softer))
     return signed

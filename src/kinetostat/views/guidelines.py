@@ -11,8 +11,14 @@ from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guideline_sentences import DECIDING_SHARE, LEAST_EFFECT, limit_of, statements
-from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles, guidelines
+from kinetostat.studies.guideline_sentences import (
+    DECIDING_SHARE,
+    LEAST_EFFECT,
+    limit_of,
+    share_with_same_signs,
+    statements,
+)
+from kinetostat.studies.guidelines import EXCESS, Guidelines, Roles, guidelines
 from kinetostat.views.data_forms import stiffness_of_spring
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -32,7 +38,7 @@ DIGITS_OF_K = 6
 """Digits of the coefficients of K, which are compared with those of papers."""
 BOLD_SHARE = 0.5
 """Share from which an element is printed in bold."""
-MOST_MOVES = 16
+MOST_PARAMETERS = 16
 """Parameters that have a line unless all are wanted."""
 MOST_NAMED_PATHS = 8
 
@@ -58,7 +64,7 @@ def over_poses(share: float) -> str:
 
 def _left_out(answer: Guidelines) -> Iterator[str]:
     """Write sentences on the parameters that the tables omit, and why."""
-    hidden = len(answer.parameters) - MOST_MOVES
+    hidden = len(answer.parameters) - MOST_PARAMETERS
     if hidden > 0:
         yield f"{words_on_omitted(hidden)} (--full shows them)."
     if answer.without_influence:
@@ -81,7 +87,7 @@ def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
         yield _element_table(answer, answer.here)
         yield _limit_table(answer, answer.here)
     if answer.parameters:
-        yield _move_table(answer, len(answer.parameters) if full else MOST_MOVES)
+        yield _effect_table(answer, len(answer.parameters) if full else MOST_PARAMETERS)
 
 
 def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
@@ -140,16 +146,18 @@ def _limit(value: float) -> str:
     return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 
 
-def _move_table(answer: Guidelines, count: int) -> FittedTable:
+def _effect_table(answer: Guidelines, count: int) -> FittedTable:
     """The effect of the first parameters on each direction."""
     grid = bool(answer.poses[0])
     title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     if grid:
         title += "; poses: share of the poses at which all arrows of the row point the same way as here"
     table = numeric_table(title, "parameter", [*answer.components, *(["poses"] if grid else [])])
-    for move in answer.parameters[:count]:
-        name = with_leg(answer.machine, move.path)
-        table.add_row(name, *(_arrow(p) for p in move.percents), *([_share_alike(move)] if grid else []))
+    for effect in answer.parameters[:count]:
+        share = share_with_same_signs(effect)
+        poses = "all" if share is None or share == 1.0 else f"{100.0 * share:.0f} %"
+        name = with_leg(answer.machine, effect.path)
+        table.add_row(name, *(_arrow(p) for p in effect.percents), *([poses] if grid else []))
     return table
 
 
@@ -158,14 +166,6 @@ def _arrow(percent: float) -> Text:
         return Text("–" if math.isnan(percent) else "·")
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
     return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
-
-
-def _share_alike(move: Move) -> str:
-    shares = [
-        move.stiffer[i] if p > 0.0 else move.softer[i] for i, p in enumerate(move.percents) if abs(p) >= LEAST_EFFECT
-    ]
-    least = min(shares, default=1.0)
-    return "all" if least == 1.0 else f"{100 * least:.0f} %"
 
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
@@ -205,15 +205,15 @@ def _elements(answer: Guidelines) -> list[dict[str, Any]]:
 def _parameters(answer: Guidelines) -> list[dict[str, Any]]:
     """The parameters with their effects by direction."""
     rows = []
-    for move in answer.parameters:
+    for effect in answer.parameters:
         row: dict[str, Any] = {
-            "path": move.path,
-            "one_percent": "0.01 rad" if move.turning else "1 %",
-            "stiffer_percent_per_percent": _by_direction(answer, move.percents),
+            "path": effect.path,
+            "one_percent": "0.01 rad" if effect.turning else "1 %",
+            "stiffer_percent_per_percent": _by_direction(answer, effect.percents),
         }
-        if move.stiffer:
-            row["stiffer_at"] = _by_direction(answer, move.stiffer)
-            row["softer_at"] = _by_direction(answer, move.softer)
+        if effect.stiffer:
+            row["stiffer_at"] = _by_direction(answer, effect.stiffer)
+            row["softer_at"] = _by_direction(answer, effect.softer)
         rows.append(row)
     return rows
 

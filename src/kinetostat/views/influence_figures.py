@@ -138,7 +138,7 @@ def _elements_with_limits(guidelines: Guidelines) -> list[tuple[Element, np.ndar
 
 def design_figure(guidelines: Guidelines, title: str = "{}: effect of each parameter") -> Figure:
     """Draw parameters against directions: blue where 1 % more makes a direction stiffer, red where softer."""
-    rows = {with_leg(guidelines.machine, move.path): move.percents for move in guidelines.parameters}
+    rows = {with_leg(guidelines.machine, effect.path): effect.percents for effect in guidelines.parameters}
     titles = title.format(guidelines.machine.name), setting_of(guidelines.machine)
     label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
     return coloured_table(titles, rows, guidelines.components, "RdBu", label)
