@@ -69,7 +69,17 @@ def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
         tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
     density, shrink = tension * (1.0 / length), 1.0 / square
     stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
-    return RodPull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
+    return RodPull(
+        near=near,
+        at=at,
+        moment=at.cross(near),
+        length=length,
+        tension=tension,
+        density=density,
+        stretching=stretching,
+        elastic=elastic,
+        slack=slack,
+    )
 
 
 def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array]:
@@ -79,31 +89,30 @@ def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array
         pulls: the pulls of the rods.
         weights: weight of the dyad of each line in the decrease: `stretching` of each pull for the tangent stiffness.
     """
-    pulled = [pull.at * pull.density for pull in pulls]
-    ends = _sum(pulled)
+    weighted_ends = [pull.at * pull.density for pull in pulls]
+    ends = _sum(weighted_ends)
     starts = _sum([pull.near * pull.density for pull in pulls])
-    turned = [
-        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(pulled, pulls, strict=True)]) for j in "xyz"]
+    # The sum of c a b^T: its antisymmetric part is the moment, and the whole says how the moment turns.
+    outer = [
+        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(weighted_ends, pulls, strict=True)]) for j in "xyz"]
         for i in "xyz"
     ]
-    moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
-    trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
-    fall = sum_of_dyads(pulls, weights)[None]
+    moment = [outer[i][j] - outer[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    trace, density = outer[0][0] + outer[1][1] + outer[2][2], total([pull.density for pull in pulls])
+    decrease = sum_of_dyads(pulls, weights)[None]
     for i in range(3):
         for j in range(3):
-            fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
-        fall[0, 3 + i, 3 + i] = fall[0, 3 + i, 3 + i] + density
-    fall[:, :3, 3:] = fall[:, :3, 3:] + skew_of(of_scalars(starts.components()))
-    fall[:, 3:, :3] = fall[:, 3:, :3] - skew_of(of_scalars(ends.components()))
-    return of_scalars([*moment, *(starts - ends).components()]), fall
+            decrease[0, i, j] = decrease[0, i, j] + (trace if i == j else 0.0) - outer[i][j]
+        decrease[0, 3 + i, 3 + i] = decrease[0, 3 + i, 3 + i] + density
+    decrease[:, :3, 3:] = decrease[:, :3, 3:] + skew_of(of_scalars(starts.components()))
+    decrease[:, 3:, :3] = decrease[:, 3:, :3] - skew_of(of_scalars(ends.components()))
+    return of_scalars([*moment, *(starts - ends).components()]), decrease
 
 
 def _sum(vectors: Sequence[Vector]) -> Vector:
-    return (
-        Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))
-        if vectors
-        else ZERO
-    )
+    if not vectors:
+        return ZERO
+    return Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))
 
 
 def sum_of_dyads(pulls: Sequence[RodPull], weights: Row) -> Array:

@@ -110,13 +110,7 @@ def write_mex(
 ) -> list[Path]:
     """Write NAME.c, NAME.h and NAME_mex.c, which make a function of MATLAB and Octave; NAME is that of the path.
 
-    Args:
-        analysis: the analysis of the machine at its pose.
-        path: the path of NAME.c.
-        inputs, outputs: as in C: parameters that become arguments, and quantities.
-
-    Raises:
-        InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
+    Arguments and errors are those of `c_source.write`.
     """
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
     given = [f"[{k}]: {in_comment(path)}" for k, path in enumerate(functions.inputs, 1)]
@@ -160,13 +154,8 @@ def write_fmu(
 ) -> list[Path]:
     """Write the machine as a model of FMI 3.0: its source and, where a C compiler is installed, its library.
 
-    Args:
-        analysis: the analysis of the machine at its pose.
-        path: the path of NAME.fmu.
-        inputs, outputs: as in C: parameters that become inputs of the model, and quantities.
-
-    Raises:
-        InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
+    Arguments and errors are those of `c_source.write`; the path is that of NAME.fmu, and `inputs` become inputs of the
+    model.
     """
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
     stem = path.stem

@@ -103,13 +103,7 @@ def write_klipper(analysis: Analysis, path: Path, over: Sequence[str] | None = N
 def write_reprapfirmware(analysis: Analysis, path: Path, over: Sequence[str] | None = None) -> list[Path]:
     """Write the heights as a height map of RepRapFirmware, for `G29 S1 P"NAME.csv"`.
 
-    Args:
-        analysis: the analysis of the machine at its pose; its z is the height of the map.
-        path: the path of the file.
-        over: ranges of x and of y, as "x=-100 mm:100 mm:9"; about the pose, as far as a report shows, if None.
-
-    Raises:
-        InputError: nothing loads the machine, other axes than x and y, or fewer than three points along one.
+    Arguments and errors are those of `write_klipper`, but points without rest are holes of the map.
     """
     chart = height_map(analysis, over or ())
     known = chart.heights[np.isfinite(chart.heights)]

@@ -95,13 +95,7 @@ def write_link(
 ) -> list[Path]:
     """Write the machine as the end of an address: its programs and data, which any page of a machine opens.
 
-    Args:
-        analysis: the analysis of the machine at its pose.
-        path: the path of a text file with one line, "viewer.html#m=...".
-        inputs, outputs: as for `write`.
-
-    Raises:
-        InputError: legs of the machine have no closed form, or an input or output is unknown or has no program.
+    The file is a text with one line, "viewer.html#m=...". Arguments and errors are those of `write`.
     """
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
     write_text(path, f"{VIEWER}#m={address_of(functions, path.stem)}\n")
