@@ -1,5 +1,6 @@
 """The studio for everyone, in a real browser: text can be read, the keyboard reaches every control, all of it fits."""
 
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -90,3 +91,19 @@ def test_on_a_narrow_page_no_label_is_cut_and_the_layers_leave_the_machine_free(
     layers.wait_for(state="visible")
     button.click()
     layers.wait_for(state="hidden")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_names_of_cables_do_not_lie_on_each_other(width):
+    """Cables leave their winches in pairs, and the names of a pair would cover each other."""
+    with browser() as new_tab, served("cogiro") as address:
+        tab = new_tab(width).tab
+        tab.goto(address)
+        tab.wait_for_function("document.querySelectorAll('.machine-label-labels').length === 8")
+        tab.wait_for_function("document.querySelector('.machine-view').dataset.rest === 'fine'")
+        boxes = tab.evaluate(
+            """[...document.querySelectorAll('.machine-label-labels')].map((name) => name.getBoundingClientRect())
+            .map((box) => [box.left, box.right, box.top, box.bottom])"""
+        )
+    for one, other in combinations(boxes, 2):
+        assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]

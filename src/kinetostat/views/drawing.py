@@ -1,7 +1,7 @@
 """Drawing of a machine at its pose: front, side and plan. Geometry comes from the configuration, style is set here."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import matplotlib as mpl
@@ -24,6 +24,8 @@ MOST_TICKS = 4
 """Intervals of an axis at most: views are for shapes, and half of the time of drawing one goes into its numbers."""
 MILLIMETRES = 1e3
 LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
+BESIDE = 0.3
+"""Share of the distance of the farthest base joint below which another one is beside it, so that names would meet."""
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
 """Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 
@@ -82,6 +84,9 @@ def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: 
         panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
+    if up == "y":
+        for leg, name in zip(standing, _short_names(standing), strict=True):
+            _write_name(panel, name, leg, [other for other in standing if other is not leg])
     marks = {"P": reference} if (tool - reference).norm() == 0.0 else {"P": reference, "T": tool}
     for name, point in marks.items():
         (x,), (y,) = flat([point], across, up)
@@ -97,23 +102,40 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
     if actuated and len(x) > 1:
         middle = [0.45 * ends[0] + 0.55 * ends[1] for ends in (x, y)]
         panel.plot([x[0], middle[0]], [y[0], middle[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
-        if up == "y":
-            _number(panel, leg, x[0], y[0], colour)
 
 
-def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
-    """Write the name of a leg beside its base joint: away from the leg, or from the origin where the leg goes up."""
+def _short_names(legs: Sequence[Leg]) -> list[str]:
+    """Return the names of legs in the plan: "1" of "cable 1" where all are cables."""
+    parts = [leg.label.rpartition(" ") for leg in legs]
+    return [last for _, _, last in parts] if len({first for first, _, _ in parts}) == 1 else [leg.label for leg in legs]
+
+
+def _write_name(panel: Axes, name: str, leg: Leg, others: Sequence[Leg]) -> None:
+    """Write the name of a leg in the plan beside its base joint.
+
+    It stands away from the leg, or from the origin where the leg goes up, and also away from a base joint beside it.
+    """
     ends = list(zip(*flat(list(leg.path), "x", "y"), strict=True))
-    ways = [*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)]
-    across, up = next(
-        (dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > MILLIMETRES * SAME_TO_THE_EYE
-    )
-    text = leg.label
+    x, y = ends[0]
+    across, up = _way([*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)])
+    apart = [(x - a, y - b) for a, b in zip(*flat([other.path[0] for other in others], "x", "y"), strict=True)]
+    nearest = min(apart, key=lambda way: math.hypot(*way), default=(0.0, 0.0))
+    if 0.0 < math.hypot(*nearest) < BESIDE * max(math.hypot(*way) for way in apart):
+        far = math.hypot(*nearest)
+        across, up = across + nearest[0] / far, up + nearest[1] / far
+        size = math.hypot(across, up) or 1.0
+        across, up = across / size, up / size
     panel.annotate(
-        text, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=colour, zorder=5,
+        name, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=LEG_COLOUR, zorder=5,
         ha=_alignment(across, "right", "left"), va=_alignment(up, "top", "bottom"),
         path_effects=[withStroke(linewidth=2.0, foreground="white")],
     )  # fmt: skip
+
+
+def _way(ways: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the first of some ways that is no point, with the length 1."""
+    long = MILLIMETRES * SAME_TO_THE_EYE
+    return next((dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > long)
 
 
 def _alignment(part: float, low: str, high: str) -> str:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kinetostat.arrays import Array
-from kinetostat.display import Scale, number
+from kinetostat.display import Scale, number, with_minus_signs
 from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, setting_of
@@ -134,7 +134,7 @@ def moved_legend(figure: Figure, named: tuple[str, str], setting: str, slack: bo
     styles += [("slack", SLACK, "--")] if slack else []
     legend = figure.legend(
         handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
-        loc="outside lower center", ncols=len(styles), title_fontsize=6.5, title=setting,
+        loc="outside lower center", ncols=len(styles), title_fontsize=6.5, title=with_minus_signs(setting),
     )  # fmt: skip
     legend.get_title().set(multialignment="center", color="#555555")
 

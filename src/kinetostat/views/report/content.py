@@ -133,7 +133,7 @@ _POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
 _EXPONENT = re.compile(r"\*\*([2-4])\b")
 _DEGREES = re.compile(r"(?<=\d) deg\b")
 _WHOLE = re.compile(r"(?<=\d)\.0(?= (?:m|rad|N|kg|Pa)\b)")
-_PLAIN_NUMBER = re.compile(r"[-+.\de]+")
+_PLAIN_NUMBER = re.compile(r"[-+.\de]+(?: deg)?")
 _ZEROS = re.compile(r"(?<![\w.,])(\d+?)(0{6,})(?:\.0)?(?= (?:m|rad|N|kg|Pa)\b)")
 _TIMES = re.compile(r"^(\d+) x ")
 

@@ -439,11 +439,12 @@ export default {
       const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
       const up = new THREE.Vector3().crossVectors(back, right);
       const whole = Math.tan((this.camera.fov * Math.PI) / 360), slope = whole * FILLED;
-      const below = Number(getComputedStyle(this.$el).getPropertyValue("--below")) || 0; // share that words stand on
+      const style = getComputedStyle(this.$el); // shares of the height on which words and buttons stand
+      const [over, under] = ["--over", "--under"].map((name) => Number(style.getPropertyValue(name)) || 0);
       const [aside, wide] = this.span(right, back, slope * this.camera.aspect);
-      const [above, high] = this.span(up, back, slope * (1 - below));
+      const [above, high] = this.span(up, back, slope * (1 - over - under));
       const distance = Math.max(wide, high);
-      const target = this.centre.clone().addScaledVector(right, aside).addScaledVector(up, above - below * whole * distance);
+      const target = this.centre.clone().addScaledVector(right, aside).addScaledVector(up, above + (over - under) * whole * distance);
       this.camera.position.copy(target).addScaledVector(back, distance);
       this.camera.near = distance / 100;
       this.camera.far = distance * 20;
