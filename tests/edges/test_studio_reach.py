@@ -94,10 +94,10 @@ def test_on_a_narrow_page_no_label_is_cut_and_the_layers_leave_the_machine_free(
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_names_of_cables_do_not_lie_on_each_other(width):
+def test_names_of_cables_do_not_lie_on_each_other(page, width):
     """Cables leave their winches in pairs, and the names of a pair would cover each other."""
-    with browser() as new_tab, served("cogiro") as address:
-        tab = new_tab(width).tab
+    tab = page.tab.context.browser.new_page(viewport={"width": width, "height": 800})
+    with served("cogiro") as address:
         tab.goto(address)
         tab.wait_for_function("document.querySelectorAll('.machine-label-labels').length === 8")
         tab.wait_for_function("document.querySelector('.machine-view').dataset.rest === 'fine'")
@@ -105,5 +105,6 @@ def test_names_of_cables_do_not_lie_on_each_other(width):
             """[...document.querySelectorAll('.machine-label-labels')].map((name) => name.getBoundingClientRect())
             .map((box) => [box.left, box.right, box.top, box.bottom])"""
         )
+        tab.close()
     for one, other in combinations(boxes, 2):
         assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]

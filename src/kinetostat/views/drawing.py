@@ -133,7 +133,7 @@ def _write_name(panel: Axes, name: str, leg: Leg, others: Sequence[Leg]) -> None
 
 
 def _way(ways: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the first of some ways that is no point, with the length 1."""
+    """Return the first of some ways that leads anywhere, with the length 1."""
     long = MILLIMETRES * SAME_TO_THE_EYE
     return next((dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > long)
 
