@@ -12,6 +12,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison import compare, read_design
 from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studio.design.texts import comparison_text
 from kinetostat.views.comparison import COMPARISON
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.data_forms import json_of
@@ -254,3 +255,10 @@ def test_bars_start_at_zero_and_what_is_not_known_is_said():
         assert panels[name].get_ylim()[0] == 0.0
     assert [text.get_text() for text in panels["moving mass"].texts] == ["not known"]
     assert figure.legends[0].get_title().get_text() == "in base axes at the platform point P"
+
+
+def test_each_table_of_the_studio_has_its_own_caption():
+    """A screen reader calls a table by its caption: values over poses are not those at the pose of each design."""
+    shown = comparison_text(compare(["hexapod", STIFFER], ["z=13 cm:14 cm:2"]))
+    assert shown.count("<caption>At the pose of each design</caption>") == 1
+    assert "<caption>Over z=13 cm:14 cm:2</caption>" in shown
