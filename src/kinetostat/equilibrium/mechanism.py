@@ -76,7 +76,7 @@ def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
 def _side_by_side(legs: Sequence[ElasticLeg], given: tuple[int, ...]) -> ElasticLeg:
     """The springs and masses of legs of one form with the poses of one leg after those of the other."""
 
-    def arrays(of: Sequence[Any], *names: str) -> dict[str, Array]:
+    def arrays(of: Sequence[Any], *names: str) -> dict[str, Any]:
         return {name: np.concatenate([getattr(each, name) for each in of]) for name in names}
 
     first, masses = legs[0], [leg.masses for leg in legs]
