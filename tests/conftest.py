@@ -77,6 +77,9 @@ os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
 """Messages quote commands as they are typed in the shell: in tests `kinetostat` is on the path, as in the docs."""
 
+os.fsync = lambda _: None
+"""What tests write need not outlive a power cut: a disk takes 4 ms for each file until it is sure to."""
+
 gc.disable()  # until all tests are collected; see `pytest_collection_finish`
 
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
@@ -172,7 +175,7 @@ def pytest_collection_modifyitems(items):
         if item.path.parent.name == LAWS and getattr(item.function, "is_hypothesis_test", False):
             item.add_marker("laws")
         # Not `item.keywords`: the names of the folders are among them.
-        if any(item.get_closest_marker(marker) for marker in MARKERS):
+        if any(mark.name in MARKERS for mark in item.iter_markers()):
             item.add_marker("slow")
     order = {marker: place for place, marker in enumerate(MARKERS)}
     items.sort(key=lambda item: order.get(BY_FILE.get(item.path.stem), len(order)))

@@ -152,10 +152,9 @@ class ErrorModel:
         """
         motions: Errors = [{} for _ in self.rows.legs]
         each = np.atleast_2d(np.asarray(values, dtype=float))
+        present = each.any(axis=0).tolist()
         for number, (_, insertions) in enumerate(self.sources):
-            if not each[:, number].any():
-                continue
-            for i in insertions:
+            for i in insertions if present[number] else ():
                 amount = each[:, number]
                 if i.factor is not None:
                     amount = amount * i.amount(self.drawn.state.coordinates[i.leg])
@@ -235,23 +234,28 @@ class ErrorModel:
 
     def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
         tool, length, legs = self._tool_at(state.platform), self.rows.length, self.rows.legs
-        by_place: dict[tuple[int, int], list[tuple[int, Insertion]]] = {}
+        by_place: dict[int, dict[int, list[tuple[int, Insertion]]]] = {}
         for number, (_, insertions) in enumerate(self.sources):
             for i in insertions if wanted is None or number in wanted else ():
-                by_place.setdefault((i.leg, i.behind), []).append((number, i))
+                by_place.setdefault(i.leg, {}).setdefault(i.behind, []).append((number, i))
         with np.errstate(all="ignore"):
             places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
             free = screws_of_legs(self.rows, places, tool, self.independent)
             hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
-            for (leg, behind), entries in by_place.items():
-                wrenches = _work_in_body(hold.at_origin(leg, tool, length), places[leg].before[behind])
-                wrenches = _work_beside(wrenches, errors[leg].get(behind))
-                amounts = np.stack([i.amount(self.drawn.state.coordinates[leg]) for _, i in entries], axis=1)
-                work = np.swapaxes(wrenches, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
-                twists = hold.shares[leg] @ work
-                for column, (number, _) in enumerate(entries):
-                    result[:, :, number] += twists[:, :, column]
+            for leg, of_leg in by_place.items():
+                at_origin, before = hold.at_origin(leg, tool, length), [places[leg].before[behind] for behind in of_leg]
+                bodies = Motions(
+                    *(np.stack([getattr(at, part) for at in before]) for part in ("rotation", "translation"))
+                )
+                beside = np.stack([np.broadcast_to(errors[leg].get(b, np.zeros(6)), (len(self), 6)) for b in of_leg])
+                every = _work_beside(_work_in_body(at_origin, bodies), beside)
+                for wrenches, entries in zip(every, of_leg.values(), strict=True):
+                    amounts = np.stack([i.amount(self.drawn.state.coordinates[leg]) for _, i in entries], axis=1)
+                    work = np.swapaxes(wrenches, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
+                    twists = hold.shares[leg] @ work
+                    for column, (number, _) in enumerate(entries):  # an error may stand twice at one place
+                        result[:, :, number] += twists[:, :, column]
         result[:, 3:] *= length
         result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
         sound = np.isin(self.drawn.status, REGULAR) & state.settled
@@ -259,29 +263,29 @@ class ErrorModel:
 
 
 def _work_in_body(wrenches: Array, place: Motions) -> Array:
-    """Work of wrenches at the base origin [n x 6 x m] on screws fixed in a body: the transposed adjoint."""
+    """Work of wrenches at the base origin [n x 6 x m] on screws fixed in a body, or in each of several."""
     moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
-    moments = moments + cross(forces, place.translation[:, None])
-    return np.concatenate([np.swapaxes(part @ place.rotation, 1, 2) for part in (moments, forces)], axis=1)
+    moments = moments + cross(forces, place.translation[..., None, :])
+    return np.concatenate([np.swapaxes(part @ place.rotation, -2, -1) for part in (moments, forces)], axis=-2)
 
 
-def _work_beside(wrenches: Array, error: Array | None) -> Array:
-    """Work of wrenches [n x 6 x m] on the screws by which exp(e) changes, on the left, per unit that is added to e.
+def _work_beside(wrenches: Array, error: Array) -> Array:
+    """Work of wrenches [... x 6 x m] on the screws by which exp(e) changes, on the left, per unit that is added to e.
 
-    The error e is small [n x 6], so that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices.
+    The error e is small [... x 6], so that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices.
     """
-    if error is None:
+    if not error.any():
         return wrenches
     once = _bracket(error, wrenches)
     return np.asarray(wrenches + once / 2.0 + _bracket(error, once) / 6.0)
 
 
 def _bracket(screw: Array, wrenches: Array) -> Array:
-    """Work of wrenches [n x 6 x m] on the brackets of a screw [n x 6] with others."""
-    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
-    turning, moving = screw[:, None, :3], screw[:, None, 3:]
+    """Work of wrenches [... x 6 x m] on the brackets of a screw [... x 6] with others."""
+    moments, forces = np.swapaxes(wrenches[..., :3, :], -2, -1), np.swapaxes(wrenches[..., 3:, :], -2, -1)
+    turning, moving = screw[..., None, :3], screw[..., None, 3:]
     parts = cross(moments, turning) + cross(forces, moving), cross(forces, turning)
-    return np.concatenate([np.swapaxes(part, 1, 2) for part in parts], axis=1)
+    return np.concatenate([np.swapaxes(part, -2, -1) for part in parts], axis=-2)
 
 
 def error_model(
