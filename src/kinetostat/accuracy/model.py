@@ -152,7 +152,7 @@ class ErrorModel:
         """
         motions: Errors = [{} for _ in self.rows.legs]
         each = np.atleast_2d(np.asarray(values, dtype=float))
-        present = each.any(axis=0).tolist()
+        present = np.any(each != 0.0, axis=0)
         for number, (_, insertions) in enumerate(self.sources):
             for i in insertions if present[number] else ():
                 amount = each[:, number]
