@@ -4,6 +4,7 @@ import pytest
 from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 
 from kinetostat.machine.loading import build, bundled, load
+from kinetostat.machine.parameters import values
 from kinetostat.spec import document
 from kinetostat.spec.errors import shorten
 
@@ -176,6 +177,12 @@ def test_messages_show_only_printable_text(written, place, text):
 def test_a_file_that_is_no_text_is_refused(written, content, words):
     message = refusal(written(content))
     assert all(word in message for word in words)
+
+
+def test_a_file_of_a_windows_editor_is_read(written):
+    """It begins with a mark of the byte order, and its lines end in two characters."""
+    windows = b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode()
+    assert values(load(written(windows))) == values(load(written(GOOD)))
 
 
 def test_a_folder_is_refused(tmp_path):

@@ -23,7 +23,7 @@ from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import form_of, remove_replaced_form, with_angles
-from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, numbered_entry, with_values
+from kinetostat.machine.parameters import POSE, Given, check_contrast, find_field, numbered_entry, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY, Plan
@@ -114,10 +114,10 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
 
 
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
-    """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"; unknown names stay."""
+    """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"."""
     pairs = ((setting, *setting.partition("=")) for setting in several(settings))
     return [
-        f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign else given
+        f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign and name.strip() else given
         for given, name, sign, value in pairs
     ]
 
@@ -131,10 +131,7 @@ def _whole_path(document: Document, name: str) -> str:
     family = family_named(kind) if isinstance(kind, str) else None
     if family is None or head in {*KEYS, *document, *(table.partition(".")[0] for table in family.every_table)}:
         return name
-    try:
-        return find(family, name).path
-    except InputError:
-        return name
+    return find_field(family, name).path
 
 
 def _common_path(document: Document, name: str) -> str:

@@ -212,7 +212,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
     hint = f"did you mean {named_entry(near[0])}?" if near else rest
-    raise InputError(f'"{given}" is not a field of family {family.name}; {hint}')
+    raise InputError(f"{shorten(given)} is not a field of family {family.name}; {hint}")
 
 
 def values(machine: HasNumbers) -> dict[str, Scalar]:

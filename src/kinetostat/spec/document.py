@@ -78,13 +78,15 @@ def read_text(path: Path) -> str:
 def text_of(data: bytes, origin: str, kind: str = "TOML") -> str:
     """Return the text of a file of bounded size; `origin` names it in messages, and `kind` what it should be.
 
+    A mark of the byte order at its start, as Windows editors write it, is left out.
+
     Raises:
         InputError: if it is too large or not text.
     """
     if len(data) > LARGEST_FILE:
         raise InputError(f'"{origin}" is larger than {LARGEST_FILE >> 20} MiB; it should be a short {kind} text.')
     try:
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
             f'"{origin}" is not text: byte {error.start} is not UTF-8; it must be {kind}, saved as UTF-8.'

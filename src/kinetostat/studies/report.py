@@ -113,7 +113,7 @@ def _study(name: str, path: Path, settings: Sequence[str]) -> Subject:
 def _read(name: str, path: Path) -> tuple[str, str]:
     """The text of a machine or study file, or of a bundled machine of that name."""
     shipped = bundled()
-    return (f"{name}.toml", shipped[name]) if name in shipped else (path.name, path.read_text("utf-8"))
+    return (f"{name}.toml", shipped[name]) if name in shipped else (path.name, path.read_text("utf-8-sig"))
 
 
 @dataclass(frozen=True)
