@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat import command, evaluate, modes
 from kinetostat.engine.batch import first_limit_passed, in_slabs, limits_used
 from kinetostat.engine.form import Specimen, form_of, traced_machine
 from kinetostat.engine.kernel import slab_fill
@@ -14,6 +15,7 @@ from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
+from kinetostat.machine.loading import load as bundled_with_limits
 from kinetostat.machine.parameters import parameters, values, with_values
 from machines import load_without_limits as load
 
@@ -129,6 +131,29 @@ def test_loads_that_hold_a_singular_machine_hold_it_within_its_limits_only(way):
         fill = loaded_fill(machine, [*columns], ["displacement_z"], way)
         statuses.append(in_slabs(PointTable(columns), fill, 1, way.slab, 1)[1].tolist())
     assert statuses == [[Status.OK] * 4, [Status.JOINT_LIMIT] * 4]
+
+
+HEAVY = ("tool.mass=3 kg", "load.gravity=[0, 0, -9.81]")
+
+
+def test_actuators_commanded_beyond_a_limit_are_said_to_be():
+    """At 6 cm two legs of the hexapod are longer than its file allows; at a right angle it has no rest at all."""
+    machine = bundled_with_limits("hexapod", HEAVY)
+    answer = command(machine, {"x": [0.0, 0.06, 0.0], "yaw": [0.0, 0.0, math.pi / 2]})
+    assert answer.settled.tolist() == [True, True, False]
+    assert answer.message.endswith(
+        "But a limit of the file is passed at 1 of 3 poses, first at pose 2: limits.longest_leg."
+    )
+    assert "But the pose passes limits.longest_leg" in command(with_values(machine, {"pose.x": 0.06})).message
+    assert "limit" not in command(machine, {"x": [0.0, 0.001]}).message
+
+
+def test_modes_under_load_obey_limits_as_the_map_of_frequencies_does():
+    machine = bundled_with_limits("hexapod", [*HEAVY, 'load.state="loaded"', "limits.longest_leg=7 cm"])
+    assert evaluate(machine, {"x": [0.0]}, ["loaded_frequency_1"]).status.values.tolist() == [Status.JOINT_LIMIT]
+    refused = modes(machine)
+    assert (refused.status, refused.modes) == (Status.JOINT_LIMIT, ())
+    assert "limits.longest_leg asks for at most 70 mm" in refused.message
 
 
 @pytest.mark.parametrize(("name", "load_settings", "fields"), CASES, ids=[case[0] for case in CASES])

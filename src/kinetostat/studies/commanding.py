@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import Array, Mask
-from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.batch import Progress, first_limit_passed, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.actuation import commanded_state
 from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, states_at
@@ -24,6 +24,7 @@ from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.column import stacked_columns
+from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
@@ -328,7 +329,8 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         left=answer.left,
         turned=answer.turned,
         settled=answer.settled,
-        message=_message(machine, answer.settled, answer.before, answer.left),
+        message=_message(machine, answer.settled, answer.before, answer.left)
+        + _limits_passed(machine, {} if poses is None else poses.leaves, answer.settled),
     )
 
 
@@ -341,3 +343,21 @@ def _message(machine: Machine, settled: Mask, before: Array, left: Array) -> str
         f"Commanded so, the tool point is off by at most {show(float(np.nanmax(left)), 'm')}; without a correction by "
         f"{show(float(np.nanmax(before)), 'm')}.{without}"
     )
+
+
+def _limits_passed(machine: Machine, columns: Mapping[str, Array], settled: Mask) -> str:
+    """A sentence on the commanded poses that pass a limit of the file; empty without one."""
+    names, rows = [limit.name for limit in limits_set(machine.tables["limits"])], np.flatnonzero(settled)
+    if not (names and rows.size):
+        return ""
+    path, here = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
+    placed = {path: np.full(len(settled), here), **columns}
+    first = first_limit_passed(machine, {path: column[rows] for path, column in placed.items()}, names)
+    passed = np.flatnonzero(first >= 0)
+    if not passed.size:
+        return ""
+    limit = f"limits.{names[first[passed[0]]]}"
+    if len(settled) == 1:
+        return f" But the pose passes {limit}, see `kinetostat analyze` there."
+    where = f"{len(passed)} of {len(settled)} poses, first at pose {rows[passed[0]] + 1}: {limit}"
+    return f" But a limit of the file is passed at {where}."

@@ -17,7 +17,7 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.links import loaded_links
-from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, state_of
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.loading import Deflection
@@ -298,7 +298,8 @@ def modes(
 def _modes_in(state: MachineState) -> Vibration:
     machine, names, status = state.machine, state.machine.family.component_names, state.status
     refuse_unknown_mass(machine, "modes", state.configuration)
-    if status is not Status.OK and (not machine.loaded or status in WITHOUT_SEARCH_FOR_REST):
+    held_by_loads = machine.loaded and status is Status.SINGULAR and int(state.free.place_status) == Status.OK
+    if status is not Status.OK and not held_by_loads:
         return Vibration(state, status, state.refusal, names)
     equations = state.equations
     if equations is None:
