@@ -301,20 +301,30 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
         shares: screws a and weights w >= 0, infinity included.
         length: what to multiply translational components by, to compare them with rotational ones, m or 1/m.
     """
-    finite = Symmetric6.total([Symmetric6.dyad(a, a) * where(w < INFINITE, w, 0.0) for a, w in shares])
-    reached = [_endless(w, screw, length) for screw, w in shares]
+    limited = [where(w < INFINITE, w, 0.0) for _, w in shares]
+    finite = Symmetric6.total([Symmetric6.dyad(a, a) * w for (a, _), w in zip(shares, limited, strict=True)])
+    reached = [_beyond_round_off(screw, length) for screw, _ in shares]
+    endless = [
+        [where(w < INFINITE, 0.0, where(flag, 1.0, 0.0)) for flag in flags]
+        for flags, (_, w) in zip(reached, shares, strict=True)
+    ]
     entries = []
     for k, (i, j) in enumerate(POSITIONS):
-        together = total([flags[i] * flags[j] for flags in reached])
-        entries.append(where(together > 0.5, INFINITE, finite.upper[k]))
+        if i == j:  # a sum of squares stays infinite by itself, which takes half of the arithmetic
+            weights = [where(flags[i], w, least) for flags, (_, w), least in zip(reached, shares, limited, strict=True)]
+            squares = [a.components()[i] * a.components()[i] for a, _ in shares]
+            entries.append(total([square * w for square, w in zip(squares, weights, strict=True)]))
+        else:
+            together = total([flags[i] * flags[j] for flags in endless])
+            entries.append(where(together > 0.5, INFINITE, finite.upper[k]))
     return Symmetric6(tuple(entries))
 
 
-def _endless(weight: Scalar, screw: Screw, length: Scalar) -> list[Scalar]:
-    """1 for each component of the screw that an infinite weight reaches beyond round-off, else 0."""
+def _beyond_round_off(screw: Screw, length: Scalar) -> list[Scalar]:
+    """For each component of the screw, whether it is more than round-off, so that an infinite weight reaches it."""
     sizes = [c * c * scale for c, scale in zip(screw.components(), _squares(length), strict=True)]
     limit = UNREACHED_COMPONENT * total(sizes)
-    return [where(weight < INFINITE, 0.0, where(size > limit, 1.0, 0.0)) for size in sizes]
+    return [size > limit for size in sizes]
 
 
 def _squares(length: Scalar) -> list[Scalar]:
