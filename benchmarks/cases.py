@@ -99,8 +99,16 @@ HEXAPOD = Case(
         "pose.z",
     ),
     numpy_hexapod.diagonals,
-    {"6x6 Cholesky": 2},
-    np.concatenate([*numpy_hexapod.BASE.T, *numpy_hexapod.PLATFORM.T, [numpy_hexapod.ACTUATOR] * 6]),
+    {"6x6 Cholesky": 2, "with margin and limits": 4},
+    np.concatenate(
+        [
+            *numpy_hexapod.BASE.T,
+            *numpy_hexapod.PLATFORM.T,
+            [numpy_hexapod.ACTUATOR] * 6,
+            [numpy_hexapod.SHORTEST**2, numpy_hexapod.LONGEST**2, *[np.cos(numpy_hexapod.STEEPEST) ** 2] * 2],
+            [numpy_hexapod.LENGTH, numpy_hexapod.LEAST_MARGIN],
+        ]
+    ),
 )
 
 TRIPTERON = Case(

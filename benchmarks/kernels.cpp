@@ -1,6 +1,7 @@
 // Machines by hand in C++ with GCC vector extensions: what evaluate() is measured against.
 // The 4-dof machine in two ways: the paper's (K of eq. 32, 6x6 Cholesky inverse), and one that uses all that is known of
-// it (4x4). The hexapod and the Tripteron: K, then a 6x6 Cholesky inverse.
+// it (4x4). The hexapod and the Tripteron: K, then a 6x6 Cholesky inverse. The hexapod also as it is judged: with its
+// singularity margin, which follows from the traces of K and C because its legs are equally stiff, and with its limits.
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -181,10 +182,12 @@ static inline V inverse_diagonal(V K[6][6], V* C) {
     return smallest;
 }
 
-struct Hexapod { double base[3][6], top[3][6], actuator[6]; };
+// Limits: squares of the shortest and the longest leg, and of the least cosines of a leg to z of base and platform.
+struct Hexapod { double base[3][6], top[3][6], actuator[6], shortest, longest, base_cosine, top_cosine, length, margin; };
 
 // Columns x y z roll pitch yaw.
-static inline V hexapod(const Hexapod& m, const double* const* in, int64_t at, V* C, V* D) {
+template <bool JUDGED>
+static inline V hexapod(const Hexapod& m, const double* const* in, int64_t at, V* C, V* D, Mask& allowed) {
     V p[3], c[3], s[3], K[6][6];
     for (int i = 0; i < 3; i++) p[i] = load(in[i] + at), cos_sin(load(in[3 + i] + at), c[i], s[i]);
     V R[3][3] = {{c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0]},
@@ -198,14 +201,24 @@ static inline V hexapod(const Hexapod& m, const double* const* in, int64_t at, V
             r[i] = R[i][0] * m.top[0][leg] + R[i][1] * m.top[1][leg] + R[i][2] * m.top[2][leg];
             v[i] = r[i] + p[i] - m.base[i][leg];
         }
-        V unit = 1.0 / root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        V square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], unit = 1.0 / root(square);
         for (int i = 0; i < 3; i++) v[i] *= unit;
+        if (JUDGED) {
+            V up = v[0] * R[0][2] + v[1] * R[1][2] + v[2] * R[2][2];
+            allowed &= (square >= m.shortest) & (square <= m.longest) & (v[2] * v[2] >= m.base_cosine)
+                & (up * up >= m.top_cosine);
+        }
         V w[6] = {r[1] * v[2] - r[2] * v[1], r[2] * v[0] - r[0] * v[2], r[0] * v[1] - r[1] * v[0], v[0], v[1], v[2]};
         for (int i = 0; i < 6; i++)
             for (int j = 0; j <= i; j++) K[i][j] += m.actuator[leg] * w[i] * w[j];
     }
     for (int i = 0; i < 6; i++) D[i] = K[i][i];
-    return inverse_diagonal(K, C);
+    V smallest = inverse_diagonal(K, C);
+    if (!JUDGED) return smallest;
+    double area = m.length * m.length;
+    V stiff = (D[0] + D[1] + D[2]) * (1.0 / area) + D[3] + D[4] + D[5], soft = (C[0] + C[1] + C[2]) * area + C[3] + C[4] + C[5];
+    V margin = 6.0 / root(stiff * soft);
+    return (smallest > 1e-9) & (margin > m.margin) ? margin : smallest * 0.0;
 }
 
 struct Tripteron { double link, torsion, bending, shear, actuator; };  // compliances of a link; N/m
@@ -271,23 +284,24 @@ static inline V pose_4dof(const Machine& m, const double* const* in, int64_t at,
     return regular;
 }
 
-enum Kind { FOUR_DOF, FOUR_DOF_REDUCED, HEXAPOD, TRIPTERON };
+enum Kind { FOUR_DOF, FOUR_DOF_REDUCED, HEXAPOD, TRIPTERON, HEXAPOD_JUDGED };
 
 template <Kind KIND, bool ALL>
 static void run(const void* m, const double* const* in, double* const* out, int8_t* status, int64_t count) {
     for (int64_t k = 0; k < count; k += LANES) {
         int64_t at = k <= count - LANES ? k : count - LANES;
         V C[6], K[6], regular;
-        Mask reached = Mask{} - 1;
-        if (KIND == HEXAPOD) regular = hexapod(*static_cast<const Hexapod*>(m), in, at, C, K);
+        Mask reached = Mask{} - 1, allowed = Mask{} - 1;
+        if (KIND == HEXAPOD) regular = hexapod<false>(*static_cast<const Hexapod*>(m), in, at, C, K, allowed);
+        else if (KIND == HEXAPOD_JUDGED) regular = hexapod<true>(*static_cast<const Hexapod*>(m), in, at, C, K, allowed);
         else if (KIND == TRIPTERON) regular = tripteron(*static_cast<const Tripteron*>(m), in, at, C, K);
         else regular = pose_4dof(*static_cast<const Machine*>(m), in, at, KIND == FOUR_DOF_REDUCED, ALL, C, K, reached);
-        Mask solvable = regular > 1e-9, ok = reached & solvable;
+        Mask solvable = regular > (KIND == HEXAPOD_JUDGED ? 0.0 : 1e-9), ok = reached & solvable & allowed;
         V nan = regular * 0.0 + NAN;
         if (ALL)
             for (int i = 0; i < 6; i++) store(out[i] + at, ok ? C[i] : nan), store(out[6 + i] + at, ok ? K[i] : nan);
         else store(out[0] + at, ok ? C[0] + C[1] + C[2] + C[3] + C[4] + C[5] : nan);
-        Mask code = reached ? (solvable ? Mask{} : Mask{} + 3) : Mask{} + 1;
+        Mask code = reached ? (solvable ? (allowed ? Mask{} : Mask{} + 2) : Mask{} + 3) : Mask{} + 1;
         for (int i = 0; i < LANES; i++) status[at + i] = int8_t(code[i]);
     }
 }
@@ -303,6 +317,7 @@ extern "C" void kernel(int kind, const void* m, const double* const* in, double*
         case FOUR_DOF: either<FOUR_DOF>(m, in, out, status, count, all); break;
         case FOUR_DOF_REDUCED: either<FOUR_DOF_REDUCED>(m, in, out, status, count, all); break;
         case HEXAPOD: either<HEXAPOD>(m, in, out, status, count, all); break;
+        case HEXAPOD_JUDGED: either<HEXAPOD_JUDGED>(m, in, out, status, count, all); break;
         case TRIPTERON: either<TRIPTERON>(m, in, out, status, count, all); break;
     }
 }

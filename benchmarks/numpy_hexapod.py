@@ -9,6 +9,10 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 ACTUATOR = 20e6
+SHORTEST, LONGEST, STEEPEST = 0.07, 0.125, np.radians(75)
+"""Limits: of the length of legs, m, and of their angles to the z axes of base and platform."""
+LENGTH, LEAST_MARGIN = 0.1025, 1e-6
+"""Through which rotations and translations compare, m, and the singularity margin below which nothing has a result."""
 
 
 def ring(radius: float, height: float, angles: list[float]) -> Array:
