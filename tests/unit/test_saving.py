@@ -134,6 +134,14 @@ def test_legs_joints_and_links_are_met_by_name():
     assert same(build(text), machine)
 
 
+def test_springs_in_series_keep_their_names_and_units():
+    machine = with_values(load("hexapod-hardware"), {"legs.leg.drive.stiffness.nut": 250e6})
+    text = as_file(machine)
+    assert len(difference(bundled()["hexapod-hardware"], text)) == 2
+    assert 'stiffness = ["screw 139 N/um", "nut 250 N/um", "bearing 375 N/um"]' in text
+    assert same(build(text), machine)
+
+
 def test_a_machine_without_a_file_is_written_in_readable_units():
     text = as_file(replace(load("hexapod"), written=None))
     assert 'base_angles = ["-10 deg", "10 deg", "110 deg", "130 deg", "230 deg", "250 deg"]' in text

@@ -125,6 +125,10 @@ def _fields(machine: Machine) -> Iterator[tuple[str, str, Quantity]]:
 
 def _field(home: Any, name: str, quantity: Quantity, new: Any, old: Any) -> tuple[Any, str, Any]:
     """Return the table, the key and the value that stand for the new numbers of a field."""
+    if isinstance(home, list):  # springs in series, each a text of its name and its stiffness
+        names = [str(text).partition(" ")[0] for text in home]
+        place = names.index(name)
+        return home, str(place), f"{name} {quantity.in_file(new, home[place].partition(' ')[2])}"
     before = home.get(name)
     if quantity.count is None:
         return home, name, quantity.in_file(new, before)
