@@ -121,6 +121,7 @@ def contour_maps(dataset: "xr.Dataset", names: Sequence[str], title: str) -> Fig
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
     with new_figure((2.75 * columns + 0.3, 2.45 * rows + 0.4), title, *setting_lines(dataset)) as figure:
+        mpl.rcParams["axes.grid"] = False
         panels = figure.subplots(rows, columns, squeeze=False).flat
         x, x_label = grid_view.axis_values(dataset, str(across))
         y, y_label = grid_view.axis_values(dataset, str(up))
@@ -276,7 +277,6 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: "xr.DataArray", scale:
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
     panel.set_facecolor("#eeeeee")
-    panel.grid(visible=False)
     panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
     panel.locator_params(nbins=MOST_STEPS)
     if values.count() == 0:
