@@ -107,7 +107,7 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
             continue
         title = str(shown.title or description.title)
         rows = as_table(shown, title)
-        parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer"))
+        parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer", rows.numeric))
     return "".join(parts) + "".join(figure_html(drawing) for drawing in description.drawings(answer).values())
 
 

@@ -71,7 +71,9 @@ def full_label(parameter: Parameter) -> str:
     return label(parameter) if where in ("pose", "geometry") else f"{where}: {label(parameter)}"
 
 
-def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
+def table(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "", numeric: Sequence[bool] = ()
+) -> str:
     """Return an HTML table whose first column names the rows.
 
     Args:
@@ -79,16 +81,22 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind
         head: heads of the columns; no head is shown if all are empty.
         rows: rows of texts.
         kind: further class for the style sheet.
+        numeric: whether each column has numbers; words are broken into lines. If it is empty, all but the first have.
     """
     columns = [without_round_off(column) for column in zip(*rows, strict=True)]
     columns[1:] = [[*map(with_minus_signs, column)] for column in columns[1:]]
-    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    kinds = ["" if number else ' class="words"' for number in numeric or [True] * len(head)]
+    top = "".join(f'<th scope="col"{name}>{escape(cell)}</th>' for cell, name in zip(head, kinds, strict=True))
     body = "".join(
-        f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'
+        f'<tr><th scope="row">{escape(first)}</th>{_cells(rest, kinds[1:])}</tr>'
         for first, *rest in zip(*columns, strict=True)
     )
     heads = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
     return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{heads}<tbody>{body}</tbody></table>'
+
+
+def _cells(cells: Sequence[str], kinds: Sequence[str]) -> str:
+    return "".join(f"<td{name}>{escape(cell)}</td>" for cell, name in zip(cells, kinds, strict=True))
 
 
 def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str, str] | None = None) -> str:
