@@ -1,6 +1,7 @@
 """What sweeps and maps leave behind: labelled NetCDF that reads back, figures with units, and no half-written file."""
 
 import xml.etree.ElementTree as ElementTree
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -201,6 +202,15 @@ def test_a_picture_of_a_figure_has_its_pixels_and_its_size(section, tmp_path):
         assert picture.mode == "RGB"
         assert picture.info["dpi"] == pytest.approx((200.0, 200.0), abs=0.01)
         np.testing.assert_array_equal(np.asarray(picture), np.asarray(figure.canvas.buffer_rgba())[..., :3])
+
+
+def test_numbers_that_are_placed_once_stand_where_matplotlib_places_them_again(section, tmp_path):
+    figure = contour_maps(section, ["compliance_z", "stiffness_x"], "title")
+    save_figure(figure, tmp_path / "once.png")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kinetostat.views.figures.steady_ticks", lambda _panels: nullcontext())
+        save_figure(figure, tmp_path / "again.png")
+    assert (tmp_path / "once.png").read_bytes() == (tmp_path / "again.png").read_bytes()
 
 
 def test_stiffness_curves_are_log_log_with_one_panel_per_unit():

@@ -252,6 +252,13 @@ def test_processes_that_begin_at_once_have_one_secret_and_one_file(folder, expec
     assert answer()[:-1] == expected
 
 
+def test_a_secret_that_another_process_has_made_meanwhile_stays(folder, monkeypatch):
+    write_program(TEXT, CONTENT)
+    monkeypatch.setattr(program_files, "_exists", lambda *_: False)  # as it was when this process looked
+    write_program("another recipe", CONTENT)
+    assert read_program(TEXT) == CONTENT
+
+
 def test_nothing_is_kept_where_it_is_switched_off(tmp_path, expected, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert answer(**{program_files.VARIABLE: "off"}) == [*expected, "compiled"]
