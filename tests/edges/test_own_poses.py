@@ -201,3 +201,13 @@ def test_a_control_character_in_a_file_is_refused_with_its_line(tmp_path, capsys
     path.write_text(f"x [mm],y [mm]\n1,2\n1{character}5,2\n", "utf-8")
     assert main(["path", "hexapod", str(path)]) == BAD_INPUT
     assert "line 3 has the control character" in capsys.readouterr().err
+
+
+def test_a_quantity_that_has_no_number_at_any_pose_is_a_row_of_dashes(tmp_path, capsys):
+    """A Delta does not turn, so that drives give it no angular acceleration; other quantities have numbers."""
+    (tmp_path / "poses.csv").write_text("x [mm]\n0\n5\n", "utf-8")
+    asked = ["--quantity", "least_angular_acceleration", "--quantity", "mass"]
+    assert main(["path", "delta", str(tmp_path / "poses.csv"), "--set", "tool.mass=1 kg", *asked]) == 0
+    rows = {line.split()[0]: line.split() for line in capsys.readouterr().out.splitlines() if line.strip()}
+    assert rows["least_angular_acceleration"][2:] == ["–"] * 4
+    assert rows["mass"][:3] == ["mass", "kg", "1"]

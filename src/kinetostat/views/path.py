@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -51,6 +51,9 @@ def _tables(answer: PoseAnswers, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Extremes and the numbers of their poses", "quantity", heads)
     display = answer.machine.display
     for name, values in answer.values.items():
+        if np.isnan(values).all():  # of turns, where the machine has none
+            table.add_row(name, display.scale(QUANTITIES[name].unit).head, DASH, DASH, DASH, DASH)
+            continue
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
         scale = display.fitting(QUANTITIES[name].unit, (values[low], values[high]))
         least, largest = (number(float(values[k]) * scale.factor, digits=display.digits) for k in (low, high))
