@@ -1,12 +1,12 @@
 """Small displacements over scalars: how far points move keeps all digits, however far away they are."""
 
 from fractions import Fraction
-from math import atan
+from math import atan, sin
 
 import numpy as np
 import pytest
 
-from kinetostat.numerics.motions import along, of_scalars
+from kinetostat.numerics.motions import along, exponential, of_scalars
 
 AXIS = [Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3)]
 CENTRE, POINT = [Fraction(3, 4), Fraction(5, 8), Fraction(-1, 2)], [Fraction(7, 8), Fraction(-9, 4), Fraction(1, 16)]
@@ -30,3 +30,11 @@ def test_the_shift_of_a_point_is_that_of_exact_fractions(tangent):
     # Two such turns in a row, of which the second one leads back.
     back = along(screw, of_scalars([-2.0 * atan(tangent)])[0])
     assert np.abs((back @ moved).shift(point)).max() < 2e-15 * abs(float(sine))
+
+
+@pytest.mark.parametrize("angle", [1e-3, 0.03, 0.0499, 0.0501])
+def test_a_screw_across_its_axis_moves_to_all_digits_where_the_series_ends(angle):
+    """A turn about x with a motion along y leads (1 - cos t)/t to the side, which is 2 sin^2(t/2)/t."""
+    motion = exponential(np.array([[angle, 0.0, 0.0, 0.0, 1.0, 0.0]]))
+    expected = [0.0, sin(angle) / angle, 2.0 * sin(0.5 * angle) ** 2 / angle]
+    assert motion.translation[0].tolist() == pytest.approx(expected, rel=1e-15, abs=0.0)

@@ -1,7 +1,8 @@
 """Finite displacements of many bodies at once: exponentials of screws, their inverse, and how screws change with them.
 
 Arrays of NumPy, rotation first, all screws at the origin and in base axes; leading axes are poses. An array may also
-hold scalars of any kind as objects, for one pose: the same sums and products are then traced.
+hold scalars of any kind as objects, for one pose: the same sums and products are then traced. `exponential` takes any
+screws of floats, `along` and `each_along` also traced ones; `each_about` is faster for screws that all poses share.
 
 Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3
 and appendix A; theory section 12.
@@ -20,7 +21,7 @@ from kinetostat.numerics.iteration import with_rows
 
 IDENTITY = np.eye(3)
 SMALL_ANGLE = 0.05
-"""Angle, rad, below which quotients like (t - sin t) / t^3 are taken from their series: the fourth term is 1e-16."""
+"""Angle, rad, below which quotients like (t - sin t) / t^3 come from their series: the first term left out is 2e-16."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,13 @@ class Motions:
     def shift(self, points: Array) -> Array:
         """Return by how much points [n x 3] move, without the round-off of where they are.
 
-        The columns of a rotation are of length 1, so that small entries beside the diagonal tell what it lacks of 1.
+        The columns of a rotation are of length 1, so that small entries beside the diagonal give 1 minus the diagonal's
+        entry with all digits.
         """
         turned = self.rotation - IDENTITY
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            aside = self.rotation[:, j, i] * self.rotation[:, j, i] + self.rotation[:, k, i] * self.rotation[:, k, i]
-            turned[:, i, i] = -aside / (1.0 + self.rotation[:, i, i])
+            beside = self.rotation[:, j, i] * self.rotation[:, j, i] + self.rotation[:, k, i] * self.rotation[:, k, i]
+            turned[:, i, i] = -beside / (1.0 + self.rotation[:, i, i])
         return np.asarray(np.einsum("nij,nj->ni", turned, points) + self.translation)
 
     def twist(self, twists: Array) -> Array:
@@ -119,7 +121,7 @@ def along(twists: Array, amounts: Array) -> Motions:
 
 
 def each_along(twists: Array, amounts: Array) -> list[Motions]:
-    """The displacements by screw motions in a row [n x m x 6], each by its amount [n x m]: m of them."""
+    """m displacements at each of n poses: the k-th by the screws `twists[:, k]` [n x m x 6] times `amounts[:, k]`."""
     count, motions = amounts.shape
     if twists.dtype == object or amounts.dtype == object:
         return [along(twists[:, k], amounts[:, k]) for k in range(motions)]
@@ -129,7 +131,7 @@ def each_along(twists: Array, amounts: Array) -> list[Motions]:
 
 
 def each_about(twists: Array, amounts: Array) -> list[Motions]:
-    """The displacements by screw motions that are the same at all poses [m x 6], by amounts [n x m]: m of them.
+    """m displacements at each of n poses: the k-th by the screw `twists[k]` [m x 6] times `amounts[:, k]` [n x m].
 
     With K the cross product with the unit axis and t the angle, rotations are 1 + sin t K + (1 - cos t) K^2: fixed
     matrices times two numbers of each pose, in a quarter of the time of exponentials.
@@ -139,14 +141,14 @@ def each_about(twists: Array, amounts: Array) -> list[Motions]:
     size = np.linalg.norm(twists[:, :3], axis=1)
     unit = np.where(size > 0.0, size, 1.0)[:, None]
     across = skew_of(twists[:, :3] / unit)
-    twice = across @ across
-    aside, back = (np.einsum("mij,mj->mi", part, twists[:, 3:] / unit) for part in (across, twice))
+    squared = across @ across
+    across_moving, squared_moving = (np.einsum("mij,mj->mi", k, twists[:, 3:] / unit) for k in (across, squared))
     # What 1, the amount, sin t and 1 - cos t are multiplied by: nine numbers of the rotation and three of the shift.
     parts = np.zeros((len(twists), 4, 12))
     parts[:, 0, :9] = np.eye(3).ravel()
-    parts[:, 1, 9:] = twists[:, 3:] + back * unit
-    parts[:, 2] = np.concatenate([across.reshape(-1, 9), -back], axis=1)
-    parts[:, 3] = np.concatenate([twice.reshape(-1, 9), aside], axis=1)
+    parts[:, 1, 9:] = twists[:, 3:] + squared_moving * unit
+    parts[:, 2] = np.concatenate([across.reshape(-1, 9), -squared_moving], axis=1)
+    parts[:, 3] = np.concatenate([squared.reshape(-1, 9), across_moving], axis=1)
     angle = amounts.T * size[:, None]
     terms = np.stack([np.ones_like(angle), amounts.T, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2], axis=2)
     return [Motions(each[:, :9].reshape(-1, 3, 3), each[:, 9:]) for each in terms @ parts]
@@ -211,11 +213,11 @@ def _quotients(angle: Array) -> tuple[Array, Array, Array]:
 
 
 def _series(angle: Array) -> tuple[Array, Array, Array]:
-    """The same by their series, for small angles."""
+    """The quotients of `_quotients` by their series, for small angles."""
     square = angle * angle
     fourth, sixth = square**2, square**3
     first = 1.0 - square / 6.0 + fourth / 120.0 - sixth / 5040.0
-    half = 1.0 - square / 24.0 + fourth / 1920.0
+    half = 1.0 - square / 24.0 + fourth / 1920.0 - sixth / 322560.0
     third = 1.0 / 6.0 - square / 120.0 + fourth / 5040.0 - sixth / 362880.0
     return first, 0.5 * half * half, third
 
