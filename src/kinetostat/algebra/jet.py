@@ -1,7 +1,7 @@
 """Jets: a number with its rates along two directions and the rate of one by the other (hyper-dual numbers).
 
-A formula over scalars that is given jets gives its exact first and second derivatives along them. No formula lives
-here.
+A formula over scalars that is given jets gives its exact first and second derivatives along them. No formula of a
+machine lives here.
 
 Source: J. A. Fike and J. J. Alonso, "The development of hyper-dual numbers for exact second-derivative calculations",
 AIAA Paper 2011-886.
@@ -9,13 +9,13 @@ AIAA Paper 2011-886.
 
 from typing import Any, NoReturn
 
-from kinetostat.algebra.scalar import Scalar, arctan2, cos, reciprocal, sin, sqrt, weighted, where
+from kinetostat.algebra.scalar import Scalar, arctan2, cos, is_one, is_zero, reciprocal, sin, sqrt, weighted, where
 from kinetostat.frozen import dataclass
 
 
 @dataclass(frozen=True)
 class Jet:
-    """A number that depends on two amounts, of which only first orders and their product count.
+    """A number a + b e1 + c e2 + d e1 e2 with e1² = e2² = 0: it depends on two amounts to first order in each.
 
     Attributes:
         value: the number.
@@ -41,7 +41,8 @@ class Jet:
         return jet_of(other) - self
 
     def __mul__(self, other: Scalar) -> Scalar:
-        if type(other) is float and other in (0.0, 1.0):
+        # Structural zeros and ones stay what they are, so that they cost a traced program nothing.
+        if is_zero(other) or is_one(other):
             return self if other else 0.0
         b = jet_of(other)
         return Jet(
@@ -60,7 +61,7 @@ class Jet:
         return jet_of(other) * _inverse(self)
 
     def __neg__(self) -> "Jet":
-        return Jet(*(0.0 if type(part) is float and part == 0.0 else -part for part in self.parts))
+        return Jet(*(0.0 if is_zero(part) else -part for part in self.parts))
 
     def __abs__(self) -> Scalar:
         return where(self < 0.0, -self, self)
@@ -88,8 +89,8 @@ class Jet:
         """The number, its rates and the mixed rate."""
         return self.value, self.first, self.second, self.mixed
 
-    def along(self, value: Scalar, slope: Scalar, curvature: Scalar) -> "Jet":
-        """A function of this number, from the function's value and its first two derivatives there."""
+    def image(self, value: Scalar, slope: Scalar, curvature: Scalar) -> "Jet":
+        """The image of this number under a function, from the function's value and its first two derivatives there."""
         rates = [weighted(slope, rate) for rate in (self.first, self.second, self.mixed)]
         return Jet(value, rates[0], rates[1], rates[2] + weighted(curvature, self.first * self.second))
 
@@ -122,7 +123,7 @@ def jet_of(number: Scalar) -> Jet:
 def _inverse(a: Jet) -> Jet:
     shrink = reciprocal(a.value)
     square = shrink * shrink
-    return a.along(shrink, -square, 2.0 * square * shrink)
+    return a.image(shrink, -square, 2.0 * square * shrink)
 
 
 class _JetFunctions:
@@ -132,21 +133,21 @@ class _JetFunctions:
     def sqrt(a: Jet) -> Jet:
         root = sqrt(a.value)
         slope = 0.5 * reciprocal(root)
-        return a.along(root, slope, -0.5 * slope * reciprocal(a.value))
+        return a.image(root, slope, -0.5 * slope * reciprocal(a.value))
 
     @staticmethod
     def sin(a: Jet) -> Jet:
         sine = sin(a.value)
-        return a.along(sine, cos(a.value), -sine)
+        return a.image(sine, cos(a.value), -sine)
 
     @staticmethod
     def cos(a: Jet) -> Jet:
         cosine = cos(a.value)
-        return a.along(cosine, -sin(a.value), -cosine)
+        return a.image(cosine, -sin(a.value), -cosine)
 
     @staticmethod
     def atan2(y: Scalar, x: Scalar) -> Jet:
-        """Angle of a point: its rate is (x dy - y dx) / r^2, and this is a quotient of jets again for the mixed one."""
+        """Angle of a point: its rate is (x dy - y dx) / r^2; the mixed rate is the derivative of this quotient."""
         y, x = jet_of(y), jet_of(x)
         shrink = 1.0 / (x.value * x.value + y.value * y.value)
         first = (x.value * y.first - y.value * x.first) * shrink
@@ -157,6 +158,6 @@ class _JetFunctions:
 
     @staticmethod
     def where(condition: Any, a: Scalar, b: Scalar) -> Scalar:
-        """`a` where the condition holds, `b` elsewhere."""
+        """`a` where the condition holds, `b` elsewhere; a rate that both have, such as a structural zero, is kept."""
         pairs = zip(jet_of(a).parts, jet_of(b).parts, strict=True)
         return Jet(*(left if left is right else where(condition.holds, left, right) for left, right in pairs))

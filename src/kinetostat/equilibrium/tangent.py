@@ -33,9 +33,9 @@ from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, STIFFEST_LEG, UNRESIS
 def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     """Solve the linear equations at a state for right sides [n x unknowns x k].
 
-    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg with rigid parts only has none,
-    and beside a leg that is much stiffer, what resists softly loses its digits. Such poses are solved over the motions
-    that keep all legs closed.
+    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg made only of rigid parts has
+    no finite stiffness, and a very stiff leg drowns the digits of a soft one. Poses with such legs are solved over the
+    motions that keep all legs closed.
 
     Args:
         equations: the equations at the state.
@@ -81,8 +81,7 @@ def compliance(equations: Balance) -> Array:
     right = np.zeros((len(equations.left), equations.left.shape[1], size))
     right[:, :size] = np.eye(size)
     moved = ways @ solve(equations, right)[:, :size] @ ways.T
-    shift = np.broadcast_to(np.eye(6), moved.shape).copy()
-    shift[:, 3:, :3] = -skew_of(equations.state.platform.translation)
+    shift = _shift(-skew_of(equations.state.platform.translation))
     moved = shift @ moved @ np.swapaxes(shift, 1, 2)
     moved = 0.5 * (moved + np.swapaxes(moved, 1, 2))
     sizes = np.abs(np.diagonal(moved, axis1=1, axis2=2))
@@ -91,11 +90,18 @@ def compliance(equations: Balance) -> Array:
     return np.where(moves[:, :, None] & moves[:, None] | np.isnan(moved), moved, 0.0)
 
 
+def _shift(lever: Array) -> Array:
+    """The matrices [n x 6 x 6] that take twists to another reference point: `lever` times the rotation is added."""
+    result = np.broadcast_to(np.eye(6), (len(lever), 6, 6)).copy()
+    result[:, 3:, :3] = lever
+    return result
+
+
 def inverse(compliances: Array) -> Array:
     """The stiffness of each compliance [n x m x m].
 
-    Rigid parts that hold single components leave the others a stiffness of their own: that of a fixed component is
-    infinite, and 0 couples it to the others. All of it is infinite where other directions are rigid.
+    Rigid parts that hold single components leave the others a stiffness of their own: the diagonal entry of a fixed
+    component is infinite, its coupling entries are 0. All of it is infinite where other directions are rigid.
     """
     sizes = np.sqrt(np.abs(np.diagonal(compliances, axis1=1, axis2=2)))
     fixed = sizes == 0.0
@@ -130,15 +136,15 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     for number, leg in enumerate(equations.mechanism.legs):
         block = equations.leg_rates(number, loaded=False)
         rigid |= np.linalg.cond(block) >= 1.0 / UNRESISTED
+        # Wrenches that no joint feels make the block singular: the pseudo-inverse leaves out what rigid parts hold.
         total += np.linalg.pinv(block)[:, leg.size :, leg.size :]
-    back = np.broadcast_to(np.eye(6), (len(total), 6, 6)).copy()
-    back[:, 3:, :3] = skew_of(equations.state.platform.translation)
-    whole = np.swapaxes(back, 1, 2) @ ways @ total @ ways.T @ back
-    whole = 0.5 * (whole + np.swapaxes(whole, 1, 2))
+    from_tool = _shift(skew_of(equations.state.platform.translation))
+    stiffness = np.swapaxes(from_tool, 1, 2) @ ways @ total @ ways.T @ from_tool
+    stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     exists = np.abs(ways).max(axis=1) > 0.0
     fixed = (np.diagonal(compliances, axis1=1, axis2=2) == 0.0) & exists
     apart = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
-    result = np.where((rigid & ~apart)[:, None, None], np.inf, whole)
+    result = np.where((rigid & ~apart)[:, None, None], np.inf, stiffness)
     return _with_held(result, fixed & rigid[:, None])
 
 
@@ -191,13 +197,14 @@ def stabilities(equations: Balance) -> Stabilities:
         stiff, turning = (within(matrix[here], allowed) for matrix in (elastic, geometric))
         springs = spring_factor(equations, part)
         holds = holds_all(springs)
-        half = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
-        shares, turns = np.linalg.eigh(-np.swapaxes(half, 1, 2) @ turning @ half)
+        whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
+        # K_e + factor K_g is singular at factor = 1/share, so that the largest share decides.
+        shares, vectors = np.linalg.eigh(-np.swapaxes(whitening, 1, 2) @ turning @ whitening)
         # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
         stable[here] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
         grows = holds & (shares[:, -1] > UNRESISTED)
         factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
-        moved = (allowed @ half @ turns[:, :, -1:])[:, :, 0]
+        moved = (allowed @ whitening @ vectors[:, :, -1:])[:, :, 0]
         modes[here] = np.where(grows[:, None], moved / np.abs(moved).max(axis=1, keepdims=True), 0.0)
     legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
     return Stabilities(

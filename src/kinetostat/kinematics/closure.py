@@ -14,7 +14,15 @@ from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
-from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
+from kinetostat.kinematics.leg_gaps import (
+    Coordinates,
+    Problems,
+    free_coordinates,
+    goal_of,
+    problems_of,
+    some,
+    undetermined,
+)
 from kinetostat.kinematics.posture import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
@@ -131,19 +139,10 @@ class ClosedForms:
     def _status_where_determined(task: Task, coordinates: Array, status: Codes) -> Codes:
         """The status with poses that do not determine where the platform is."""
         free = free_coordinates(task.chains)
-        here = np.flatnonzero(status == Status.OK)
-        if not free or not here.size:
+        if not free:
             return status
         (problems,) = problems_of(task.chains, len(status), free)
-        unknowns = np.zeros((len(status), problems.size))
-        for part in problems.parts:
-            units = np.where(part.build.slides, problems.lengths[:, None, None], 1.0)
-            unknowns[:, part.columns] = coordinates[:, part.build.places] / units
-        goal = goal_of(problems, task.goal)
-        open_end = undetermined(problems.take(here), unknowns[here], some(goal, here))
-        status = status.copy()
-        status[here[open_end]] = int(Status.SINGULAR)
-        return status
+        return _with_undetermined(problems, problems.unknowns_of(coordinates), goal_of(problems, task.goal), status)
 
     @staticmethod
     def over_scalars(chains: Chains) -> Joints:
@@ -192,26 +191,31 @@ def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> 
     """
     count, free = len(goal), free_coordinates(chains)
     coordinates, status = np.zeros((count, chains.size)), np.full(count, int(Status.OK))
-    every = problems_of(chains, count, free)
+    groups = problems_of(chains, count, free)
     if chosen is not None:
-        every = [problems.take(np.flatnonzero(chosen[problems.poses])) for problems in every]
-    stated = [(problems, goal_of(problems, goal)) for problems in every]
-    for problems, there in stated:
-        status[problems.poses[too_far_or_near(problems, there)]] = int(Status.OUT_OF_REACH)
-    for whole, everywhere in stated:
-        tried = np.flatnonzero(status[whole.poses] == Status.OK)
-        problems, there = whole.take(tried), some(everywhere, tried)
-        unknowns, codes = follow(problems, there)
+        groups = [group.take(np.flatnonzero(chosen[group.poses])) for group in groups]
+    stated = [(group, goal_of(group, goal)) for group in groups]
+    for group, group_goal in stated:
+        status[group.poses[too_far_or_near(group, group_goal)]] = int(Status.OUT_OF_REACH)
+    for group, group_goal in stated:
+        tried = np.flatnonzero(status[group.poses] == Status.OK)
+        problems, tried_goal = group.take(tried), some(group_goal, tried)
+        unknowns, codes = follow(problems, tried_goal)
         reached = np.flatnonzero(codes == Status.OK)
-        unknowns[reached] = nearest_home(problems.take(reached), unknowns[reached], some(there, reached))
-        if free:
-            closed = np.flatnonzero(codes == Status.OK)
-            loose = undetermined(problems.take(closed), unknowns[closed], some(there, closed))
-            codes[closed[loose]] = int(Status.SINGULAR)
-        for part in problems.parts:
-            units = np.where(part.build.slides, problems.lengths[:, None, None], 1.0)
-            coordinates[problems.poses[:, None, None], part.build.places[part.legs]] = unknowns[:, part.columns] * units
-        # Of the legs of a pose, one that is shown to be out of reach decides.
+        unknowns[reached] = nearest_home(problems.take(reached), unknowns[reached], some(tried_goal, reached))
+        verdicts = _with_undetermined(problems, unknowns, tried_goal, codes) if free else codes
+        problems.fill(coordinates, unknowns)
+        # The worst status of a pose's legs wins, so the worst is written last.
         for code in (Status.SINGULAR, Status.NOT_CONVERGED, Status.OUT_OF_REACH):
-            status[problems.poses[codes == code]] = int(code)
+            status[problems.poses[verdicts == code]] = int(code)
     return coordinates, status
+
+
+def _with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, codes: Codes) -> Codes:
+    """The codes of solved problems, SINGULAR where the given coordinates leave the platform free to move."""
+    solved = np.flatnonzero(codes == Status.OK)
+    if not solved.size:
+        return codes
+    codes = codes.copy()
+    codes[solved[undetermined(problems.take(solved), unknowns[solved], some(goal, solved))]] = int(Status.SINGULAR)
+    return codes

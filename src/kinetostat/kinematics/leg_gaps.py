@@ -163,6 +163,24 @@ class Problems:
         point = {name: _at(getattr(self.chains.home.translation, name), self.poses) for name in POINT}
         return point | dict.fromkeys(ANGLES, 0.0)
 
+    def unknowns_of(self, coordinates: Array) -> Array:
+        """The unknowns at joint coordinates [poses x coordinates], those not given as at the home pose."""
+        unknowns = np.zeros((len(self.poses), self.size))
+        for part in self.parts:
+            unknowns[:, part.columns] = coordinates[self._entries(part)] / self._units(part)
+        return unknowns
+
+    def fill(self, coordinates: Array, unknowns: Array) -> None:
+        """Write the joint coordinates of solved problems into those of all poses [poses x coordinates], rad or m."""
+        for part in self.parts:
+            coordinates[self._entries(part)] = unknowns[:, part.columns] * self._units(part)
+
+    def _entries(self, part: AlikeLegs) -> tuple[Integers, Integers]:
+        return self.poses[:, None, None], part.build.places[part.legs]
+
+    def _units(self, part: AlikeLegs) -> Array:
+        return np.where(part.build.slides, self.lengths[:, None, None], 1.0)
+
     def take(self, chosen: Integers) -> "Problems":
         """Return some of the problems, by number."""
         parts = tuple(replace(part, legs=part.legs[chosen]) for part in self.parts)

@@ -47,7 +47,7 @@ class StateSpace(ImmutableAnswer):
         outputs: turns and motions of the tool point, base axes, and deflections of the actuators' springs.
         frequencies: of the modes that are states, Hz.
         ratios: their damping ratios.
-        assumed: whether the file says nothing about damping, so that these are a usual value.
+        assumed: whether the file says nothing about damping; then the ratios are the default.
     """
 
     machine: Machine
@@ -78,7 +78,7 @@ def state_space(
         inputs: names of forces: fx fy fz mx my mz at the tool point, or those of actuators; forces and moments at the
             tool point if None.
         outputs: names of motions: x y z rx ry rz of the tool point, or those of actuators; the tool point's if None.
-        count: of the lowest modes that are states; all if None. What is left out of them follows at once, as a spring.
+        count: of the lowest modes that are states; all if None. Higher modes act as springs without mass.
 
     Raises:
         InputError: a name is unknown, nothing has a mass, or the pose has no vibrations.
@@ -90,16 +90,17 @@ def state_space(
     if count is not None and count < 1:
         raise InputError(f"count is {count}; a state space has one mode or more: give a positive number.")
     forces = {name: part for name, part in WRENCH.items() if part in vibration.components}
-    felt, pushed = _ports(solution, forces, ("N·m", "N"), "input", inputs)
-    shown, moved = _ports(solution, {part: part for part in vibration.components}, ("rad", "m"), "output", outputs)
-    rings = solution.ringing if count is None else min(count, solution.ringing)
+    input_ports, input_modes = _ports(solution, forces, ("N·m", "N"), "input", inputs)
+    motions = {part: part for part in vibration.components}
+    output_ports, output_modes = _ports(solution, motions, ("rad", "m"), "output", outputs)
+    kept = solution.ringing if count is None else min(count, solution.ringing)
     return StateSpace(
         machine,
-        equations_of(solution, damping, pushed, moved, rings),
-        felt,
-        shown,
-        tuple(solution.frequencies[:rings].tolist()),
-        tuple(damping.ratios(solution)[:rings].tolist()),
+        equations_of(solution, damping, input_modes, output_modes, kept),
+        input_ports,
+        output_ports,
+        tuple(solution.frequencies[:kept].tolist()),
+        tuple(damping.ratios(solution)[:kept].tolist()),
         vibration.assumed,
     )
 
@@ -109,6 +110,7 @@ def _ports(
 ) -> tuple[tuple[Port, ...], Array]:
     """The chosen inputs or outputs, and how each moves in all modes; units are those of turning and of sliding."""
     rows = {name: COMPONENTS.index(part) for name, part in tool.items()}
+    # Rows 0 to 2 of a screw turn, and so do drives that say so: False takes the unit of turning, True that of sliding.
     known = {name: (units[row > 2], solution.tool[row]) for name, row in rows.items()}
     known |= {drive.name: (units[not drive.turning], drive.motion) for drive in solution.drives}
     names = [choice(name, known, what) for name in (tool if wanted is None else wanted)]

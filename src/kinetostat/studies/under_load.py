@@ -40,6 +40,8 @@ from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
 CURVE_SHARES = tuple(i / 12 for i in range(16))
 """Shares of the loads at which a curve is drawn: up to 125 %."""
+MOVING = 0.5
+"""Share of the largest motion above which a leg is named among those that move."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,8 @@ class LoadedState(ImmutableAnswer):
 
     Attributes:
         state: the machine's state, at the pose that it has without loads.
-        rest: whether it comes to rest; whether it stays there, with stable springs and struts that do not buckle; and
-            whether it keeps to its limits, those of the loads of its actuators at rest among them.
+        rest: the verdict: no rest, unstable springs or a strut that buckles, beyond a limit (loads of actuators at rest
+            among them), or ok.
         reason: why there is no state of rest; empty where there is one.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
         displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose [n]; empty
@@ -170,8 +172,8 @@ class LoadedState(ImmutableAnswer):
 
 def _with_shares_of_springs(direction: Softest) -> Softest:
     """Return the direction with the shares of springs alone, scaled to add up to 1; tension and weight are left out."""
-    whole = sum(share for _, share in direction.shares) or 1.0
-    shares, kinds = (tuple((n, share / whole) for n, share in row) for row in (direction.shares, direction.kinds))
+    total = sum(share for _, share in direction.shares) or 1.0
+    shares, kinds = (tuple((n, share / total) for n, share in row) for row in (direction.shares, direction.kinds))
     return replace(direction, shares=shares, kinds=kinds)
 
 
@@ -199,7 +201,7 @@ def under_load(machine: Machine | MachineState) -> LoadedState:
         return LoadedState(state, Rest.NO_REST, why_no_tensions(state.machine), names)
     if state.at_rest is None or state.stability is None:
         return _without_rest(state)
-    return _at_rest(state, state.at_rest, state.stability)
+    return _answer_at_rest(state, state.at_rest, state.stability)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,14 +238,14 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
     displacements, loads = [], []
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), last)
-        springs, there = _springs(solution.balance), solution.balance.state
-        known, last = (1.0, there) if solution.settled[0] else (math.nan, last)
-        displacements.append(known * _in_si(mechanism, there.platform.amounts()[0], parts))
-        loads.append([known * spring.load for spring in springs])
-    return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in springs), np.array(loads))
+        states, rest_state = _spring_states(solution.balance), solution.balance.state
+        known, last = (1.0, rest_state) if solution.settled[0] else (math.nan, last)
+        displacements.append(known * _in_si(mechanism, rest_state.platform.amounts()[0], parts))
+        loads.append([known * spring.load for spring in states])
+    return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in states), np.array(loads))
 
 
-def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> LoadedState:
+def _answer_at_rest(state: MachineState, equations: Balance, stability: Stability) -> LoadedState:
     """Return the answer for a machine that comes to rest, whether its rest is stable or not."""
     machine, response = state.machine, state.free
     mechanism, parts = equations.mechanism, list(machine.family.components)
@@ -251,8 +253,6 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
     all_compliances = compliance(equations)
     compliances = (all_compliances * mechanism.compliance_units)[0][square]
     springs_alone = (elastic_stiffness(equations, all_compliances) / mechanism.compliance_units)[0][square]
-    springs = _springs(equations)
-    slack = tuple(dict.fromkeys(spring.leg for spring in springs if spring.slack))
     checks = _limits_at_rest(state)
     stays = stability.stable and not any(strut.bends_away for strut in state.struts)
     return LoadedState(
@@ -262,8 +262,8 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
         components=machine.family.component_names,
         displacement=_in_si(mechanism, equations.state.platform.amounts()[0], parts),
         linear=_linear(response, mechanism, parts),
-        springs=tuple(springs),
-        slack_legs=slack,
+        springs=tuple(_spring_states(equations)),
+        slack_legs=_slack_legs(equations),
         elastic=_clean_stiffness(springs_alone),
         tangent=_clean_stiffness(inverse(compliances[None])[0]),
         compliance=np.array(clean_matrix(compliances.tolist())),
@@ -271,7 +271,7 @@ def _at_rest(state: MachineState, equations: Balance, stability: Stability) -> L
         mode=(stability.mode * units)[parts],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
-        residual=float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
+        residual=float(np.abs(equations.left).max() / _largest_wrench(equations)),
         links=loaded_links(equations, response.configuration.legs, response.reference),
     )
 
@@ -292,12 +292,15 @@ def _limits_at_rest(state: MachineState) -> list[Check]:
 
 
 def _largest_wrench(equations: Balance) -> float:
-    """The largest component of the load, of what the legs carry (it may be preload alone), and of thermal growth."""
+    """The largest component of the load, of what the legs carry (it may be preload alone), and of thermal growth.
+
+    Above 0, so that a machine on which nothing acts has the residual 0.
+    """
     sizes = (equations.load, *equations.state.wrenches, equations.mechanism.growth)
-    return float(max(np.abs(size).max(initial=0.0) for size in sizes))
+    return float(max(np.abs(size).max(initial=1e-300) for size in sizes))
 
 
-def _springs(equations: Balance) -> list[SpringState]:
+def _spring_states(equations: Balance) -> list[SpringState]:
     """All springs that deform, leg by leg."""
     mechanism, coordinates = equations.mechanism, equations.state.coordinates
     length, force = float(mechanism.length[0]), float(mechanism.force[0])
@@ -431,12 +434,12 @@ def how_it_gives_way(limit: LoadLimit | None) -> str:
 
 
 def moving_legs(equations: Balance, stability: Stability) -> list[str]:
-    """The legs that move at least half as much as the one that moves most when a state gives way."""
+    """The legs that move more than `MOVING` times as much as the one that moves most when a state gives way."""
     legs = zip(equations.mechanism.legs, stability.legs, strict=True)
-    return [leg.name for leg, size in legs if size > 0.5 * max(stability.legs)]
+    return [leg.name for leg, size in legs if size > MOVING * max(stability.legs)]
 
 
-def _slack_legs(equations: Balance) -> list[str]:
+def _slack_legs(equations: Balance) -> tuple[str, ...]:
     """The legs in which a spring is slack."""
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
-    return [leg.name for leg, terms in pairs if ((leg.sign != 0.0) & (terms.carrying[0] == 0.0)).any()]
+    return tuple(leg.name for leg, terms in pairs if ((leg.sign != 0.0) & (terms.carrying[0] == 0.0)).any())

@@ -44,7 +44,7 @@ def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
             )
     for leg in plan.legs_of_file:
         for i, joint in enumerate(leg.joints):
-            where = f'"{origin}": leg "{leg.written or leg.name}", joint "{joint.name}"'
+            where = f'"{origin}": leg "{leg.copy_of or leg.name}", joint "{joint.name}"'
             data = tables[leg.table(joint.name)]
             _check_axes(data, where)
             if plan.planar:
@@ -82,7 +82,7 @@ def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
 def _check_link(
     leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, tables: Mapping[str, Any], shape: str, origin: str
 ) -> None:
-    where = f'"{origin}": leg "{leg.written or leg.name}", link "{link.name}"'
+    where = f'"{origin}": leg "{leg.copy_of or leg.name}", link "{link.name}"'
     before, behind = (tables[leg.table(joint.name)] for joint in (near, far))
     ends = [np.array(departure(before).components()), np.array(behind.point)]
     span = ends[1] - ends[0]

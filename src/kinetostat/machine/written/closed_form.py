@@ -35,6 +35,9 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import ClosedLeg, Closure, Inverse, Step
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SAME_CENTRE, SAME_DIRECTION
 
+LEAST_SHARE = 1e-6
+"""Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
+
 
 @dataclass(frozen=True)
 class ParallelAxes:
@@ -69,9 +72,9 @@ class ParallelAxes:
         bent, closure = self._triangle(axis, lower, upper, span)
         lower_turn = turn_between(axis, lower, bent)
         both = turn_between(axis, upper, span - bent)
-        whole = turn_between(axis, lower, motion.rotation.apply(lower))
+        all_three = turn_between(axis, lower, motion.rotation.apply(lower))
         amounts: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, whole))
+        turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, all_three))
         for i, turn in zip(self.revolutes, turns, strict=True):
             amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
@@ -126,10 +129,6 @@ def _parallel_axes(name: str, movers: Sequence[Joint]) -> ParallelAxes | None:
     return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))
 
 
-LEAST_SHARE = 1e-6
-"""Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
-
-
 @dataclass(frozen=True)
 class BallLeg:
     """A leg of six joints with a ball at one end, and two revolutes about another point among the others.
@@ -177,17 +176,16 @@ class BallLeg:
         leg = self._solve(movers[::-1], motion.inverse())
         # Seen from the base, what follows a joint is what comes before it as seen from the platform.
         amounts: list[Scalar | Turn] = []
-        following = motion
+        following = motion  # of all links beyond this joint
         for amount, joint in zip(leg.amounts, movers[::-1], strict=True):
-            back = _opposite(amount)
-            if isinstance(amount, Turn) and isinstance(back, Turn) and amount.placement:
-                there = amount.placement
-                axis, point = motion.rotation.apply(there.axis), motion.apply(there.point)
-                back = replace(back, placement=RevolutePlace(axis, point, following))
-                following = motion @ there.motion
+            opposite = _opposite(amount)
+            if isinstance(amount, Turn) and isinstance(opposite, Turn) and amount.placement:
+                place = amount.placement
+                opposite = replace(opposite, placement=_place_at(place.axis, place.point, motion, following))
+                following = motion @ place.motion
             else:
                 following = following @ joint.moved(amount)[1]
-            amounts.append(back)
+            amounts.append(opposite)
         return ClosedLeg(amounts[::-1], leg.closure, leg.gap)
 
     def _solve(self, movers: Sequence[Joint], motion: Displacement) -> ClosedLeg:
@@ -207,21 +205,21 @@ class BallLeg:
             fixed = point_of(pair[0])
             start = centre - fixed
             square = _square(start)
-            back, limits = to_distance(single, goal, centre, fixed, square)
-            end = single.moved(back)[1].apply(goal) - fixed
-            amount = _opposite(back)
+            undone, limits = to_distance(single, goal, centre, fixed, square)
+            end = single.moved(undone)[1].apply(goal) - fixed
+            amount = _opposite(undone)
         size = reciprocal(sqrt(square))
         before = single.axis * self.aligned if self.aligned else start * size
         turns, gap = self._pair(pair, before, end * size, centre - fixed)
         moved = single.moved(amount)[1]
         if self.pair_first:
-            whole = _place(turns[1]).motion @ moved
-            amounts = [*turns, _with_placement(amount, single, _place(turns[1]).motion, whole)]
+            arm = _place(turns[1]).motion @ moved
+            amounts = [*turns, _with_placement(amount, single, _place(turns[1]).motion, arm)]
         else:
             turns = [_after(moved, turn) for turn in turns]
-            whole = _place(turns[1]).motion
+            arm = _place(turns[1]).motion
             amounts = [_with_placement(amount, single, moved, moved), *turns]
-        ball_turns, left = _ball_turns(ball, whole.rotation, goal, motion)
+        ball_turns, left = _ball_turns(ball, arm.rotation, goal, motion)
         return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + left)
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
@@ -256,7 +254,9 @@ class BallLeg:
 def _ball_turns(
     ball: Sequence[Joint], arm: Rotation, centre: Vector, motion: Displacement
 ) -> tuple[list[Turn], Scalar]:
-    """Turns of a ball's axes that are left of a motion after that of the joints before it (theory (75)).
+    """Turns of the ball's axes: what remains of the motion once the joints before the ball have made theirs.
+
+    Source: theory (75).
 
     Args:
         ball: its joints at the home pose.
@@ -308,8 +308,7 @@ def _with_placement(amount: Scalar | Turn, joint: Joint, before: Displacement, a
     """The amount of the single joint with its placement, between the motions of what is before and behind it."""
     if not isinstance(amount, Turn):
         return amount
-    axis, point = before.rotation.apply(joint.axis), before.apply(point_of(joint))
-    return replace(amount, placement=RevolutePlace(axis, point, after))
+    return replace(amount, placement=_place_at(joint.axis, point_of(joint), before, after))
 
 
 def _place(turn: Turn) -> RevolutePlace:
@@ -321,8 +320,12 @@ def _place(turn: Turn) -> RevolutePlace:
 def _after(moved: Displacement, turn: Turn) -> Turn:
     """A turn whose placement a joint before it has displaced."""
     place = _place(turn)
-    axis, point = moved.rotation.apply(place.axis), moved.apply(place.point)
-    return replace(turn, placement=RevolutePlace(axis, point, moved @ place.motion))
+    return replace(turn, placement=_place_at(place.axis, place.point, moved, moved @ place.motion))
+
+
+def _place_at(axis: Vector, point: Vector, before: Displacement, after: Displacement) -> RevolutePlace:
+    """The place of a revolute that what is before it has displaced, and the displacement of what follows it."""
+    return RevolutePlace(before.rotation.apply(axis), before.apply(point), after)
 
 
 def to_distance(

@@ -30,8 +30,8 @@ MOST_COPIES = 24
 
 
 @dataclass(frozen=True)
-class Placing:
-    """Placement of a copy: mirrored in the x-z plane of the base if it is, then turned about its z axis.
+class CopyPlacement:
+    """The way a copy lies: first the mirror image in the x-z plane of the base, if `mirrored`, then the turn about z.
 
     Attributes:
         cosine, sine: the cosine and sine of the angle of the turn.
@@ -44,7 +44,7 @@ class Placing:
 
     def vector(self, vector: Vector) -> Vector:
         """A point or direction of the written leg in the copy."""
-        y = -1.0 * vector.y if self.mirrored else vector.y
+        y = -vector.y if self.mirrored else vector.y
         return Vector(vector.x * self.cosine - y * self.sine, vector.x * self.sine + y * self.cosine, vector.z)
 
     def matrix(self, matrix: Matrix) -> Matrix:
@@ -57,17 +57,17 @@ class Placing:
         return tuple(tuple(row) for row in (both @ np.array(matrix) @ both.T).tolist())
 
 
-def placings(copies: Copies, where: str) -> list[Placing]:
-    """Placement of each of the copies, the first one first; mirror images follow the copies that they mirror.
+def placements(copies: Copies, where: str) -> list[CopyPlacement]:
+    """The placement of each of the copies, the first one first; mirror images follow the copies that they mirror.
 
     Raises:
-        InputError: an angle that is not one; names the leg.
+        InputError: an entry of angles is not an angle; names the leg.
     """
     turns = copies.count // 2 if copies.mirrored else copies.count
     angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / turns for i in range(turns)]
     images = (False, True) if copies.mirrored else (False,)
     return [
-        Placing(_without_round_off(math.cos(a)), _without_round_off(math.sin(a)), image)
+        CopyPlacement(_without_round_off(math.cos(a)), _without_round_off(math.sin(a)), image)
         for a in angles
         for image in images
     ]
@@ -82,7 +82,7 @@ def _angle(angle: object, where: str) -> float:
 
 def _without_round_off(number: float) -> float:
     near = round(2.0 * number) / 2.0
-    return near + 0.0 if abs(number - near) < SNAP else number
+    return near if abs(number - near) < SNAP else number
 
 
 def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
@@ -117,44 +117,38 @@ def legs_of(leg: LegPlan, copies: Copies | None, where: str) -> tuple[LegPlan, .
     """The legs that a written leg stands for: itself, or its copies, numbered from 1.
 
     Raises:
-        InputError: as `placings` does.
+        InputError: as `placements` does.
     """
     if copies is None:
         return (leg,)
     return tuple(
-        replace(
-            leg,
-            name=f"{leg.name} {i}",
-            written=leg.name,
-            copies=copies,
-            placing=placing,
-        )
-        for i, placing in enumerate(placings(copies, where), 1)
+        replace(leg, name=f"{leg.name} {i}", copy_of=leg.name, copies=copies, placement=placement)
+        for i, placement in enumerate(placements(copies, where), 1)
     )
 
 
 def joint_numbers(leg: LegPlan, joint: JointPlan, tables: Mapping[str, Any]) -> Any:
     """The numbers of a joint, with points and axes where they are in this leg."""
     data = tables[leg.table(joint.name)]
-    if leg.placing is None:
+    if leg.placement is None:
         return data
-    return SimpleNamespace(**{name: _number_in_copy(value, leg.placing) for name, value in vars(data).items()})
+    return SimpleNamespace(**{name: _number_in_copy(value, leg.placement) for name, value in vars(data).items()})
 
 
 def matrix_in(leg: LegPlan, matrix: Matrix) -> Matrix:
     """A compliance that is written for a leg, where it is in this leg."""
-    return matrix if leg.placing is None else leg.placing.matrix(matrix)
+    return matrix if leg.placement is None else leg.placement.matrix(matrix)
 
 
 def direction_in(leg: LegPlan, direction: Sequence[float]) -> Vector:
     """A direction that is written for a leg, where it points in this leg."""
-    return Vector(*direction) if leg.placing is None else leg.placing.vector(Vector(*direction))
+    return Vector(*direction) if leg.placement is None else leg.placement.vector(Vector(*direction))
 
 
 def inertia_in(leg: LegPlan, tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
     """An inertia tensor that is written for a leg, in the axes of this leg; a mirror image is turned likewise."""
-    return tuple(tensor) if leg.placing is None else turned_tensor(leg.placing.vector, tensor)
+    return tuple(tensor) if leg.placement is None else turned_tensor(leg.placement.vector, tensor)
 
 
-def _number_in_copy(value: Any, placing: Placing) -> Any:
-    return placing.vector(Vector(*value)).components() if isinstance(value, tuple) else value
+def _number_in_copy(value: Any, placement: CopyPlacement) -> Any:
+    return placement.vector(Vector(*value)).components() if isinstance(value, tuple) else value

@@ -8,7 +8,7 @@ from kinetostat.machine.machine import Inverse
 from kinetostat.spec.immutable import Immutable
 
 NAME = "legs"
-"""As machine files name this kind."""
+"""The name of this family in machine files."""
 
 SUMMARY = "any machine, written leg by leg: joints by point and axis at the home pose, and the links between them"
 
@@ -117,9 +117,9 @@ class LegPlan(Immutable):
         joints, links: its joints and links.
         idle, centred: see `leg.Leg`.
         inverse: closed form of its joint coordinates, if it has one.
-        written: name of the leg of the file that it is a copy of; empty if it is not a copy.
+        copy_of: name of the leg of the file that it is a copy of; empty if it is not a copy.
         copies: what the file says about that leg's copies.
-        placing: how the copy lies (`copies.Placing`).
+        placement: the way the copy lies: a `copies.CopyPlacement`, which builds on this file; None if not a copy.
     """
 
     name: str
@@ -128,13 +128,13 @@ class LegPlan(Immutable):
     idle: tuple[int, ...] = ()
     centred: tuple[tuple[int, ...], ...] = ()
     inverse: Inverse | None = None
-    written: str = ""
+    copy_of: str = ""
     copies: Copies | None = None
-    placing: Any = None
+    placement: Any = None
 
     def table(self, part: str) -> str:
         """Name of the table with the numbers of one of its joints or links."""
-        return f"legs.{self.written or self.name}.{part}"
+        return f"legs.{self.copy_of or self.name}.{part}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,10 +158,11 @@ class Plan(Immutable):
 
     @property
     def legs_of_file(self) -> tuple[LegPlan, ...]:
-        """The legs of the file: of copies, the first."""
-        return tuple({leg.written or leg.name: leg for leg in reversed(self.legs)}.values())[::-1]
+        """The legs of the file, each once; its first copy stands for a leg that is copied."""
+        return tuple({leg.copy_of or leg.name: leg for leg in reversed(self.legs)}.values())[::-1]
 
     def __hash__(self) -> int:
+        # A dictionary of machines asks often, and names tell most plans apart; equality compares all of them.
         return hash((tuple(leg.name for leg in self.legs), self.pose, self.planar))
 
 
@@ -174,7 +175,7 @@ def literals(plan: Plan) -> dict[str, dict[str, object]]:
     for leg in plan.legs_of_file:
         if leg.copies is not None:
             angles = {"angles": list(leg.copies.angles)} if leg.copies.angles else {}
-            tables[f"legs.{leg.written}"] = {"copies": leg.copies.count, **angles, "mirrored": leg.copies.mirrored}
+            tables[f"legs.{leg.copy_of}"] = {"copies": leg.copies.count, **angles, "mirrored": leg.copies.mirrored}
         for joint in leg.joints:
             tables[leg.table(joint.name)] = _joint_literals(joint)
         for link in leg.links.values():
