@@ -16,7 +16,6 @@ from kinetostat.spec.tolerance_table import (
     joined_tolerances,
     read_tolerances,
     within_class,
-    within_grade,
 )
 
 
@@ -81,10 +80,13 @@ def test_a_general_tolerance_has_lengths_and_angles():
     assert medium.within("length", 0.401) == pytest.approx(0.8e-3)
     assert medium.within("angle", 0.3) == pytest.approx(math.radians(10 / 60))
     assert within_class("v", 9.0, "angle") == pytest.approx(math.radians(20 / 60))
+    assert within_class("m", math.nextafter(0.4, 1.0), "angle") == medium.within("angle", 0.4), "round-off is no range"
+    with pytest.raises(InputError, match=r"sizes above 0, not for 0 mm"):
+        within_class("m", 0.0, "angle")
     with pytest.raises(InputError, match=r"no value for 3000 mm"):
         within_class("f", 3.0, "length")
     with pytest.raises(InputError, match=r"up to 3150 mm"):
-        within_grade(7, 3.2)
+        within_class(7, 3.2, "length")
 
 
 def test_a_class_without_a_nominal_size_says_what_to_write():

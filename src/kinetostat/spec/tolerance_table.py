@@ -59,34 +59,22 @@ ANGLE_LIMITS = {
 """Plus-minus, minutes of arc. Source: ISO 2768-1:1989, table 3."""
 
 
-def within_grade(grade: int, size: float) -> float:
-    """Half of the tolerance zone of a grade: how far a length may be from its nominal size either way, m.
+def within_class(name: int | str, size: float, kind: str) -> float:
+    """The greatest distance of a length (m) or an angle (rad) of a class from its nominal value either way.
 
     Args:
-        grade: 1 to 14, of ISO 286-1.
-        size: nominal size, m.
-
-    Raises:
-        InputError: the size is beyond the table.
-    """
-    place = bisect_left(SIZES, _mm(size, SIZES[-1], f"IT{grade}"))
-    return 0.5 * UM * GRADES[grade][place]
-
-
-def within_class(name: str, size: float, kind: str) -> float:
-    """Limit of a class of ISO 2768-1: how far a length (m) or an angle (rad) may be from its nominal value either way.
-
-    Args:
-        name: "f", "m", "c" or "v".
+        name: a grade of ISO 286-1, 1 to 14, of which half of the zone counts; or "f", "m", "c" or "v" of ISO 2768-1.
         size: nominal length, or length of the shorter side of the angle, m.
-        kind: "length" or "angle".
+        kind: "length" or "angle"; grades have lengths only.
 
     Raises:
         InputError: the size is beyond the table, or the class has no value there.
     """
+    if isinstance(name, int):
+        return 0.5 * UM * GRADES[name][_range_of(size, SIZES, f"IT{name}")]
     if kind == "angle":
-        return MINUTE * ANGLE_LIMITS[name][bisect_left(SIDES, size / MM)]
-    limit = LENGTH_LIMITS[name][bisect_left(LENGTHS, _mm(size, LENGTHS[-1], f"ISO 2768-{name}"))]
+        return MINUTE * ANGLE_LIMITS[name][_range_of(size, SIDES, f"ISO 2768-{name}")]
+    limit = LENGTH_LIMITS[name][_range_of(size, LENGTHS, f"ISO 2768-{name}")]
     if limit is None:
         raise InputError(
             f"ISO 2768-{name} has no value for {size / MM:g} mm; take another class, or write the tolerance in mm."
@@ -94,14 +82,15 @@ def within_class(name: str, size: float, kind: str) -> float:
     return MM * limit
 
 
-def _mm(size: float, most: float, name: str) -> float:
-    """A nominal size in mm, rounded so that 400 mm is not above 400 mm."""
+def _range_of(size: float, ends: Sequence[float], name: str) -> int:
+    """The number of the range to which a nominal size belongs, rounded so that 400 mm is not above 400 mm."""
     millimetres = round(size / MM, 9)
-    if not 0.0 < millimetres <= most:
+    if not 0.0 < millimetres <= ends[-1]:
+        reach = f"up to {ends[-1]:g} mm" if math.isfinite(ends[-1]) else "above 0"
         raise InputError(
-            f"{name} has values for sizes up to {most:g} mm, not for {millimetres:g} mm; write the tolerance in mm."
+            f"{name} has values for sizes {reach}, not for {millimetres:g} mm; write the tolerance with its unit."
         )
-    return millimetres
+    return bisect_left(ends, millimetres)
 
 
 TABLE = "tolerances"
@@ -116,6 +105,9 @@ UNIFORM, NORMAL = "uniform", "normal"
 LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "ratio": 0.5}
 """The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
 COSTS = (1e-6, 1e6)
+"""The least and the greatest cost of a line, in units of those of other lines."""
+LARGEST_SIZE = 1e3
+"""The largest nominal size that may be written with a class, m."""
 LINE_KEYS = ("tolerance", "cost")
 HOW = (
     'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '
@@ -129,51 +121,66 @@ _CLASS = re.compile(r"(?:ISO\s*)?2768\s*-?\s*([fmcv])[HKL]?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Deviation:
-    """The greatest distance of a number from its nominal value.
+class PlusMinus:
+    """The greatest distance of a number from its nominal value, as it was written with its unit.
 
     Attributes:
         text: the text as it was written.
-        kind: "length", "angle" or "ratio"; empty of a class of a standard.
-        limit: plus and minus, SI: three standard deviations of a normal distribution; 0 of a class.
         spread: "uniform" or "normal", between or about the limits.
-        grade: the grade of ISO 286-1; 0 if it is not written so.
-        standard_class: the standard class of ISO 2768-1: f, m, c or v; empty if it is not written so.
-        size: nominal size that was written with a class, m; 0 if none was.
+        kind: "length", "angle" or "ratio".
+        limit: plus and minus, SI: three standard deviations of a normal distribution.
     """
 
     text: str
+    spread: str
     kind: str
     limit: float
-    spread: str
-    grade: int = 0
-    standard_class: str = ""
-    size: float = 0.0
 
     def fits(self, kind: str) -> bool:
         """Whether it can be the tolerance of a number of a kind."""
-        if self.standard_class:
-            return kind in ("length", "angle")
-        return kind == ("length" if self.grade else self.kind)
+        return kind == self.kind
+
+    def within(self, _kind: str, _size: float) -> float:
+        """The plus and minus of a number, SI, which does not depend on its size."""
+        return self.limit
+
+
+@dataclass(frozen=True)
+class StandardClass:
+    """The greatest distance of a number from its nominal value, by a class of a standard.
+
+    Attributes:
+        text, spread: as of `PlusMinus`.
+        name: a grade of ISO 286-1, which has lengths only, or a class of ISO 2768-1: f, m, c or v.
+        size: nominal size that was written with it, m; 0 if none was.
+    """
+
+    text: str
+    spread: str
+    name: int | str
+    size: float
+
+    def fits(self, kind: str) -> bool:
+        """Whether it can be the tolerance of a number of a kind."""
+        return kind == "length" or (kind == "angle" and isinstance(self.name, str))
 
     def within(self, kind: str, size: float) -> float:
         """The plus and minus of a number, SI.
 
         Args:
-            kind: the kind of the number, "length", "angle" or "ratio".
-            size: its nominal size, m; 0 if it has none.
+            kind: "length" or "angle".
+            size: its nominal size, m, where none was written; 0 if it has none.
 
         Raises:
-            InputError: a class of a standard needs a nominal size, or has no value for it.
+            InputError: neither size is known, or the class has no value for it.
         """
         nominal = self.size or size
-        if not (self.grade or self.standard_class):
-            return self.limit
         if not nominal:
             raise InputError(f'"{self.text}" depends on a nominal size; write it, for example "{self.text} at 300 mm".')
-        if self.grade:
-            return within_grade(self.grade, nominal)
-        return within_class(self.standard_class, nominal, kind)
+        return within_class(self.name, nominal, kind)
+
+
+Deviation = PlusMinus | StandardClass
 
 
 @dataclass(frozen=True)
@@ -205,7 +212,7 @@ Tolerances = dict[str, Tolerance]
 
 
 def take_tolerances(document: Document, settings: Sequence[str], origin: str) -> tuple[Document, list[str], Tolerances]:
-    """Part a machine file into all that is not a tolerance and its tolerances, with their overrides.
+    """Separate the tolerances of a machine file, with their overrides, from the rest of it.
 
     Args:
         document: what was written.
@@ -296,17 +303,18 @@ def _deviation(written: object, place: str) -> Deviation:
             words, spread = words[: -len(name) - 1], name
     name, at, size = words.partition(" at ")
     grade, general = _GRADE.fullmatch(name.strip()), _CLASS.fullmatch(name.strip())
-    if grade or general:
-        nominal = _size(size, place) if at else 0.0
-        number = int(grade[1]) if grade else 0
-        if grade and number not in GRADES:
-            raise InputError(f"{place} is {shorten(written)}; grades IT{min(GRADES)} to IT{max(GRADES)} are known.")
-        return Deviation(text, "", 0.0, spread, number, general[1].lower() if general else "", nominal)
+    nominal = _size(size, place) if at and (grade or general) else 0.0
+    if grade and int(grade[1]) not in GRADES:
+        raise InputError(f"{place} is {shorten(written)}; grades IT{min(GRADES)} to IT{max(GRADES)} are known.")
+    if grade:
+        return StandardClass(text, spread, int(grade[1]), nominal)
+    if general:
+        return StandardClass(text, spread, general[1].lower(), nominal)
     factor = 1.0
     if words.lower().startswith("sigma "):
         words, factor, spread = words[len("sigma ") :], SIGMAS, NORMAL
     kind, limit = _amount(_SIGNS.sub("", words), written, place)
-    return Deviation(text, kind, factor * limit, spread)
+    return PlusMinus(text, spread, kind, factor * limit)
 
 
 def _size(text: str, place: str) -> float:
@@ -314,7 +322,7 @@ def _size(text: str, place: str) -> float:
         size = parse(text.strip(), "length")
     except UnitError as error:
         raise InputError(f"{place}: the nominal size is {shorten(text)}: {error}.") from None
-    if not 0.0 < size <= 1e3:
+    if not 0.0 < size <= LARGEST_SIZE:
         raise InputError(f'{place}: the nominal size is {shorten(text)}; give a length, e.g. "300 mm".')
     return size
 
@@ -329,8 +337,10 @@ def _amount(text: str, written: object, place: str) -> tuple[str, float]:
         if not 0.0 <= value <= largest:
             break
         return kind, value
+    length, angle, ratio = LARGEST_TOLERANCE.values()
     raise InputError(
-        f"{place} is {shorten(written)}, which is not a tolerance from 0 to 1 m, 0.5 rad or 50 %, with its unit; {HOW}."
+        f"{place} is {shorten(written)}, which is not a tolerance from 0 to {length:g} m, {angle:g} rad or "
+        f"{100.0 * ratio:g} %, with its unit; {HOW}."
     )
 
 
