@@ -36,8 +36,10 @@ class Labelled(Element):
 class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES):
     """Scenes of solids, with light, shadows and a camera.
 
-    Methods `overlay`, `look`, and `swing` and `sway` for a shape that swings; the event `swinging` says whether it
-    moves, and `drawn` which scene the browser has drawn last.
+    Methods: `show` (a scene), `overlay` (solids over it), `ghost` (a translucent shape behind it), `look` (a view),
+    `swing` (a shape that swings), `sway` (let it move or rest), `save` (the picture).
+    Events: `pull` (the part that is dragged), `settle` (it is let go), `swinging` (whether a shape moves), `drawn` (the
+    number of the last scene drawn).
     """
 
     def __init__(self, label: str) -> None:
@@ -54,7 +56,7 @@ class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES)
 
     @property
     def is_behind(self) -> bool:
-        """Whether the browser has still to draw the last scene; what is played then waits, so that a pause is one."""
+        """Whether the browser has still to draw the last scene; playing waits for it, so that a pause acts at once."""
         return self._drawn is not None and self._drawn < self._sent
 
     def _note_drawn(self, event: GenericEventArguments) -> None:
@@ -69,10 +71,11 @@ class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES)
 class BrowserLink(Element, component=COMPONENTS / "browser_link.js"):
     """The address of the page and its dark or light theme, which the browser shares.
 
-    Events `undo` and `redo` by the keyboard; `theme` after the method `otherTheme`: dark, light, or None as the system.
+    Methods: `otherTheme` (change from dark to light, or back).
+    Events: `undo`, `redo` (by the keyboard), `theme` (whether it is dark now; None where it follows the system).
     """
 
-    def put(self, address: str) -> None:
+    def show_query(self, address: str) -> None:
         """Show this query in the address."""
         if self._props.get("address") != address:
             self._props["address"] = address
@@ -80,27 +83,33 @@ class BrowserLink(Element, component=COMPONENTS / "browser_link.js"):
 
 
 class MapView(Labelled, component=COMPONENTS / "map_view.js"):
-    """A map with a mark; methods `show`, `mark`; events `pick` with x and y, and `settle`."""
+    """A map with a mark.
+
+    Methods: `show` (a map), `mark` (a point). Events: `pick` (x and y of a point), `settle` (the choice has ended).
+    """
 
 
 class CurveView(Labelled, component=COMPONENTS / "curve_view.js"):
-    """Curves over one number; methods `show`, `mark`; event `pick` with the number of the mark next to a click."""
+    """Curves over one number.
+
+    Methods: `show` (curves), `mark` (a value of that number). Events: `pick` (the number of the mark next to a click).
+    """
 
 
 class FrontView(Labelled, component=COMPONENTS / "front_view.js"):
-    """Designs as points over two objectives; method `show`; event `pick` with the number of a point."""
+    """Designs as points over two objectives. Methods: `show` (points). Events: `pick` (the number of a point)."""
 
 
 class DesignTable(Labelled, component=COMPONENTS / "design_table.js"):
-    """Designs or other things as rows that sort by any column; event `pick` with the number of a row."""
+    """Designs or other things as rows that sort by any column. Events: `pick` (the number of a row)."""
 
     def __init__(self, label: str, action: str = "load design") -> None:
         """An empty table; `action` is what a screen reader says of the button of a row, before its number."""
         super().__init__(label)
         self._props["action"] = action
-        self.put([], [], [], None, None)
+        self.show_rows([], [], [], None, None)
 
-    def put(
+    def show_rows(
         self, names: list[str], values: list[list[float]], texts: list[list[str]], knee: int | None, chosen: int | None
     ) -> None:
         """Show other rows: what each column is, numbers to sort by, and how they are written."""
@@ -109,7 +118,10 @@ class DesignTable(Labelled, component=COMPONENTS / "design_table.js"):
 
 
 class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
-    """A number with its name and unit, and a slider; events `slide`, `settle`, `write`."""
+    """A number with its name and unit, and a slider.
+
+    Events: `slide` (a position of the slider), `settle` (the slider is let go), `write` (the text that was typed).
+    """
 
     def __init__(self, label: str, meaning: str, steps: int, slides: bool) -> None:
         """A row without a value yet; `steps` positions of its slider, if it has one."""
@@ -120,7 +132,7 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
         """Show the present value in the place of what was typed, which may have meant the same."""
         self._set(taken=self._props["taken"] + 1)
 
-    def put(self, text: str, position: int) -> None:
+    def show_value(self, text: str, position: int) -> None:
         """Show a value and the position of its slider, and clear an earlier complaint."""
         self._set(text=text, position=position, problem="")
 
@@ -136,13 +148,13 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
 
 
 class TextEditor(Labelled, component=COMPONENTS / "text_editor.js"):
-    """A text with line numbers; events `edit` with the whole text, and `place` with the line of the cursor."""
+    """A text with line numbers. Events: `edit` (the whole text), `place` (the line of the cursor)."""
 
     def __init__(self, label: str) -> None:
         super().__init__(label)
         self._props.update(text="", version=0, line=0)
 
-    def put(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Show a text in the place of what was typed."""
         self._props.update(text=text, version=self._props["version"] + 1)
         self.update()
@@ -181,15 +193,15 @@ def in_quotes(text: str) -> str:
 
 
 def upload_field(
-    on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str, suffix: str = ".toml"
+    on_upload: Callable[[Any], Any], on_refusal: Callable[[str], None], mark: str, suffix: str = ".toml"
 ) -> ui.upload:
     """A hidden field that takes one file from the browser, by default TOML; `pickFiles` of it opens the dialogue.
 
-    FastAPI keeps the function of every field that it has served. What is called by it is therefore let go with the
-    page, which would stay in memory otherwise.
+    FastAPI keeps the function of every field that it has served, and with it the page, unless the page takes
+    `on_upload` and `on_refusal` out of `called` when it goes.
     """
     too_large = f"The file is larger than {LARGEST_FILE >> 20} MiB, the limit for a file."
-    called = {"upload": on_upload, "refuse": refuse}
+    called = {"upload": on_upload, "refuse": on_refusal}
     ui.context.client.on_delete(lambda: called.clear())
     field = ui.upload(
         on_upload=lambda event: called["upload"](event), on_rejected=lambda: called["refuse"](too_large),

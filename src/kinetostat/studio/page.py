@@ -185,7 +185,7 @@ class StudioPage:
         memory = self.session.memory
         address = address_of(memory)
         self._remember(memory, address)
-        self.browser.put(address)
+        self.browser.show_query(address)
 
     def _show_picture(self, request: PictureRequest, drawn: Picture) -> None:
         """Draw, then let a waiting slider go on, then request the figures: the eye follows the picture first."""

@@ -101,7 +101,7 @@ class ParametersPanel:
 
     def _put(self, control: Control, value: float) -> None:
         display = self._session.machine.display
-        self._rows[control.path].put(
+        self._rows[control.path].show_value(
             shown_value(control.parameter.quantity, value, display), control.position_of(value)
         )
 

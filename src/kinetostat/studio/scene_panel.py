@@ -146,7 +146,7 @@ class ScenePanel:
         self.key.set_content(scene_key(report))
         self.scale.set_visibility(report.exaggeration is not None)
         if report.exaggeration is not None:
-            self.scale.put(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
+            self.scale.show_value(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
 
     def wait(self) -> None:

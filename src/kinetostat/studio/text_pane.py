@@ -141,7 +141,7 @@ class TextPane:
 
     def _put(self, machine: Machine, text: str) -> None:
         self._typed, self._text = machine, text
-        self.editor.put(text)
+        self.editor.show_text(text)
         self._say(Reading(machine))
 
     def _discard(self) -> None:

@@ -292,7 +292,7 @@ class FrontPanel:
         if self.across.options != names:
             self._offer(names)
         self._draw()
-        self.rows.put(*_table(progress), progress.knee, chosen)
+        self.rows.show_rows(*_table(progress), progress.knee, chosen)
 
     def _offer(self, names: dict[int, str]) -> None:
         """Offer the objectives as axes and colour; with only two, the choice is hidden."""

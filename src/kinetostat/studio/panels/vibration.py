@@ -131,7 +131,7 @@ class VibrationPanel(Panel):
         self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(MASS_HINT))
         if self._session is not None:
             control = self._session.controls[MASS]
-            self.mass.put(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
+            self.mass.show_value(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
 
     def _take_mass(self, event: GenericEventArguments) -> None:
         """Give the machine the mass that was typed, or say why that is not possible."""
@@ -170,7 +170,7 @@ class VibrationPanel(Panel):
         if self._ringing is None or self._report is None:
             return
         answer, mode = self._ringing.answer, self._ringing.answer.modes[self._chosen]
-        self.table.put(*mode_rows(self._ringing), None, self._chosen)
+        self.table.show_rows(*mode_rows(self._ringing), None, self._chosen)
         self.energies.set_content(energies_text(mode, self._chosen + 1, self._report.legs))
         self.swinging.set_text(f"mode {self._chosen + 1}, {answer.machine.display.show(mode.frequency, 'Hz')}")
         self._draw()
