@@ -70,7 +70,7 @@ def equations(_folder: Path) -> str:
 
 def statements(_folder: Path) -> str:
     """What the paper says in words, measured."""
-    found = (*paper().claims, *paper().search_claims)
+    found = paper().all_claims
     rows = ((one.place, one.statement, one.measured, f"**{one.finding.value}** {one.limits}") for one in found)
     return table(("where", "statement", "measured", "verdict"), rows)
 

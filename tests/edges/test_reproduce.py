@@ -89,6 +89,7 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 4
     assert "<script" not in page
+    assert page.count('<th>statement</th><th class="n">residual</th><th class="n">tolerance</th>') == 1, "numbers align"
     assert not re.search(r'(src|href)="(?!#)', page)
     rows = list(csv.DictReader((folder / "numbers.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 88

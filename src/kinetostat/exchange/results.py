@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
@@ -30,25 +29,26 @@ UNITS = {
     "stiffness": ("N·m/rad", "N/rad", "N/m"),
     "compliance": ("rad/(N·m)", "rad/N", "m/N"),
 }
-"""Units of the entries of K and C: rotation, coupling, translation."""
+"""Units of the entries of K and C by the number of translations, 0 to 2, among row and column."""
 ROTATIONS = COMPONENTS[:3]
 AXES = ("x", "y", "z")
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
-def unit_of(matrix: str, row: str, column: str) -> str:
-    """Return the unit of an entry of "stiffness" or "compliance" by the names of its row and column."""
-    return UNITS[matrix][2 - (row in ROTATIONS) - (column in ROTATIONS)]
-
-
 def reference_point(analysis: Analysis) -> list[float]:
     """Return the tool point T, or P without a tool, in the base frame, m [3]."""
+    _platform_of(analysis)
+    machine = analysis.machine
+    point = machine.tool_point(state_of(machine).configuration.platform)
+    return [float(c) for c in point.components()]
+
+
+def _platform_of(analysis: Analysis) -> tuple[Array, Array]:
+    """Position and rotation of the platform, without which nothing can be exported."""
     if analysis.platform is None:
-        raise ValueError("an analysis without a result has no placement")
-    position, rotation = analysis.platform
-    offset = np.array(analysis.machine.tables["tool"].offset)
-    return [float(c) for c in np.array(position) + np.array(rotation) @ offset]
+        raise ValueError("an analysis without a result cannot be exported")
+    return analysis.platform
 
 
 def as_dataset(analysis: Analysis) -> xr.Dataset:
@@ -59,11 +59,9 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
     Dimensions: `row` and `column` of K and C, `component` of diagonals, `spring`, `axis`, and `base_axis`. What is not
     finite (K where the machine is rigid, C where it is free) is left out.
     """
-    if analysis.platform is None:
-        raise ValueError("an analysis without a result cannot be exported")
+    position, rotation = _platform_of(analysis)
     machine = analysis.machine
     names = list(analysis.components)
-    position, rotation = analysis.platform
     variables: dict[str, Variable] = {}
     for name, matrix in (("stiffness", analysis.stiffness), ("compliance", analysis.compliance)):
         if matrix is not None:
@@ -71,11 +69,8 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
     variables |= _springs(analysis)
     variables |= _indices(analysis)
     variables["platform_position"] = (("base_axis",), list(position), _attributes("P in the base frame", "m"))
-    variables["platform_rotation"] = (
-        ("base_axis", "axis"),
-        rotation,
-        _attributes("platform axes in the base frame", "1"),
-    )
+    axes = _attributes("platform axes in the base frame", "1")
+    variables["platform_rotation"] = (("base_axis", "axis"), rotation, axes)
     variables["tool_point"] = (("base_axis",), reference_point(analysis), _attributes("T in the base frame", "m"))
     variables |= pose_of(analysis)
     coordinates = {
@@ -139,20 +134,13 @@ def _spring_unit(spring: Spring) -> str:
 
 def _indices(analysis: Analysis) -> dict[str, Variable]:
     """Scalars of the pose that have a number, and the principal compliances."""
-    indices = analysis.indices
+    indices, length = analysis.indices, analysis.characteristic_length
+    condition = indices.stiffness_condition if indices else None
     scalars = {
         "wrench_condition": (analysis.wrench_condition, "condition of W, of the leg wrenches", "1"),
         "jacobian_condition": (analysis.jacobian_condition, "condition of the actuators' Jacobian", "1"),
-        "stiffness_condition": (
-            indices.stiffness_condition if indices else None,
-            "condition of K, by its extreme eigenvalues",
-            "1",
-        ),
-        "characteristic_length": (
-            analysis.characteristic_length,
-            "by which rotations are compared with translations",
-            "m",
-        ),
+        "stiffness_condition": (condition, "condition of K, by its extreme eigenvalues", "1"),
+        "characteristic_length": (length, "by which rotations are compared with translations", "m"),
         "moving_mass": (analysis.moving_mass, "of what moves, as far as it is known", "kg"),
     }
     variables: dict[str, Variable] = {
@@ -175,9 +163,6 @@ CSV_HEADER = ("quantity", "row", "column", "value", "unit")
 ABOUT = ("machine", "family", "frame", "kinetostat")
 """Attributes at the top of a CSV file: a line "about" each, their values in the columns of names."""
 
-Line = tuple[str, str, str, float]
-Unit = Callable[[str, str, str], str]
-
 
 def write_netcdf(analysis: Analysis, path: Path) -> list[Path]:
     """Write the results as NetCDF-4."""
@@ -186,31 +171,17 @@ def write_netcdf(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def write_csv(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the results as CSV, one number a line."""
+    """Write the results as CSV, one number a line: its names, all its digits and its unit; NaN is left empty."""
     dataset = as_dataset(analysis)
-    write_lines(path, dataset, partial(_unit, dataset))
+    rows = [("about", key, no_formula(str(dataset.attrs[key])), "", "") for key in ABOUT]
+    for quantity, row, column, value in _numbers(dataset):
+        shown = "" if math.isnan(value) else repr(value)
+        rows.append((quantity, no_formula(row), no_formula(column), shown, _unit_of(dataset, quantity, row, column)))
+    write_text(path, csv_text(CSV_HEADER, rows))
     return [path]
 
 
-def write_lines(path: Path, dataset: xr.Dataset, unit: Unit) -> None:
-    """Write a dataset as CSV, one number a line: its names, all its digits and its unit; NaN is left empty.
-
-    Args:
-        path: the path of the file.
-        dataset: the dataset with the attributes of `ABOUT`.
-        unit: the unit of a number by its variable, row and column.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    rows = [("about", key, no_formula(str(dataset.attrs[key])), "", "") for key in ABOUT]
-    for quantity, row, column, value in _lines(dataset):
-        shown = "" if value != value else repr(value)
-        rows.append((quantity, no_formula(row), no_formula(column), shown, unit(quantity, row, column)))
-    write_text(path, csv_text(CSV_HEADER, rows))
-
-
-def _lines(dataset: xr.Dataset) -> Iterator[Line]:
+def _numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, str, float]]:
     """Every number of a dataset: quantity, label of its row, label of its column, value."""
     for name, variable in dataset.data_vars.items():
         sizes = variable.sizes
@@ -225,9 +196,9 @@ def _label(dataset: xr.Dataset, dim: str, i: int) -> str:
     return str(dataset[dim].values[i]) if dim in dataset.coords else str(i + 1)
 
 
-def _unit(dataset: xr.Dataset, name: str, row: str, column: str) -> str:
+def _unit_of(dataset: xr.Dataset, name: str, row: str, column: str) -> str:
     if name in UNITS:
-        return unit_of(name, row, column)
+        return UNITS[name][(row not in ROTATIONS) + (column not in ROTATIONS)]
     if name == "spring_stiffness":
         return str(dataset["spring_unit"].sel(spring=row).values)
     return str(dataset[name].attrs["units"])
@@ -247,9 +218,7 @@ def write_matlab(variables: dict[str, Any], path: Path) -> list[Path]:
 
 def matlab_variables(analysis: Analysis) -> dict[str, Any]:
     """Return the variables of a MATLAB file and their `units`; K and C are [] where they are not finite."""
-    if analysis.platform is None:
-        raise ValueError("an analysis without a result cannot be exported")
-    position, rotation = analysis.platform
+    position, rotation = _platform_of(analysis)
     pose = {_matlab_name(name.removeprefix("pose_")): variable for name, variable in pose_of(analysis).items()}
     return {
         "name": analysis.machine.name,

@@ -4,7 +4,7 @@ The formulas are in `kinetostatics`.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Real
 from typing import Any
 
@@ -65,7 +65,7 @@ class Indices(ImmutableAnswer):
 
 @dataclass(frozen=True, eq=False)
 class Along(ImmutableAnswer):
-    """Stiffness along one direction, in the axes of K and C.
+    """Stiffness along one direction, in the axes of K and C. What is `held` here is `guided` in `Indices`.
 
     Attributes:
         direction: the direction as it was given [3].
@@ -94,21 +94,22 @@ def stiffness_along(
     Raises:
         InputError: the direction has no length, or none in the plane of a planar machine.
     """
-    values: dict[str, float | None] = {}
     direction = three_numbers(direction)
-    blocks: tuple[tuple[Block, str], ...] = (("translation", "force"), ("rotation", "moment"))
-    for block, name in blocks:
-        for kind, function in (("", free_stiffness_along), ("_held", guided_stiffness_along)):
-            try:
-                values[name + kind] = function(direction, block, stiffness, compliance, components)
-            except ValueError:
-                values[name + kind] = None
-    if all(value is None for value in values.values()):
+
+    def along(block: Block, function: Callable[..., float | None]) -> float | None:
+        try:
+            return function(direction, block, stiffness, compliance, components)
+        except ValueError:  # The direction is zero, or not one of this block; below, none of either block is an error.
+            return None
+
+    force, force_held = along("translation", free_stiffness_along), along("translation", guided_stiffness_along)
+    moment, moment_held = along("rotation", free_stiffness_along), along("rotation", guided_stiffness_along)
+    if all(value is None for value in (force, force_held, moment, moment_held)):
         raise InputError(
             f"The direction {shorten(direction)} is zero, or perpendicular to the plane of this machine; give three "
             "numbers, e.g. (1, 0, 0), on the command line --along 1,0,0."
         )
-    return Along(np.array(direction), **values)
+    return Along(np.array(direction), force, force_held, moment, moment_held)
 
 
 def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
@@ -156,8 +157,10 @@ def indices_of(
     """
     screws: list[Eigenscrew] = []
     if components == SPATIAL:
-        known = stiffness if stiffness is not None else compliance
-        screws = [] if known is None else (compliance_eigenscrews if stiffness is None else eigenscrews)(known)
+        if stiffness is not None:
+            screws = eigenscrews(stiffness)
+        elif compliance is not None:
+            screws = compliance_eigenscrews(compliance)
     return Indices(
         None if compliance is None else principal_compliances(compliance, components),
         free_stiffnesses(stiffness, compliance, components),
@@ -172,10 +175,8 @@ def indices_of(
     )
 
 
-def indices_json(indices: Indices | None) -> dict[str, Any]:
+def indices_json(indices: Indices) -> dict[str, Any]:
     """The indices as plain data, for the JSON of an analysis."""
-    if indices is None:
-        return {"principal_compliances": None}
     compliances = (indices.principal_compliances or {}).items()
     stiffnesses = {"free": indices.free or {}, "guided": indices.guided or {}}
     return {

@@ -135,8 +135,10 @@ def _platform(analysis: Analysis) -> dict[str, Any]:
 
 def _index(key: str, analysis: Analysis) -> Any:
     """One of the indices; None where there are none, and NaN, which JSON has as null, where this one has no value."""
-    value = indices_json(analysis.indices).get(key)
-    return math.nan if value is None and analysis.indices else value
+    if analysis.indices is None:
+        return None
+    value = indices_json(analysis.indices)[key]
+    return math.nan if value is None else value
 
 
 def _mobility(mobility: Mobility | None) -> dict[str, Any] | None:

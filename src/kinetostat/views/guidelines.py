@@ -10,6 +10,7 @@ from rich.text import Text
 from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.elements import Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import (
     DECIDING_SHARE,
@@ -41,6 +42,9 @@ BOLD_SHARE = 0.5
 MOST_PARAMETERS = 16
 """Parameters that have a line unless all are wanted."""
 MOST_NAMED_PATHS = 8
+"""Paths of parameters that a sentence names; it counts the others."""
+NO_NUMBER, NO_EFFECT = "–", "·"
+"""Signs in tables: for a rigid or free direction, and for an effect too small to count."""
 
 
 def _lines(answer: Guidelines) -> Lines:
@@ -102,14 +106,14 @@ def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
 def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
     """The share of each element in the compliance of each direction."""
     table = numeric_table("Attribution: share of each element in the diagonal of C", "element", answer.components)
-    for element, row in zip(answer.elements, here.shares[:, :, 0].tolist(), strict=True):
+    for element, row in zip(answer.elements, _at_pose(here.shares).tolist(), strict=True):
         table.add_row(element.name, *(_share(part) for part in row))
     return table
 
 
 def _share(part: float) -> Text:
     if math.isnan(part) or part == 0.0:
-        return Text("–" if part else "·")
+        return Text(NO_EFFECT if part == 0.0 else NO_NUMBER)
     return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= DECIDING_SHARE else "dim")
 
 
@@ -119,12 +123,12 @@ def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
     An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
     """
     title = (
-        "Stiffness from which an element counts as rigid, within 1 % (· any stiffness suffices; never: nothing else is "
-        "compliant in that direction)"
+        f"Stiffness from which an element counts as rigid, within 1 % ({NO_EFFECT} any stiffness suffices; never: "
+        "nothing else is compliant in that direction)"
     )
     table = numeric_table(title, "element", ["now", *answer.components])
     for k, element in enumerate(answer.elements):
-        row = here.rigid[k, :, 0].tolist()
+        row = _at_pose(here.rigid)[k].tolist()
         scale = answer.machine.display.scale(element.unit)
         if element.stiffness is None:
             table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
@@ -139,9 +143,9 @@ def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
 def _limit(value: float) -> str:
     """Return a limit in at most five characters."""
     if math.isnan(value):
-        return "–"
+        return NO_NUMBER
     if value == 0.0 or math.isinf(value):
-        return "·" if value == 0.0 else "never"
+        return NO_EFFECT if value == 0.0 else "never"
     text = f"{value:.2g}" if value >= 1000.0 else f"{value:.3g}"
     return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 
@@ -163,34 +167,32 @@ def _effect_table(answer: Guidelines, count: int) -> FittedTable:
 
 def _arrow(percent: float) -> Text:
     if not abs(percent) >= LEAST_EFFECT:
-        return Text("–" if math.isnan(percent) else "·")
+        return Text(NO_NUMBER if math.isnan(percent) else NO_EFFECT)
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
     return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
 
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
     """The elements with their roles at the pose and over the grid, by direction."""
-    here, over, actuator = answer.here, answer.over_grid, answer.actuator
+    here, over = answer.here, answer.over_grid
     if here is None:
         return []
     by_direction = partial(_by_direction, answer)
-    of_actuator = actuator.stiffness if actuator else None
+    shares, rigid, gains = map(_at_pose, (here.shares, here.rigid, here.gains))
     rows = []
     for k, element in enumerate(answer.elements):
-        limits = [None if element.stiffness is None else limit_of(element.stiffness, f) for f in here.rigid[k, :, 0]]
+        limits = [None if element.stiffness is None else limit_of(element.stiffness, factor) for factor in rigid[k]]
         row: dict[str, Any] = {
             "name": element.name,
             "parts": element.parts,
             "actuated": element.actuated,
             "units": element.unit or None,
             "stiffness": stiffness_of_spring(element.stiffness),
-            "compliance_share": by_direction(here.shares[k, :, 0]),
-            "rigid_from_factor": by_direction(here.rigid[k, :, 0]),
+            "compliance_share": by_direction(shares[k]),
+            "rigid_from_factor": by_direction(rigid[k]),
             "rigid_from": by_direction(limits),
-            "rigid_from_per_actuator": by_direction(
-                [limit and of_actuator and limit / of_actuator for limit in limits]
-            ),
-            "doubling_lowers_compliance": by_direction(here.gains[k, :, 0]),
+            "rigid_from_per_actuator": by_direction([_per_actuator(limit, answer.actuator) for limit in limits]),
+            "doubling_lowers_compliance": by_direction(gains[k]),
         }
         if over is not None:
             row["over_grid"] = {
@@ -200,6 +202,18 @@ def _elements(answer: Guidelines) -> list[dict[str, Any]]:
             }
         rows.append(row)
     return rows
+
+
+def _at_pose(roles: Array) -> Array:
+    """Roles [elements x components x poses] at the only pose of `Guidelines.here`, [elements x components]."""
+    return roles[:, :, 0]
+
+
+def _per_actuator(limit: float | None, actuator: Element | None) -> float | None:
+    """A limit as a multiple of an actuator's stiffness; 0 stays 0, also where there is nothing to compare with."""
+    if limit is None or limit == 0.0:
+        return limit
+    return limit / actuator.stiffness if actuator and actuator.stiffness else None
 
 
 def _parameters(answer: Guidelines) -> list[dict[str, Any]]:

@@ -10,6 +10,8 @@ from kinetostat.views.tables import FittedTable, text_table
 SOURCE_WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
 EXACT_SHARE = 1e-9
 """Share of a number below which its uncertainty is round-off."""
+LEAST_SHOWN_SHARE = 5e-4
+"""Share of the variance up to which a source is not named."""
 
 
 def measured_table(answer: MeasuredComparison) -> FittedTable:
@@ -49,7 +51,10 @@ def _scale(row: MeasuredRow, display: Display) -> Scale:
 
 
 def verdict_of(row: MeasuredRow, display: Display) -> str:
-    """The verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off."""
+    """The verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off.
+
+    A measured value that cannot be told from zero has its error in its unit, because a percentage of it means nothing.
+    """
     if row.explained:
         return "explained"
     low, high = row.bounds
@@ -58,17 +63,19 @@ def verdict_of(row: MeasuredRow, display: Display) -> str:
         scale = _scale(row, display)
         ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
         return f"off by {ends}"
-    stiff = "stiffness" in row.entry.name
-    more = (abs(row.predicted) > size) == stiff
+    is_stiffness = row.entry.parts[0] in ("stiffness", "free_stiffness")
+    model_is_stiffer = (abs(row.predicted) > size) == is_stiffness
     ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)}\N{NO-BREAK SPACE}%"
-    return f"too {'stiff' if more else 'compliant'} by {ends}"
+    return f"too {'stiff' if model_is_stiffer else 'compliant'} by {ends}"
 
 
 def _lines(answer: MeasuredComparison) -> Lines:
     yield "Verdict", answer.message
-    parts = sorted(answer.shares.items(), key=lambda part: -part[1])
+    shares = sorted(answer.shares.items(), key=lambda source: -source[1])
     text = ", ".join(
-        f"{number(100.0 * share, digits=2)} % {SOURCE_WORDS[name]}" for name, share in parts if share > 5e-4
+        f"{number(100.0 * share, digits=2)} % {SOURCE_WORDS[name]}"
+        for name, share in shares
+        if share > LEAST_SHOWN_SHARE
     )
     yield "Variance", f"The variance of the differences is made of: {text}."
     if answer.source:

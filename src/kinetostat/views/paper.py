@@ -3,7 +3,6 @@
 The page stands alone: no script, no request, pictures inside. Numbers and verdicts come from `studies.paper`.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
 from functools import partial
@@ -40,6 +39,37 @@ FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
 FIGURE_6 = "Fig. 6: the best design and the mean of the population"
 MACHINE_TITLE = "The machine at its reference pose"
+
+VERDICT_MARKS = {
+    PrintVerdict.EQUAL: "good",
+    PrintVerdict.MISPRINT: "note",
+    PrintVerdict.DIFFERS: "bad",
+    Finding.HOLDS: "good",
+    Finding.PARTLY: "note",
+    Finding.FAILS: "bad",
+}
+
+COUNTS = ("no", "one", "two", "three", "four", "five", "six")
+PAPER_STYLE = """
+.tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
+.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
+.tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
+.mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
+.good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
+.bad { background: #fde0df; color: #7f1d1d; }
+dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-width: 46rem; }
+"""
+
+CAPTIONS = {
+    "machine": "Four U-P-S legs (blue, thick: cylinder) and the passive leg (orange) that leaves four freedoms. The "
+    "text from which this program was made has no figures; the geometry is a reconstruction that the printed numbers "
+    "determine completely.",
+    "figure-4": "K_rz and K_y grow with the passive links; the other four do not depend on them at this pose.",
+    "figure-5": "The paper's cut through the workspace. The machine itself cannot move along y: there, y shifts the "
+    "plane of its passive leg, and the platform with it.",
+    "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "
+    "best and mean still are from the last best.",
+}
 
 
 def write_all(
@@ -109,22 +139,22 @@ def _tables(reproduction: Reproduction, full: bool) -> Iterator[Table | str]:
             check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else Text("FAILS", "red")
         )
     yield equations
-    for claim in (*reproduction.claims, *reproduction.search_claims):
+    for claim in reproduction.all_claims:
         yield f"{claim.place}  {claim.finding.value}\n  {claim.statement}\n  {claim.measured} {claim.limits}"
 
 
 def verdict(reproduction: Reproduction) -> str:
     """Return a sentence with the counts of numbers, equations and statements."""
-    numbers = Counter(comparison.verdict for comparison in reproduction.comparisons)
-    claims = (*reproduction.claims, *reproduction.search_claims)
-    statements = Counter(claim.finding.value for claim in claims)
+    numbers = reproduction.verdicts
     holding = sum(check.holds for check in reproduction.checks)
-    findings = ", ".join(f"{count} {in_number(word, count)}" for word, count in statements.items())
+    findings = ", ".join(
+        f"{count} {in_number(finding.value, count)}" for finding, count in reproduction.findings.items()
+    )
     return (
         f"{len(reproduction.comparisons)} numbers: {numbers[PrintVerdict.EQUAL]} equal to print, "
         f"{numbers[PrintVerdict.MISPRINT]} known misprints, {numbers[PrintVerdict.DIFFERS]} differ. "
         f"{len(reproduction.checks)} groups of equations: {holding} hold. "
-        f"{len(claims)} statements: {findings}."
+        f"{len(reproduction.all_claims)} statements: {findings}."
     )
 
 
@@ -135,64 +165,21 @@ def in_number(finding: str, count: int) -> str:
 
 
 def _numbers_table(comparisons: Sequence[PaperNumber]) -> Any:
-    table = text_table("Numbers", "place", "", "printed", "computed", "unit", "verdict")
+    rows = text_table("Numbers", "place", "", "printed", "computed", "unit", "verdict")
     place = ""
     shown = {
         PrintVerdict.EQUAL: Text("equal"),
         PrintVerdict.MISPRINT: Text("misprint", "yellow"),
         PrintVerdict.DIFFERS: Text("DIFFERS", "red"),
     }
-    for comparison in comparisons:
-        head = "" if comparison.place == place else comparison.place
-        place = comparison.place
-        table.add_row(
-            head,
-            comparison.component,
-            comparison.printed,
-            f"{comparison.computed:.7g}",
-            comparison.unit,
-            shown[comparison.verdict],
-        )
-    return table
+    for each in comparisons:
+        head, place = "" if each.place == place else each.place, each.place
+        rows.add_row(head, each.component, each.printed, f"{each.computed:.7g}", each.unit, shown[each.verdict])
+    return rows
 
 
 def _csv(rows: Sequence[PaperNumber | EquationCheck | Claim]) -> str:
     return csv_text([field.name for field in fields(rows[0])], map(astuple, rows))
-
-
-VERDICT_MARKS = {
-    PrintVerdict.EQUAL: "good",
-    PrintVerdict.MISPRINT: "note",
-    PrintVerdict.DIFFERS: "bad",
-    Finding.HOLDS: "good",
-    Finding.PARTLY: "note",
-    Finding.FAILS: "bad",
-}
-
-COUNTS = ("no", "one", "two", "three", "four", "five", "six")
-NUMERIC = (False, False, True, True, False, False)
-"""Columns of the table of numbers."""
-
-PAPER_STYLE = """
-.tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
-.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
-.tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
-.mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
-.good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
-.bad { background: #fde0df; color: #7f1d1d; }
-dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-width: 46rem; }
-"""
-
-CAPTIONS = {
-    "machine": "Four U-P-S legs (blue, thick: cylinder) and the passive leg (orange) that leaves four freedoms. The "
-    "text from which this program was made has no figures; the geometry is a reconstruction that the printed numbers "
-    "determine completely.",
-    "figure-4": "K_rz and K_y grow with the passive links; the other four do not depend on them at this pose.",
-    "figure-5": "The paper's cut through the workspace. The machine itself cannot move along y: there, y shifts the "
-    "plane of its passive leg, and the platform with it.",
-    "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "
-    "best and mean still are from the last best.",
-}
 
 
 REPRODUCTION = Description(
@@ -223,14 +210,14 @@ REPRODUCTION = Description(
 )
 
 
-def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
+def page(reproduction: Reproduction, drawn: Mapping[str, Figure]) -> str:
     """The page.
 
     Args:
         reproduction: what to show.
-        figures: by name, drawn; each name has a caption here.
+        drawn: the figures by name; each name has a caption in `CAPTIONS`.
     """
-    pictures = {name: figure(as_svg(drawn), CAPTIONS[name]) for name, drawn in figures.items()}
+    pictures = {name: figure(as_svg(picture), CAPTIONS[name]) for name, picture in drawn.items()}
     body = [
         "<h1>Zhang and Gosselin's machine, reproduced</h1>",
         '<p class="soft">' + escape(printed.CITATION) + ", "
@@ -263,8 +250,8 @@ def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
 
 def misprints(reproduction: Reproduction) -> Iterator[str]:
     """Write a sentence on the misprints of each place of the paper: what is printed, what it should say, and why."""
-    known = [comparison for comparison in reproduction.comparisons if comparison.verdict is PrintVerdict.MISPRINT]
-    for place, group in groupby(known, key=lambda comparison: comparison.place):
+    wrong_numbers = [number for number in reproduction.comparisons if number.verdict is PrintVerdict.MISPRINT]
+    for place, group in groupby(wrong_numbers, key=attrgetter("place")):
         wrong = list(group)
         pairs = [
             f"{_symbol(place, each.component)} {each.printed} should read "
@@ -284,21 +271,16 @@ def _symbol(place: str, component: str) -> str:
 
 
 def _tiles(reproduction: Reproduction) -> str:
-    equal = sum(comparison.verdict is PrintVerdict.EQUAL for comparison in reproduction.comparisons)
-    misprints = sum(comparison.verdict is PrintVerdict.MISPRINT for comparison in reproduction.comparisons)
-    differing = len(reproduction.comparisons) - equal - misprints
-    equations = f"{sum(check.holds for check in reproduction.checks)} of {len(reproduction.checks)}"
-    claims = (*reproduction.claims, *reproduction.search_claims)
-    holding = sum(claim.finding is Finding.HOLDS for claim in claims)
-    limited = sum(claim.finding is Finding.PARTLY for claim in claims)
+    numbers, findings = reproduction.verdicts, reproduction.findings
+    holding = sum(check.holds for check in reproduction.checks)
     tiles = [
-        (equal, "numbers equal to print"),
-        (misprints, "known misprints"),
-        (differing, "numbers differ"),
-        (equations, "groups of equations hold"),
-        (f"{holding} + {limited}", "statements hold + in part"),
+        (numbers[PrintVerdict.EQUAL], "numbers equal to print"),
+        (numbers[PrintVerdict.MISPRINT], "known misprints"),
+        (numbers[PrintVerdict.DIFFERS], "numbers differ"),
+        (f"{holding} of {len(reproduction.checks)}", "groups of equations hold"),
+        (f"{findings[Finding.HOLDS]} + {findings[Finding.PARTLY]}", "statements hold + in part"),
     ]
-    cells = "".join(f'<div class="tile"><b>{figure}</b>{escape(text)}</div>' for figure, text in tiles)
+    cells = "".join(f'<div class="tile"><b>{count}</b>{escape(text)}</div>' for count, text in tiles)
     return f'<div class="tiles">{cells}</div>'
 
 
@@ -307,18 +289,14 @@ def _numbers(comparisons: Sequence[PaperNumber]) -> Iterable[str]:
     heads = ("place", "quantity", "printed", "computed", "unit", "verdict")
     for head, group in groupby(comparisons, key=lambda comparison: comparison.place.split(" ")[0]):
         rows = []
-        for place, members in groupby(group, key=lambda comparison: comparison.place):
-            rows += [_number_row(comparison, place if first else "") for comparison, first in _marking_first(members)]
-        yield table(titles[head], heads, rows, NUMERIC)
-
-
-def _marking_first(members: Iterable[PaperNumber]) -> Iterable[tuple[PaperNumber, bool]]:
-    return ((member, i == 0) for i, member in enumerate(members))
+        for place, members in groupby(group, key=attrgetter("place")):
+            rows += [_number_row(member, "" if i else place) for i, member in enumerate(members)]
+        yield table(titles[head], heads, rows, (False, False, True, True, False, False))
 
 
 def _number_row(comparison: PaperNumber, place: str) -> tuple[str, ...]:
-    verdict = Markup(_mark(comparison.verdict) + (f" {escape(comparison.reason)}" if comparison.reason else ""))
-    return place, comparison.component, comparison.printed, f"{comparison.computed:.9g}", comparison.unit, verdict
+    mark = Markup(_mark(comparison.verdict) + (f" {escape(comparison.reason)}" if comparison.reason else ""))
+    return place, comparison.component, comparison.printed, f"{comparison.computed:.9g}", comparison.unit, mark
 
 
 def _equations(reproduction: Reproduction) -> str:
@@ -333,7 +311,9 @@ def _equations(reproduction: Reproduction) -> str:
         for check in reproduction.checks
     ]
     heads = ("equation", "statement", "residual", "tolerance", "verdict")
-    return table("The paper's matrices A, B, J and J' against legs as (W, G)", heads, rows, NUMERIC[-5:])
+    return table(
+        "The paper's matrices A, B, J and J' against legs as (W, G)", heads, rows, (False, False, True, True, False)
+    )
 
 
 def _statements(claims: Sequence[Claim]) -> str:
@@ -345,5 +325,5 @@ def _statements(claims: Sequence[Claim]) -> str:
     return f"<dl>{''.join(entries)}</dl>"
 
 
-def _mark(verdict: PrintVerdict | Finding) -> Markup:
-    return Markup(f'<span class="mark {VERDICT_MARKS[verdict]}">{escape(verdict.value)}</span>')
+def _mark(finding: PrintVerdict | Finding) -> Markup:
+    return Markup(f'<span class="mark {VERDICT_MARKS[finding]}">{escape(finding.value)}</span>')

@@ -165,7 +165,7 @@ class MeasuredRow:
         entry: what was measured.
         predicted: the computed number.
         u_num, u_input, u_data: standard uncertainties of the computation, of the machine's numbers and of the
-            measurement.
+            measurement, as ASME V&V 20 names them.
     """
 
     entry: MeasuredEntry

@@ -5,6 +5,7 @@ facts and the statements about the optimisation. Statements are in our words. If
 for what it holds and for what it fails, with figures. If the paper leaves a threshold open, ours is named as such.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from enum import StrEnum
 from itertools import pairwise
@@ -123,12 +124,27 @@ class Reproduction(Immutable):
         return f"<Reproduction: {len(self.comparisons)} numbers, {'explained' if self.explained else 'NOT explained'}>"
 
     @property
+    def all_claims(self) -> tuple[Claim, ...]:
+        """The statements of the paper that are tested: on the machine, then on the optimisation."""
+        return (*self.claims, *self.search_claims)
+
+    @property
+    def verdicts(self) -> Counter[PrintVerdict]:
+        """Counts of the printed numbers by their verdict."""
+        return Counter(comparison.verdict for comparison in self.comparisons)
+
+    @property
+    def findings(self) -> Counter[Finding]:
+        """Counts of the statements by what was found."""
+        return Counter(claim.finding for claim in self.all_claims)
+
+    @property
     def explained(self) -> bool:
         """Whether every difference from the paper has an explanation."""
         return (
-            all(comparison.verdict is not PrintVerdict.DIFFERS for comparison in self.comparisons)
+            not self.verdicts[PrintVerdict.DIFFERS]
             and all(check.holds for check in self.checks)
-            and all(claim.finding is not Finding.FAILS for claim in (*self.claims, *self.search_claims))
+            and not self.findings[Finding.FAILS]
         )
 
 
