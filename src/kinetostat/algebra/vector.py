@@ -48,6 +48,10 @@ class Vector:
             self.x * other.y - self.y * other.x,
         )
 
+    def across(self, axis: "Vector") -> "Vector":
+        """The part at right angles to a unit vector."""
+        return self - axis * self.dot(axis)
+
     def is_at(self, other: "Vector") -> bool:
         """Whether this is the same point as another one, at every pose."""
         pairs = zip(self.components(), other.components(), strict=True)

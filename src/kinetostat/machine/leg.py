@@ -107,6 +107,13 @@ class Joint:
         return self
 
     @property
+    def pivot(self) -> Vector:
+        """The point of a revolute, m."""
+        if self.point is None:
+            raise ValueError("a slide has no point")
+        return self.point
+
+    @property
     def path(self) -> tuple[Vector, ...]:
         """Its point, if it has one."""
         return () if self.point is None else (self.point,)

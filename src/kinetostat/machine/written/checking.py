@@ -14,10 +14,12 @@ import numpy as np
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Joint, rows_about_one_point
-from kinetostat.machine.machine import Plane
-from kinetostat.machine.written.closed_form import closed_form
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Inverse, Plane, Step
+from kinetostat.machine.written.ball_leg import ball_leg
 from kinetostat.machine.written.family import chains, place
 from kinetostat.machine.written.joints import JOINT_TYPES, departure
+from kinetostat.machine.written.parallel_axes import parallel_axes
 from kinetostat.machine.written.plan import BASE, PLATFORM, JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import PARALLEL_AXES
@@ -113,8 +115,18 @@ def complete_plan(plan: Plan, tables: Mapping[str, Any]) -> Plan:
         freedoms = [joint for element in placed for joint in element.freedoms]
         idle = _dependent_freedoms(freedoms, plan.planar, home.home.translation, float(home.length))
         centred = rows_about_one_point([_centre(joint) for joint in freedoms])
-        legs.append(replace(leg, idle=idle, centred=centred, inverse=closed_form(leg.name, steps)))
+        legs.append(replace(leg, idle=idle, centred=centred, inverse=_closed_form(leg.name, steps)))
     return replace(plan, legs=tuple(legs))
+
+
+def _closed_form(name: str, steps: Sequence[Step]) -> Inverse | None:
+    """The closed form of a leg at the home pose; None if it has none, so that Newton's method closes the leg."""
+    moving = [step.element for step in steps if step.moves]
+    # The far side of a parallelogram slides along the axes at the home pose, and on a circle away from it.
+    if any(isinstance(element, Parallelogram) for element in moving):
+        return None
+    movers = [element.mover for element in moving]
+    return parallel_axes(name, movers) or ball_leg(name, movers)
 
 
 def _centre(joint: Joint) -> tuple[float, ...] | None:

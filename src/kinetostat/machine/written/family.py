@@ -18,7 +18,7 @@ from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Chains, Configuration, Family, Machine, Member, Plane, Step
 from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.machine.series import springs_in_a_row
-from kinetostat.machine.written.closed_form import BallLeg
+from kinetostat.machine.written.ball_leg import BallLeg
 from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals

@@ -1,13 +1,10 @@
-"""Closed-form joint coordinates: of legs with three parallel revolutes and at most one slide, and of legs with a ball.
+"""Joint coordinates of legs of six joints with a ball at one end, in closed form.
 
-Which legs have a closed form is seen from their axes at the home pose. All other legs are closed by Newton's method
-(`kinematics.closure`), and so are those with parallel axes where the platform turns out of the leg's plane.
-
-A leg of six joints that ends in a ball (three revolutes about one point): seen from its other end, the platform says
-where the centre of the ball is. The three joints that lead there only have to put it in its place; the ball then turns
-by what is left. A leg with its ball at the base is the same leg read backwards. Two of the three joints are revolutes
-about a second point, in any order with the third one, so that the third alone decides how far the two points are apart.
-Thus U-P-S, P-U-S, R-U-S, U-R-S and their reverses are solved, however their joints are written.
+A ball is three revolutes about one point. Seen from the other end of the leg, the platform says where this point is.
+The three joints that lead there put it in its place, and the ball then turns by what is left. A leg with its ball at
+the base is the same leg read backwards. Two of the three joints are revolutes about a second point, in any order with
+the third one, so that the third alone decides how far the two points are apart. Thus U-P-S, P-U-S, R-U-S, U-R-S and
+their reverses are solved, however their joints are written.
 
 Source: theory (73)-(75); R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation
 (1994), section 3.3, for the subproblems. All is in the base frame at the home pose.
@@ -16,8 +13,6 @@ Source: theory (73)-(75); R. M. Murray, Z. Li and S. S. Sastry, A Mathematical I
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, where
 from kinetostat.algebra.vector import (
@@ -31,102 +26,11 @@ from kinetostat.algebra.vector import (
 )
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Joint, RevolutePlace, Turn
-from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import ClosedLeg, Closure, Inverse, Step
-from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SAME_CENTRE, SAME_DIRECTION
+from kinetostat.machine.machine import ClosedLeg, Closure, Step
+from kinetostat.tolerances import NO_LINK, SAME_CENTRE, SAME_DIRECTION
 
 LEAST_SHARE = 1e-6
 """Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
-
-
-@dataclass(frozen=True)
-class ParallelAxes:
-    """A leg of three revolutes about parallel axes and at most one slide along them, in any order.
-
-    Attributes:
-        leg: its name.
-        revolutes: which of its movable elements turn, from base to platform.
-        slide: which of them slides, or None.
-        signs: the signs of the axes against the first revolute's.
-        bend: side of the line from the first to the last revolute on which the middle one lies at the home pose.
-    """
-
-    leg: str
-    revolutes: tuple[int, int, int]
-    slide: int | None
-    signs: tuple[float, ...]
-    bend: float
-
-    def close(self, steps: Sequence[Step], motion: Displacement) -> ClosedLeg:
-        """Find joint coordinates that displace the platform end by `motion` as far as the leg can, on the home branch.
-
-        Args:
-            steps: the leg at the home pose.
-            motion: the motion of the platform from its home pose, base frame.
-        """
-        movers = [step.element.mover for step in steps if step.moves]
-        axis = movers[self.revolutes[0]].axis
-        first, middle, last = (point_of(movers[i]) for i in self.revolutes)
-        goal = motion.apply(last)
-        lower, upper, span = (across(v, axis) for v in (middle - first, last - middle, goal - first))
-        bent, closure = self._triangle(axis, lower, upper, span)
-        lower_turn = turn_between(axis, lower, bent)
-        both = turn_between(axis, upper, span - bent)
-        all_three = turn_between(axis, lower, motion.rotation.apply(lower))
-        amounts: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, all_three))
-        for i, turn in zip(self.revolutes, turns, strict=True):
-            amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
-        if self.slide is not None:
-            amounts[self.slide] = self.signs[self.slide] * axis.dot(goal - last)
-        return ClosedLeg(amounts, closure)
-
-    def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
-        """Direction of the lower link, and the condition for the two links to bridge the span."""
-        near, far, square = lower.dot(lower), upper.dot(upper), span.dot(span)
-        shrink = reciprocal(square)
-        along = 0.5 * (1.0 + (near - far) * shrink)
-        aside = sqrt(near * shrink - along * along)
-        sizes = sqrt(near), sqrt(far)
-        closure = Closure(self.leg, sqrt(square), abs(sizes[0] - sizes[1]), sizes[0] + sizes[1])
-        return span * along + axis.cross(span) * (self.bend * aside), closure
-
-
-def _remaining_turn(first: Turn, whole: Turn) -> Turn:
-    """The rest of a turn after the first part of it."""
-    return Turn(
-        whole.cosine * first.cosine + whole.sine * first.sine,
-        whole.sine * first.cosine - whole.cosine * first.sine,
-    )
-
-
-def closed_form(name: str, steps: Sequence[Step]) -> Inverse | None:
-    """Recognise the closed form of a leg at the home pose, if it has one; its numbers must be floats."""
-    moving = [step.element for step in steps if step.moves]
-    # The far side of a parallelogram slides along the axes at the home pose, and on a circle away from it.
-    if any(isinstance(element, Parallelogram) for element in moving):
-        return None
-    movers = [element.mover for element in moving]
-    return _parallel_axes(name, movers) or ball_leg(name, movers)
-
-
-def _parallel_axes(name: str, movers: Sequence[Joint]) -> ParallelAxes | None:
-    turning = [i for i, joint in enumerate(movers) if joint.point is not None]
-    sliding = [i for i, joint in enumerate(movers) if joint.point is None]
-    if len(turning) != 3 or len(sliding) > 1 or any(joint.pitch for joint in movers):
-        return None
-    axes = np.array([joint.axis.components() for joint in movers], dtype=float)
-    axis = axes[turning[0]]
-    if np.linalg.norm(np.cross(axes, axis), axis=1).max() > PARALLEL_AXES:
-        return None
-    points = np.array([point_of(movers[i]).components() for i in turning], dtype=float)
-    lower, upper = (link - axis * (link @ axis) for link in np.diff(points, axis=0))
-    bend = float(np.cross(upper, lower) @ axis)
-    if min(np.linalg.norm(lower), np.linalg.norm(upper)) < NO_LINK or bend == 0.0:
-        return None
-    signs = tuple(float(np.sign(direction @ axis)) for direction in axes)
-    first, middle, last = turning
-    return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))
 
 
 @dataclass(frozen=True)
@@ -152,7 +56,7 @@ class BallLeg:
         movers = [step.element.mover for step in steps if step.moves]
         row = movers[::-1] if self.backwards else movers
         pair, single = (row[:2], row[2]) if self.pair_first else (row[1:3], row[0])
-        arm = point_of(row[3]) - point_of(pair[0])
+        arm = row[3].pivot - pair[0].pivot
         arm = arm * (1.0 / arm.norm())
         products = pair[0].axis.dot(pair[1].axis), pair[1].axis.dot(arm)
         along = single.axis.dot(arm)
@@ -191,18 +95,18 @@ class BallLeg:
     def _solve(self, movers: Sequence[Joint], motion: Displacement) -> ClosedLeg:
         """Find the coordinates of a leg whose ball comes last."""
         ball = movers[3:]
-        centre = point_of(ball[0])
+        centre = ball[0].pivot
         goal = motion.apply(centre)
         if self.pair_first:
             *pair, single = movers[:3]
-            fixed = point_of(pair[0])
+            fixed = pair[0].pivot
             end = goal - fixed
             square = _square(end)
             amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
             start = single.moved(amount)[1].apply(centre) - fixed
         else:
             single, *pair = movers[:3]
-            fixed = point_of(pair[0])
+            fixed = pair[0].pivot
             start = centre - fixed
             square = _square(start)
             undone, limits = to_distance(single, goal, centre, fixed, square)
@@ -243,7 +147,7 @@ class BallLeg:
             turn_about(first, (second, axis), first, (second, second)),
             turn_about(axis, (first, end), second, (first, start)),
         ]
-        point = point_of(pair[0])
+        point = pair[0].pivot
         half = rotation_along(first, turns[0].cosine, turns[0].sine)
         motions = [Displacement(turn, point - turn.apply(point)) for turn in (half, rotation)]
         axes = first, Carried(axis.x, axis.y, axis.z, rotation, Vector(low, across, 0.0))
@@ -277,7 +181,7 @@ def _ball_turns(
         turn_about(axis, (start, end), second, (first, third)),
         turn_about(end, (axis, far), third, (second, second)),
     ]
-    home = point_of(ball[0])
+    home = ball[0].pivot
     rotations = [
         rotation_along(start, turns[0].cosine, turns[0].sine) @ arm,
         rotation_along(end, turns[2].cosine, -turns[2].sine) @ motion.rotation,
@@ -308,7 +212,7 @@ def _with_placement(amount: Scalar | Turn, joint: Joint, before: Displacement, a
     """The amount of the single joint with its placement, between the motions of what is before and behind it."""
     if not isinstance(amount, Turn):
         return amount
-    return replace(amount, placement=_place_at(joint.axis, point_of(joint), before, after))
+    return replace(amount, placement=_place_at(joint.axis, joint.pivot, before, after))
 
 
 def _place(turn: Turn) -> RevolutePlace:
@@ -349,10 +253,10 @@ def to_distance(
         along = span.dot(joint.axis)
         if aligned:
             return sqrt(square) * aligned - along, (0.0, math.inf)
-        aside = _square(across(span, joint.axis))
+        aside = _square(span.across(joint.axis))
         root = sqrt(square - aside)
         return root * _sign((home - centre).dot(joint.axis)) - along, (sqrt(aside), math.inf)
-    arm = across(point - joint.point, joint.axis)
+    arm = (point - joint.point).across(joint.axis)
     middle = span - arm
     a, b = middle.dot(arm), middle.dot(joint.axis.cross(arm))
     mean = _square(middle) + _square(arm)
@@ -367,7 +271,7 @@ def to_distance(
 
 def _bend(joint: Joint, home: Vector, centre: Vector) -> Scalar:
     """Half the rate of the squared distance from a centre by a revolute at the home pose."""
-    arm = across(home - point_of(joint), joint.axis)
+    arm = (home - joint.pivot).across(joint.axis)
     return (home - centre).dot(joint.axis.cross(arm))
 
 
@@ -385,20 +289,20 @@ def ball_leg(name: str, movers: Sequence[Joint]) -> BallLeg | None:
             continue
         for pair_first in (True, False):
             pair, single = (arm[:2], arm[2]) if pair_first else (arm[1:], arm[0])
-            if _meet(pair) and _decides(pair, single, point_of(ball[0])):
+            if _meet(pair) and _decides(pair, single, ball[0].pivot):
                 return BallLeg(name, backwards, pair_first)
     return None
 
 
 def _decides(pair: Sequence[Joint], single: Joint, centre: Vector) -> bool:
     """Whether the home pose is clearly on one branch: of the distance that the single joint sets, and of the pair."""
-    arm = centre - point_of(pair[0])
+    arm = centre - pair[0].pivot
     if _is_in_plane(pair, arm):
         return False
     if single.point is None:
         return bool(abs(arm.dot(single.axis)) > LEAST_SHARE * arm.norm())
-    crank = across(centre - single.point, single.axis)
-    return bool(abs(_bend(single, centre, point_of(pair[0]))) > LEAST_SHARE * crank.norm() * arm.norm())
+    crank = (centre - single.point).across(single.axis)
+    return bool(abs(_bend(single, centre, pair[0].pivot)) > LEAST_SHARE * crank.norm() * arm.norm())
 
 
 def _is_in_plane(joints: Sequence[Joint], arm: Vector) -> bool:
@@ -411,24 +315,6 @@ def _meet(joints: Sequence[Joint]) -> bool:
     """Whether joints are revolutes about one point."""
     points = [joint.point for joint in joints if joint.point is not None]
     return len(points) == len(joints) and all((point - points[0]).norm() <= SAME_CENTRE for point in points)
-
-
-def point_of(joint: Joint) -> Vector:
-    """The point of a revolute, m."""
-    if joint.point is None:
-        raise ValueError("a slide has no point")
-    return joint.point
-
-
-def across(vector: Vector, axis: Vector) -> Vector:
-    """The part of a vector at right angles to an axis."""
-    return vector - axis * vector.dot(axis)
-
-
-def turn_between(axis: Vector, old: Vector, new: Vector) -> Turn:
-    """The turn about an axis that takes one vector at right angles to it to another of the same length."""
-    size = reciprocal(old.dot(old))
-    return Turn(old.dot(new) * size, axis.dot(old.cross(new)) * size)
 
 
 def _opposite(amount: Scalar | Turn) -> Scalar | Turn:
