@@ -50,11 +50,11 @@ class _Triangular:
         size = range(len(self.order))
         steps: list[Row] = [[] for _ in size]
         for k in size:
-            here = self.order[k]
-            above = [(self.vectors[here][self.pivots[i]], steps[i]) for i in range(k)]
+            vector = self.order[k]
+            above = [(self.vectors[vector][self.pivots[i]], steps[i]) for i in range(k)]
             for j in size:
-                known = total([factor * step[j] for factor, step in above])
-                steps[k].append(weighted(self.shrink[k], (1.0 if j == here else 0.0) - known))
+                from_above = total([factor * step[j] for factor, step in above])
+                steps[k].append(weighted(self.shrink[k], (1.0 if j == vector else 0.0) - from_above))
         return steps
 
 
@@ -67,7 +67,7 @@ def dual_basis(
 
     Args:
         basis: the vectors w_b, each of n scalars; components of comparable size (scale rows before).
-        squares: of each vector that the margin takes with unit size, the square of its size; None of the others.
+        squares: the square of the size of each vector that the margin takes with unit size; None for the others.
 
     Returns:
         The n dual vectors, and the singularity margin n / (|W| |W^-1|), Frobenius norms: the reciprocal of a
@@ -77,9 +77,9 @@ def dual_basis(
     solved = _triangularise(basis)
     inverse = [list(row) for row in zip(*solved.inverse(), strict=True)]
     dual: list[Row] = []
-    for known in inverse:  # a row of R^-1, and of W^-1 = R^-1 Q^T when it has been reflected
+    for coefficients in inverse:  # a row of R^-1, and of W^-1 = R^-1 Q^T when it has been reflected
         row: Row = [0.0] * len(basis)
-        for pivot, component in zip(solved.pivots, known, strict=True):
+        for pivot, component in zip(solved.pivots, coefficients, strict=True):
             row[pivot] = component
         for reflection in reversed(solved.reflections):
             reflection.apply(row)
@@ -133,8 +133,8 @@ def _singularity_margin(
         ]
         for vector, row, square in zip(vectors, inverse, given, strict=True)
     ]
-    whole = [total(list(column)) for column in zip(*sizes, strict=True)]
-    margin = float(len(vectors)) * reciprocal(sqrt(whole[0] * whole[1]))
+    of_vectors, of_inverse = (total(list(column)) for column in zip(*sizes, strict=True))
+    margin = float(len(vectors)) * reciprocal(sqrt(of_vectors * of_inverse))
     return where(least > ZERO_PIVOT, smaller(1.0, margin), 0.0)
 
 
@@ -153,8 +153,8 @@ def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
     rows = [row for _, row in sorted(columns)]
     swaps = sum(rows[i] > rows[j] for j in range(len(rows)) for i in range(j))
     sign: Scalar = -1.0 if (swaps + len(solved.reflections)) % 2 else 1.0
-    for here, row in zip(solved.order, solved.pivots, strict=True):
-        sign = where(solved.vectors[here][row] < 0.0, -sign, sign)
+    for vector, row in zip(solved.order, solved.pivots, strict=True):
+        sign = where(solved.vectors[vector][row] < 0.0, -sign, sign)
     return sign
 
 
@@ -169,20 +169,20 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     reflections: list[_Reflection] = []
     while waiting:
         # The sparsest vector first: its few rows fill the others least, so that structural zeros last longest.
-        here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
-        waiting.remove(here)
-        filled = [i for i in free if not is_zero(reduced[here][i])] or free[:1]
+        sparsest = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
+        waiting.remove(sparsest)
+        filled = [i for i in free if not is_zero(reduced[sparsest][i])] or free[:1]
         if len(filled) > 1:
-            reflections.append(_reflection(reduced[here], filled))
+            reflections.append(_reflection(reduced[sparsest], filled))
             for other in waiting:
                 reflections[-1].apply(reduced[other])
             shrink.append(reflections[-1].shrink)
         else:
-            shrink.append(reciprocal(reduced[here][filled[0]]))
-        order.append(here)
+            shrink.append(reciprocal(reduced[sparsest][filled[0]]))
+        order.append(sparsest)
         pivots.append(filled[0])
         free.remove(filled[0])
-        least = smaller(least, abs(reduced[here][filled[0]]))
+        least = smaller(least, abs(reduced[sparsest][filled[0]]))
     return _Triangular(reduced, order, pivots, shrink, free, least, reflections)
 
 
@@ -227,7 +227,7 @@ class Conjugated:
     """Columns made conjugate, A'^T S A' = diag(d), and how the given ones are made of them, A = A' L^T.
 
     Attributes:
-        columns: of A'.
+        columns: the columns of A'.
         shares: rows of the unit lower triangular L below the diagonal; row k has k entries.
         pivots: d >= 0, exactly 0 where S does not see a column beyond those before it.
         inverses: 1/d, and 0 where d is 0.
@@ -252,7 +252,7 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], sq
     (`CLOSING_ROUND_OFF`); one whose components are neither round-off nor surely more (`SURELY_MORE`) is seen in doubt.
 
     Args:
-        columns: of A; components beyond the weights have none and are carried along.
+        columns: the columns of A; components beyond the weights have none and are carried along.
         weights: the diagonal of S, >= 0.
         squares: for each weight, the square of the size that its component of a column of unit size may have, > 0; its
             order of magnitude counts.
@@ -355,8 +355,8 @@ class Eliminated:
         """A^-1 b."""
         left = self.forward(right)
         for k in reversed(range(len(left))):
-            known = total([self.upper[k][j] * left[j] for j in range(k + 1, len(left))])
-            left[k] = (left[k] - known) * self.shrink[k]
+            from_later = total([self.upper[k][j] * left[j] for j in range(k + 1, len(left))])
+            left[k] = (left[k] - from_later) * self.shrink[k]
         return left
 
 

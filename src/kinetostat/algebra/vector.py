@@ -156,7 +156,7 @@ class Normal(Vector):
     """A unit vector at right angles to others.
 
     Attributes:
-        others: these vectors.
+        others: the vectors to which it is normal.
     """
 
     others: tuple[Vector, ...]

@@ -15,7 +15,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.tolerances import HANGING, UNRESISTED
 
 MOST_STEPS = 30
-"""Of Newton's method for the slope and the length of a cable: it takes three or four unless it hangs like a chain."""
+"""Most steps of Newton's method for slope and length of a cable: three or four unless it hangs like a chain."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Hanging:
 
     Attributes:
         across, up: parts of the tension at the platform end, horizontally to the base end and upwards, N.
-        weight: of a metre of unstretched cable, N/m.
+        weight: weight per metre of unstretched cable, N/m.
         rigidity: EA, N.
         length: unstretched, between both ends, m.
     """
@@ -107,8 +107,8 @@ def hanging_cables(level: Array, rise: Array, tension: Array, weight: Array, rig
 
     Args:
         level, rise: distance of the points horizontally, and by which the base end is higher, m.
-        tension: at the platform end, N.
-        weight: of a metre of unstretched cable, N/m; greater than 0.
+        tension: tension at the platform end, N.
+        weight: weight per metre of unstretched cable, N/m; greater than 0.
         rigidity: EA, N.
 
     Returns:
@@ -145,7 +145,7 @@ def leaving_points(guides: Array, ends: Array, radius: Array, slope: Array) -> t
     Args:
         guides: where cables enter their pulleys [n x cables x 3], m.
         ends: their ends at the platform [n x cables x 3], m.
-        radius: of the wheels, m [n].
+        radius: radius of the wheels, m [n].
         slope: angles by which the cables rise where they leave [n x cables], rad.
 
     Returns:

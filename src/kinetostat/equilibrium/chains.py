@@ -292,7 +292,7 @@ def elastic_leg(
     Args:
         leg: the leg at the pose.
         units: the units in which it is counted.
-        amounts: given ones of the legs before; those of this leg are added.
+        amounts: the given amounts of the legs before; those of this leg are added.
         members: links that belong to it.
         travels: for each element, how far what moves there or last before it is from the home pose, rad or m [n]; empty
             where no flexure hinge asks for it.
@@ -338,8 +338,8 @@ def _spin(row: _Row, joints: Mapping[int, Joint], masses: Sequence[Weight]) -> t
 
     Args:
         row: the motions of the leg.
-        joints: its joints by the numbers of their coordinates.
-        masses: that it carries.
+        joints: the leg's joints by the numbers of their coordinates.
+        masses: the masses that the leg carries.
     """
     passive = [number for number, spring in enumerate(row.springs) if spring is None]
     groups = [passive[k : k + 3] for k in range(len(passive) - 2)]

@@ -28,7 +28,7 @@ def with_drives(leg: ElasticLeg, units: Units, machine: Machine) -> ElasticLeg:
     Args:
         leg: the leg without drives.
         units: the units in which it is counted.
-        machine: with its tables [drives] and [damping].
+        machine: the machine, with tables [drives] and [damping].
 
     Raises:
         InputError: rotors have an inertia or friction, but nothing says how far they turn.
@@ -63,7 +63,7 @@ def rotor_turns(spring: Spring, drives: Any) -> Scalar:
     """Radians by which the rotor of an actuator turns per metre or radian of the actuator; 0.0 if nothing says it.
 
     Args:
-        spring: of the actuator.
+        spring: the actuator's spring.
         drives: the table [drives] as this drive has it, see `machine.drives`.
 
     Raises:

@@ -198,9 +198,9 @@ class Condensed:
     Attributes:
         root: G, where G G^T is the compliance of springs alone at the place [ways x ways].
         twist: step of the platform [ways].
-        changes: of all wrenches [wrenches].
+        changes: changes of all wrenches [wrenches].
         rates: the symmetric part of 1 + G^T S G [ways x ways].
-        factors: of 1 + G^T S G.
+        factors: the triangular factors of 1 + G^T S G.
         stable: whether the tangent stiffness is positive definite by a margin, and no rank is in doubt.
     """
 
@@ -262,7 +262,7 @@ class LegwiseTangent:
 
         Args:
             machine: the machine.
-            coordinates: of the carrier, then of each leg with its wrench.
+            coordinates: those of the carrier, then those of each leg with its wrench.
             chord: whether to take the rates of springs alone in the free state. The step then is one of the chord
                 method (the simplified Newton method): it takes a quarter of the operations and leaves a share of what
                 is missing that is as small as the loads turn the legs.

@@ -282,11 +282,11 @@ def _inverse_diagonal(rows: list[Row], rank: int) -> tuple[Row, Scalar]:
 
 
 def _free_inverse_diagonal(rows: list[Row], most: int) -> tuple[Row, Scalar]:
-    """The same where numbers, and not the form, say which components have no compliance: they are rigid.
+    """The diagonal of the inverse where numbers, not the form, say which components are rigid, without compliance.
 
     Args:
-        rows: of the matrix.
-        most: its rank at most; all is rigid where more components than these move.
+        rows: the rows of the matrix.
+        most: the greatest rank that the matrix can have; all is rigid where more components than that move.
     """
     size = range(len(rows))
     fixed = [rows[i][i] < ZERO_PIVOT for i in size]

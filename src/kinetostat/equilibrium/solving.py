@@ -60,9 +60,9 @@ class Equilibria:
 
     Attributes:
         mechanism: the mechanism with its load.
-        state: those that were reached.
-        settled: where these are at rest [n].
-        sure: where they are, and no other state could have been reached but for a large change of what is given [n].
+        state: the states that were reached.
+        settled: whether each of them is at rest [n].
+        sure: whether it is, and no other state could have been reached but for a large change of what is given [n].
     """
 
     mechanism: Mechanism

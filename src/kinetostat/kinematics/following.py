@@ -69,47 +69,45 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
         tried = left[differs[left]]
         if not tried.size:
             continue
-        part, there = problems.take(tried), some(goal, tried)
-        reached, solved = _by_way(part, plan, there)
+        reached, solved = _by_way(problems.take(tried), plan, some(goal, tried))
         taken = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
         unknowns[tried[taken]], status[tried[solved]] = reached[taken], int(Status.OK)
         left = left[status[left] != Status.OK]
-    part, there = problems.take(left), some(goal, left)
-    unknowns[left], shown = _least_gap(part, unknowns[left], there)
+    unknowns[left], shown = _least_gap(problems.take(left), unknowns[left], some(goal, left))
     status[left[shown]] = int(Status.OUT_OF_REACH)
     return unknowns, status
 
 
 def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, Mask]:
-    """Follow solutions along a way; return where that ends, and whether it ends at the goal in the same mode.
+    """Follow solutions along a way; return where they end, and whether that is at the goal in the same mode.
 
-    Where it ends there in another mode, a step was so long that it crossed to that, and shorter ones are taken.
+    A solution at the goal in another mode has crossed to it by too long a step, and is followed again in shorter ones.
     """
     unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, LONGEST_STRIDE)
     again = np.flatnonzero(crossed)
     if again.size:
-        part, there = problems.take(again), some(goal, again)
-        unknowns[again], solved[again], _ = _strides(part, plan(part, there), there, CAREFUL_STRIDE)
+        part, target = problems.take(again), some(goal, again)
+        unknowns[again], solved[again], _ = _strides(part, plan(part, target), target, CAREFUL_STRIDE)
     return unknowns, solved
 
 
 def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -> tuple[Array, Mask, Mask]:
-    """Follow solutions along a way; return where that ends, whether at the goal, and whether there in another mode."""
+    """Follow solutions along a way; return where they end, whether at the goal in the same mode, or in another one."""
     unknowns, arrived = _along(problems, way, furthest)
     solved, crossed = np.zeros((2, len(unknowns)), dtype=bool)
-    here = np.flatnonzero(arrived)
-    if here.size:
-        part, there = problems.take(here), some(goal, here)
+    ended = np.flatnonzero(arrived)
+    if ended.size:
+        part, target = problems.take(ended), some(goal, ended)
 
         def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:
-            left, rates = part.take(rows).gaps(values, some(there, rows))
+            left, rates = part.take(rows).gaps(values, some(target, rows))
             return largest(left), lambda going: least_norm(rates[going], left[going])
 
         # A gap that no longer becomes less has reached round-off, or cannot be closed.
-        steps, start = MOST_STEPS_AT_GOAL, unknowns[here]
-        end = newton(equations, start, len(here), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
-        unknowns[here], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, there)
-        solved[here], crossed[here] = closed & same, closed & ~same
+        steps, start = MOST_STEPS_AT_GOAL, unknowns[ended]
+        end = newton(equations, start, len(ended), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
+        unknowns[ended], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, target)
+        solved[ended], crossed[ended] = closed & same, closed & ~same
     return unknowns, solved, crossed
 
 
@@ -221,8 +219,8 @@ def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
     """
     if problems.free:
         return np.ones(len(unknowns), dtype=bool)
-    here, home = signs(problems, unknowns, goal), signs(problems, 0.0 * unknowns, problems.at_home())
-    return np.asarray(here * home >= 0.0)
+    at_goal, at_home = signs(problems, unknowns, goal), signs(problems, 0.0 * unknowns, problems.at_home())
+    return np.asarray(at_goal * at_home >= 0.0)
 
 
 def signs(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:

@@ -64,8 +64,8 @@ class Mobility:
         kind: the kind of the pose.
         lost: names of legs that lose a freedom here.
         twists: what the platform gains, each [omega; v] at the reference point, base axes; of 1 rad, or 1 m.
-        leg_least_singular_value, platform_least_singular_value: of the unit joint screws of any leg, and of the unit
-            wrenches that hold the platform with actuators locked, lengths in units of the machine's; 0 if singular.
+        leg_least_singular_value, platform_least_singular_value: that of any leg's unit joint screws, and that of the
+            unit wrenches that hold the platform with actuators locked, in units of the machine's length; 0 if singular.
     """
 
     here: Freedoms

@@ -50,7 +50,7 @@ def balancing(matrix: Array, load: Array) -> Balancing:
 
     Args:
         matrix: wrenches of unit forces, as columns [n x d x m].
-        load: what they must add up to [n x d].
+        load: the wrench to which the forces must add up [n x d].
 
     Returns:
         All forces, `sure` where the matrix is surely of rank d.
@@ -119,31 +119,31 @@ def distribution(matrix: Array, load: Array, least: Array, most: Array, rule: Ru
 
     Args:
         matrix: wrenches of unit forces, as columns [n x d x m].
-        load: what they must add up to [n x d].
+        load: the wrench to which the forces must add up [n x d].
         least, most: bounds of every force [n]; `most` may be infinite.
-        rule: the choice among those that there are.
+        rule: the choice among all forces within the bounds.
 
     Returns:
-        The forces [n x m], and whether there are any within the bounds [n]; where there are not, they are NaN.
+        The forces [n x m], and whether there are any within the bounds [n]; else the forces are NaN.
     """
     with np.errstate(all="ignore"):
-        every = balancing(matrix, load)
+        balances = balancing(matrix, load)
     usable = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(load).all(axis=1)
-    forces, exist = np.full(every.given.shape, np.nan), np.zeros(len(load), dtype=bool)
-    rows = np.flatnonzero(usable & every.sure)
-    regular = Balancing(every.given[rows], every.internal[rows], every.sure[rows])
+    forces, exist = np.full(balances.given.shape, np.nan), np.zeros(len(load), dtype=bool)
+    rows = np.flatnonzero(usable & balances.sure)
+    regular = Balancing(balances.given[rows], balances.internal[rows], balances.sure[rows])
     forces[rows], exist[rows] = within_bounds(regular, least[rows], most[rows], rule.at(rows))
-    for row in np.flatnonzero(usable & ~every.sure):
+    for row in np.flatnonzero(usable & ~balances.sure):
         special = balancing_of_any_rank(matrix[row], load[row], float(least[row]))
         if special.sure[0]:
             forces[[row]], exist[[row]] = within_bounds(special, least[[row]], most[[row]], rule.at(np.array([row])))
     return forces, exist
 
 
-def within_bounds(every: Balancing, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
+def within_bounds(balances: Balancing, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
     """Choose among all forces that balance a load; arguments and results as for `distribution`."""
-    internal = every.internal
-    start = every.given + np.einsum("nmr,nr->nm", internal, rule.level[:, None] * internal.sum(axis=1))
+    internal = balances.internal
+    start = balances.given + np.einsum("nmr,nr->nm", internal, rule.level[:, None] * internal.sum(axis=1))
     inner, exist = _shortest_into_bounds(internal, start, least, most)
     forces = start + np.einsum("nmr,nr->nm", internal, inner)
     forces[~exist] = np.nan
@@ -162,26 +162,26 @@ def _by_power(internal: Array, forces: Array, least: Array, most: Array, rule: R
     forces, rows = forces.copy(), np.arange(len(forces))
     scale = np.maximum(np.abs(forces - rule.level[:, None]).max(axis=1), np.maximum(least, np.abs(rule.level)))
     for _ in range(MOST_POWER_STEPS):
-        ways, here = internal[rows], forces[rows]
+        ways, before = internal[rows], forces[rows]
         level, p = rule.level[rows, None], rule.exponent[rows, None]
-        size = np.abs(here - level).max(axis=1, keepdims=True)
-        apart = (here - level) / np.where(size > 0.0, size, 1.0)
+        size = np.abs(before - level).max(axis=1, keepdims=True)
+        apart = (before - level) / np.where(size > 0.0, size, 1.0)
         curved = (p - 1.0) * np.abs(apart) ** (p - 2.0) + LEAST_CURVATURE
         slope = np.einsum("nmr,nm->nr", ways, np.abs(apart) ** (p - 2.0) * apart)
         factor = np.linalg.cholesky(np.einsum("nmr,nm,nms->nrs", ways, curved, ways))
         scaled = np.linalg.solve(factor, ways.transpose(0, 2, 1)).transpose(0, 2, 1)
         down = -size * np.linalg.solve(factor, slope[:, :, None])[:, :, 0]
-        wanted: Array = here + np.einsum("nmr,nr->nm", scaled, down)
-        back, _ = _shortest_into_bounds(np.asarray(scaled), np.asarray(wanted), least[rows], most[rows])
-        step: Array = wanted + np.einsum("nmr,nr->nm", scaled, back) - here
+        wanted: Array = before + np.einsum("nmr,nr->nm", scaled, down)
+        into_bounds, _ = _shortest_into_bounds(np.asarray(scaled), np.asarray(wanted), least[rows], most[rows])
+        step: Array = wanted + np.einsum("nmr,nr->nm", scaled, into_bounds) - before
         cost = (np.abs(apart) ** p).sum(axis=1)
         for _ in range(MOST_HALVINGS):
-            there = np.abs((here + step - level) / np.where(size > 0.0, size, 1.0)) ** p
-            worse = there.sum(axis=1) > cost
+            powers = np.abs((before + step - level) / np.where(size > 0.0, size, 1.0)) ** p
+            worse = powers.sum(axis=1) > cost
             if not worse.any():
                 break
             step[worse] *= 0.5
-        forces[rows] = here + step
+        forces[rows] = before + step
         rows = rows[np.abs(step).max(axis=1) > SAME_FORCE * scale[rows]]
         if not len(rows):
             break
@@ -210,7 +210,7 @@ def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
 
     Args:
         sides: normals of the half spaces [n x k x r].
-        ends: where they end [n x k]; minus infinity for none.
+        ends: the least values of sides y [n x k]; minus infinity for a half space without end.
 
     Returns:
         The points [n x r], and whether the polyhedron has any [n].
@@ -236,7 +236,7 @@ def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
         rows, lacking = rows[going], lacking[going]
         if not len(rows):
             break
-        every, chosen, at_bound = np.arange(len(rows)), entering[rows], active[rows] != none
+        numbers, chosen, at_bound = np.arange(len(rows)), entering[rows], active[rows] != none
         normal = sides[rows, chosen]
         others = np.where(at_bound[:, :, None], sides[rows[:, None], active[rows]], 0.0)
         square = np.einsum("nar,nbr->nab", others, others) + np.eye(size) * ~at_bound[:, None, :]
@@ -246,19 +246,19 @@ def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
         open_ = gain > INDEPENDENT * lengths[rows, chosen] ** 2
         with np.errstate(all="ignore"):
             until = np.where(at_bound & (share > UNRESISTED), pull[rows] / share, np.inf)
-            whole = np.where(open_, lacking[every, chosen] / gain, np.inf)
+            full = np.where(open_, lacking[numbers, chosen] / gain, np.inf)
         first = until.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
-        part = until[every, first] if size else np.full(len(rows), np.inf)
-        far = np.minimum(part, whole)
+        part = until[numbers, first] if size else np.full(len(rows), np.inf)
+        far = np.minimum(part, full)
         stuck = np.isinf(far)
-        exist[rows[stuck & (lacking[every, chosen] > BALANCED)]] = False
+        exist[rows[stuck & (lacking[numbers, chosen] > BALANCED)]] = False
         entering[rows[stuck]] = none  # what is left of a condition that is met but for round-off
         ends[rows[stuck], chosen[stuck]] = -np.inf
         far = np.where(stuck, 0.0, far)
         points[rows] += np.where(open_ & ~stuck, far, 0.0)[:, None] * step
         pull[rows] = np.where(at_bound, pull[rows] - far[:, None] * share, 0.0)
         its_pull[rows] += far
-        takes = ~stuck & (whole <= part)
+        takes = ~stuck & (full <= part)
         slots = np.argmin(at_bound, axis=1) if size else first
         active[rows[takes], slots[takes]], pull[rows[takes], slots[takes]] = chosen[takes], its_pull[rows[takes]]
         entering[rows[takes]] = none

@@ -52,7 +52,7 @@ def at_home(machine: Machine, varying: Iterable[str]) -> Machine:
     Axes at right angles and slides along their legs then cost no arithmetic.
 
     Args:
-        machine: of any family.
+        machine: a machine of any family.
         varying: leaf paths of the parameters that vary.
     """
     if machine.family.chains is None or any(path.startswith(LEGS) for path in varying):
