@@ -133,9 +133,9 @@ class ModelVariable:
     """A variable of an FMI model.
 
     Attributes:
-        name: of it.
+        name: the name of the variable.
         unit: SI, or "" where it has none.
-        start: its values at the start; of one that is computed, as many zeros.
+        start: its values at the start; zeros for a variable that is computed.
         given: whether it is an input.
         shape: rows and columns of a matrix; empty for a single number.
         group: what it belongs to: the word under which the source code knows where the group begins.

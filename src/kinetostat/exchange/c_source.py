@@ -128,9 +128,9 @@ class PrintedProgram:
     """A formula as a static C function.
 
     Attributes:
-        name: of the function.
+        name: the name of the function.
         text: its source.
-        operations: that one call takes.
+        operations: the number of operations that one call takes.
     """
 
     name: str

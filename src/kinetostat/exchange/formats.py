@@ -197,7 +197,7 @@ def export(
         inputs, outputs: of a state space, names of forces fx fy fz mx my mz at the tool point, of motions
             x y z rx ry rz there, and of actuators in both; forces and motions of the tool point if None. Of C, a page
             and their like, leaf paths of parameters that become arguments, and names of quantities.
-        over: of maps of heights, ranges of x and y, as "x=-100 mm:100 mm:9".
+        over: the ranges of x and y of maps of heights, as "x=-100 mm:100 mm:9".
 
     Returns:
         The paths of the files: some formats need several.

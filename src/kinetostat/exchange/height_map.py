@@ -58,8 +58,8 @@ class HeightMap:
     """Heights over a grid of x and y.
 
     Attributes:
-        x, y: of the columns and of the rows, m.
-        heights: by which the tool is raised, m [rows x columns]; NaN where the machine has no state of rest.
+        x, y: the coordinates of the columns and of the rows, m.
+        heights: the rise of the tool, m [rows x columns]; NaN where the machine has no state of rest.
     """
 
     x: Array

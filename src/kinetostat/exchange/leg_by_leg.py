@@ -78,7 +78,7 @@ def fitted_text(answer: Identification) -> str | None:
     identified; comments, units and names stay. Otherwise it is a file leg by leg.
 
     Args:
-        answer: of `identify`.
+        answer: the answer of `identify`.
 
     Returns:
         The text; None where legs with these errors close only by being bent.

@@ -37,7 +37,7 @@ class FileJoint:
         parent, child: names of its links.
         frame: the frame of itself and of its child, in the root link's frame, m [4 x 4].
         axis: unit vector in the root link's frame; without meaning for a fixed joint.
-        actuated: by a <transmission>, `independent`, or as its extension says.
+        actuated: whether it is driven, by a <transmission>, `independent`, or as its extension says.
         mimics: name and multiplier of the joint that it follows, None if it follows none.
         extension: attributes of its element <kinetostat>.
     """

@@ -55,8 +55,8 @@ class Quantity:
         per_leg: whether there is a value for each actuated leg, in their order.
         apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
-        least: the least size that is allowed of what is not 0, SI; 0 for that of the kind.
-        unset: of a limit, the infinity that stands for "none"; None for a quantity that is not a limit.
+        least: the least size allowed for a value that is not 0, SI; 0 for the least size of the kind.
+        unset: the infinity that stands for "no limit"; None for a quantity that is not a limit.
     """
 
     kind: str

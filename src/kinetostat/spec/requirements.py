@@ -37,7 +37,7 @@ class Requirement:
         over: a box: ranges such as "x=-2 cm:2 cm:11".
         poses: poses, each with the fields in which it differs.
         fits: name of a motor of the catalogue; empty if the requirement is not about motors.
-        motion: that the motor must do: the lines of a CSV file, or the name of such a file.
+        motion: the motion that the motor must do: the lines of a CSV file, or the name of such a file.
         catalogue: the lines of a catalogue, or the name of such a file; that of kinetostat if empty.
         gear, screw: names of a gear and a screw of the catalogue; those of the machine's [drives] if empty.
     """
@@ -132,8 +132,8 @@ def with_files(requirements: Requirements, folder: Path) -> Requirements:
     """Put the lines of files that requirements name in the place of their names, so that a machine needs no folder.
 
     Args:
-        requirements: as they were written.
-        folder: of the file in which they were written; others lie beside it or below.
+        requirements: the requirements as they were written.
+        folder: the folder of the file in which they were written; others lie beside it or below.
 
     Raises:
         InputError: names the requirement whose file cannot be read, or lies elsewhere.

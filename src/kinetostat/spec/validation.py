@@ -44,7 +44,7 @@ class Mistake:
     Attributes:
         kind: "missing", "unknown", "no table" or "wrong".
         place: the keys that lead to it.
-        reason: of what is wrong, what is wrong with it.
+        reason: the reason why it is wrong, where there is one to tell; else empty.
     """
 
     kind: str

@@ -186,7 +186,7 @@ def timed_handler(handler: Callable[[str, Any], None], scope_of: Callable[[str],
     """Return a handler of messages that adds the time it takes to the pace of the connection.
 
     Args:
-        handler: of a message, by the name of its connection and its content.
+        handler: the function that takes a message, by the name of its connection and its content.
         scope_of: returns the scope of a connection by its name.
     """
 

@@ -56,7 +56,7 @@ class PictureRequest:
     Attributes:
         machine: at its present pose.
         sizes: proportions it was loaded with, so that balls and rods keep their thickness while it changes.
-        axes: of `pulling`, along and about which its platform can be pulled.
+        axes: the axes of `pulling`, along and about which its platform can be pulled.
         fit: whether the camera should move until all of it is seen.
     """
 
@@ -116,10 +116,10 @@ class Report:
     """An analysis and what shows it.
 
     Attributes:
-        analysis: of the machine at its pose.
+        analysis: the analysis of the machine at its pose.
         legs: name of the leg in which each joint or link is; empty where the joints have no place.
         sizes: proportions of the picture.
-        solids: that show the answers in it.
+        solids: the solids that show the answers in it.
         exaggeration: factor by which deflections are drawn larger; None without a load.
         loaded: the state of rest, where the machine is to be shown under its loads.
         refused: why its loads are refused; empty if they are not.
@@ -312,8 +312,8 @@ class Ringing:
 
     Attributes:
         answer: modes at the pose; none where it has no answer or nothing can ring.
-        frequencies: of the response, Hz [frequencies]; none where there are no modes.
-        receptance: of the tool, SI [frequencies x 6 x 6].
+        frequencies: the frequencies of the response, Hz [frequencies]; none where there are no modes.
+        receptance: the receptance of the tool, SI [frequencies x 6 x 6].
     """
 
     answer: Vibration
@@ -339,7 +339,7 @@ class SwingRequest:
 
     Attributes:
         answer: with its modes.
-        number: of the mode, from 0.
+        number: the number of the mode, from 0.
         sizes: proportions of the picture.
     """
 
@@ -366,7 +366,7 @@ class MotionRequest:
 
     Attributes:
         machine: the machine.
-        text: of the CSV file of the motion; that of the requirements of the machine's file if empty.
+        text: the CSV file of the motion; if empty, the motion is that of the requirements of the machine's file.
     """
 
     machine: Machine

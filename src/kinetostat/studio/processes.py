@@ -79,8 +79,8 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
     Args:
         kind: "machine" or "study".
         data: content of the file.
-        name: of the file, for messages.
-        tab: that has sent it.
+        name: the name of the file, for messages.
+        tab: the browser tab that has sent it.
 
     Raises:
         InputError: it cannot be read, or not within the limits, or the tab's file before is still being read.
@@ -114,7 +114,7 @@ def read(kind: str, data: bytes, name: str) -> None:
     Args:
         kind: "machine" or "study".
         data: content of the file.
-        name: of the file, for messages.
+        name: the name of the file, for messages.
 
     Raises:
         InputError: it cannot be read.

@@ -48,7 +48,7 @@ class Handle:
         of: `PLATFORM`, `BASE` or `HEAD`.
         leg: name of the leg whose joint it is; of the platform empty.
         point: base frame, m.
-        axes: of `MOVES` and `TURNS`, along or about which the platform can be pulled; a joint moves in its plate.
+        axes: those of `MOVES` and `TURNS` along or about which the platform can be pulled; a joint moves in its plate.
     """
 
     of: str
@@ -67,9 +67,9 @@ class Pull:
     """A wish of the designer.
 
     Attributes:
-        machine: as it is now.
+        machine: the machine as it is now.
         of, leg: the handle.
-        axis: of a platform's handle, one of `MOVES` or `TURNS`.
+        axis: the axis of a platform's handle, one of `MOVES` or `TURNS`.
         goal: where the platform should be, or at its translation the joint.
     """
 

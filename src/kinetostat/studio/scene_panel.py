@@ -130,7 +130,7 @@ class ScenePanel:
         """Show the overlays and figures of a pose; without an answer, show the reason and keep the last figures.
 
         Args:
-            report: of the pose.
+            report: the report of the pose.
             automatic: whether the page chose the factor of the deflected shape.
         """
         status, message = _verdict(report)
@@ -229,7 +229,7 @@ class Handles:
 
         Args:
             session: whose machine is pulled.
-            view: of the machine; sends `pull` and `settle`.
+            view: the view of the machine, which sends `pull` and `settle`.
             on_change: called after every change of the machine.
         """
         self._session, self._on_change = session, on_change

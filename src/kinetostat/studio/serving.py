@@ -49,8 +49,8 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
     """Serve the studio until it is stopped; every page starts with this machine.
 
     Args:
-        machine: that a new page shows.
-        name: of the machine if it is bundled, else empty.
+        machine: the machine that a new page shows.
+        name: the name of the machine if it is bundled, else empty.
         host: address at which to listen.
         port: at which to listen.
         browser: whether to open a browser.
@@ -98,8 +98,8 @@ def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str
     """Register the page with the server.
 
     Args:
-        machine: that a new page shows.
-        name: of the machine if it is bundled, else empty.
+        machine: the machine that a new page shows.
+        name: the name of the machine if it is bundled, else empty.
         workshop: searches and favourites of all pages.
         hosts: names by which a browser may address this server; any name if empty. The check stops pages of other
             sites, whose own names could be made to point here.
@@ -122,8 +122,8 @@ async def show(machine: Machine, name: str, workshop: Workshop) -> None:
     """Build the page of one browser tab; a tab that is loaded again goes on where it was.
 
     Args:
-        machine: that a new tab shows.
-        name: of the machine if it is bundled, else empty.
+        machine: the machine that a new tab shows.
+        name: the name of the machine if it is bundled, else empty.
         workshop: searches and favourites of all pages.
     """
     ui.add_css(STYLE)

@@ -39,10 +39,10 @@ class Memory:
 
     Attributes:
         origin: the machine as it was loaded.
-        name: of a bundled machine; empty for any other.
+        name: the name of a bundled machine; empty for any other.
         now: the machine as it is; `origin` if None.
         past: earlier states of the machine, the latest last.
-        exaggeration: of the deflected shape; None to choose one for every load.
+        exaggeration: the factor on deflections in the shape shown; None to choose one for every load.
     """
 
     origin: Machine
@@ -56,9 +56,9 @@ class Session:
     """A machine and its history.
 
     Attributes:
-        machine: as it is now; its pose may be out of reach.
-        origin: as it was loaded.
-        name: of a bundled machine; empty for any other.
+        machine: the machine as it is now; its pose may be out of reach.
+        origin: the machine as it was loaded.
+        name: the name of a bundled machine; empty for any other.
         exaggeration: factor of its deflected shape, None to choose one for every load; it has no history.
     """
 

@@ -138,7 +138,7 @@ def save(what: object, path: str | Path) -> Path:
     Args:
         what: a machine (.toml; .png, a picture; .glb, its solids), an answer (.json), a grid or a workspace (.json,
             .nc), a figure (.png, .svg, .pdf), a picture (.png).
-        path: of the file; an existing file is replaced.
+        path: the path of the file; an existing file is replaced.
 
     Returns:
         The path.

@@ -52,7 +52,7 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
     """Begin a figure with front, side and plan, of a planar machine only the plan, to scale in mm.
 
     Args:
-        configuration: of the machine.
+        configuration: the placed machine.
         draw: fills a panel, given the axes across and up.
     """
     views = THREE_VIEWS if configuration.plane is None else THREE_VIEWS[2:]

@@ -190,7 +190,7 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
     """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each.
 
     Args:
-        answer: of a machine that comes to rest.
+        answer: the answer of a machine that comes to rest.
         title: over the figure, with braces for the name of the machine.
     """
     display, commands = answer.machine.display, answer.corrections.command

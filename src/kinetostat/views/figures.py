@@ -169,8 +169,8 @@ def save(
 
     Args:
         drawings: functions that draw them, by the name of the file without its suffix.
-        folder: for the files.
-        formats: of `FORMATS`.
+        folder: the folder of the files.
+        formats: some of `FORMATS`.
         tell: called before each figure with how many are done, how many there are, and which one comes next.
 
     Returns:
@@ -256,7 +256,7 @@ def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> s
     """Say how many poses have no result, and why; empty where all have one.
 
     Args:
-        counts: of poses by their status.
+        counts: the numbers of poses by their status.
         poses: number of all.
         shown: how the figure shows them, in brackets.
     """
@@ -332,8 +332,8 @@ def fill_regions(panel: Axes, x: Array, y: Array, places: Any, known: Any, colou
 
     Args:
         panel: to fill.
-        x, y: of the poses, as the axes show them.
-        places: of each pose's colour [y x x].
+        x, y: the coordinates of the poses, as the axes show them.
+        places: the place of each pose's colour [y x x].
         known: where there is a result; elsewhere the panel is grey [y x x].
         colours: from which they are taken.
     """

@@ -51,7 +51,7 @@ def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
 
     Args:
         dataset: over the grid.
-        title: of the figure; the name of the machine if empty.
+        title: the title of the figure; the name of the machine if empty.
     """
     shown: dict[int, tuple[Callable[..., Figure], str, str]] = {
         1: (curves, "sweep", "The quantities over the parameter that varies."),

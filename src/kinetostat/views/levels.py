@@ -32,7 +32,7 @@ def usual_range(values: Array) -> tuple[float, float]:
     A map of 41 x 41 poses with a single pose next to a singularity would otherwise be of one colour.
 
     Args:
-        values: of any shape; those that are not finite are ignored, at least one must be finite.
+        values: an array of any shape; those that are not finite are ignored, at least one must be finite.
     """
     finite = values[np.isfinite(values)]
     least, low, high, greatest = np.percentile(finite, [0.0, *USUAL_PERCENTILES, 100.0])
@@ -59,7 +59,7 @@ def levels_of(values: Array) -> Levels:
     """Choose about `LEVELS` round levels over the usual range, by the logarithm where that is wide.
 
     Args:
-        values: of any shape; two finite ones must differ.
+        values: an array of any shape; two finite ones must differ.
     """
     finite = values[np.isfinite(values)]
     low, high = usual_range(finite)

@@ -42,7 +42,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Fi
     """Draw displacement and spring loads over the share of the load, with the linear answer as thin lines.
 
     Args:
-        state: of the machine under its whole load.
+        state: the state of the machine under its whole load.
         title: over the figure, with braces for the name of the machine.
     """
     machine, curve = state.machine, load_curve(state.state)
@@ -79,7 +79,7 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
     """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed.
 
     Args:
-        state: of a machine that is at rest.
+        state: the state of a machine that is at rest.
         title: over the figure, with braces for the name of the machine.
     """
     machine, response = state.machine, state.state.free
@@ -102,7 +102,7 @@ def moved_machine(
 
     Args:
         machine: at its pose.
-        response: of it.
+        response: the response of the machine.
         moved: motions of tool and links from there.
         slack_legs: names of those whose links are dashed.
     """

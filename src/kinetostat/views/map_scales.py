@@ -36,7 +36,7 @@ def trim_height(figure: Figure, panel: Axes, height: float) -> None:
     Args:
         figure: whose layout is not fixed yet.
         panel: one of the panels, which are all alike.
-        height: of all rows of panels together if they were square, inches.
+        height: the height of all rows of panels together if they were square, inches.
     """
     if panel.get_aspect() == 1.0:
         (left, right), (low, high) = panel.get_xlim(), panel.get_ylim()

@@ -41,7 +41,7 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], num
         caption: text above the table; none if empty.
         heads: heads of the columns; if all are empty, there is no row of heads.
         rows: cells as text, or as HTML in a `Markup`.
-        numeric: for each column, whether it holds numbers (aligned to the right).
+        numeric: whether each column holds numbers, which are aligned to the right.
     """
     above = f"<caption>{as_markup(caption)}</caption>" if caption else ""
     top = f"<thead>{_row('th', heads, numeric)}</thead>" if any(heads) else ""

@@ -78,9 +78,9 @@ def write_all(
     """Write tables, data, figures and the page into a folder.
 
     Args:
-        reproduction: what was recomputed.
-        folder: for the files.
-        formats: of the figures, of `views.figures.FORMATS`.
+        reproduction: the recomputed paper.
+        folder: the folder of the files.
+        formats: the formats of the figures, some of `views.figures.FORMATS`.
         tell: called before each figure with how many are done, how many there are, and which one comes next.
 
     Returns:

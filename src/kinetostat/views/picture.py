@@ -61,9 +61,9 @@ class Paper:
     """Background of a picture.
 
     Attributes:
-        color, ink: of the page and of the grid, sRGB from 0 to 1.
+        color, ink: the colours of the page and of the grid, sRGB from 0 to 1.
         shadow, grid: how strongly shadows and grid cover it, 0 to 1.
-        brightness: of the machine.
+        brightness: the brightness of the machine.
     """
 
     color: tuple[float, float, float]
@@ -95,7 +95,7 @@ def machine_picture(
         machine: at the pose to draw.
         size: width and height, pixels.
         view: "iso", "front", "side" or "top", or the direction from the machine to the camera, base axes.
-        theme: for "light" or for "dark" pages.
+        theme: the theme of the page, "light" or "dark".
         transparent: whether the background consists of shadow and grid alone.
         hidden: layers of the scene to leave out.
 

@@ -310,8 +310,8 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
 
     Args:
         console: on which it is printed.
-        description: of answers of this kind.
-        answer: of the kind that is described.
+        description: the description of answers of this kind.
+        answer: an answer of the kind that is described.
         full: whether tables show every row.
     """
     machine = description.machine_of(answer)

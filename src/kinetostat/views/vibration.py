@@ -100,8 +100,8 @@ def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str
 
     Args:
         modes: from the lowest.
-        display: of the machine.
-        components: that the machine has: a planar one does not answer along z.
+        display: the units of the machine's display.
+        components: the components that the machine has: a planar one does not answer along z.
     """
     axes = [axis for axis in "xyz" if axis != "z" or "rx" in components or "z" in components]
     heads = ["Hz", "damping %", "tool", "modal mass", "modal stiffness", *(f"{axis} %" for axis in axes)]

@@ -61,7 +61,7 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Po
     more coordinates, the others stay at the values of the pose in the file.
 
     Args:
-        dataset: of `studies.workspace.Workspace`.
+        dataset: the dataset of a `studies.workspace.Workspace`.
         labels: its verdicts.
         conditions: whose contours are drawn.
         title: over each picture.

@@ -51,10 +51,10 @@ class UncertainNumbers:
     """Numbers of a machine that are not exact.
 
     Attributes:
-        places: in the errors of the model [p].
-        values: by which they differ from the drawing, SI [p].
-        covariance: SI [p x p].
-        source: where that is from, for people; empty where nothing is uncertain.
+        places: their places among the errors of the model [p].
+        values: their differences from the drawing, SI [p].
+        covariance: the covariance of these values, SI [p x p].
+        source: the origin of the covariance, for people; empty where nothing is uncertain.
     """
 
     places: Integers
@@ -67,9 +67,9 @@ def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> 
     """Gather what is known of a machine's numbers: from a fit, and from [tolerances] for those that were not fitted.
 
     Args:
-        machine: as drawn.
-        model: its errors.
-        fit: record of `kinetostat identify`; None without one.
+        machine: the machine as drawn.
+        model: the model of its errors.
+        fit: the record of `kinetostat identify`; None without one.
 
     Raises:
         InputError: the record cannot be read or is about another machine, or a line of [tolerances] is about nothing.
@@ -80,15 +80,14 @@ def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> 
     chosen = [part for part in parts if part.group not in GROUPS_WITHOUT_COMPLIANCE and part.errors[0] not in fitted]
     variances = [part.limit**2 * (SIGMAS**-2 if part.normal else 1.0 / 3.0) for part in chosen]
     places = [*fitted, *(part.errors[0] for part in chosen)]
-    whole = np.zeros((len(places), len(places)))
-    whole[: len(fitted), : len(fitted)] = covariance
-    whole[np.arange(len(fitted), len(places)), np.arange(len(fitted), len(places))] = variances
-    counted = [place for place, size in enumerate(np.diag(whole)) if size > 0.0 or place < len(fitted)]
+    together = np.diag([*np.zeros(len(fitted)), *variances])
+    together[: len(fitted), : len(fitted)] = covariance
+    counted = [place for place, size in enumerate(np.diag(together)) if size > 0.0 or place < len(fitted)]
     sources = [f'the fit "{fit}"' if fit else "", "[tolerances]" if chosen else ""]
     return UncertainNumbers(
         np.array(places, dtype=np.int64)[counted],
         np.concatenate([values, np.zeros(len(chosen))])[counted],
-        whole[np.ix_(counted, counted)],
+        together[np.ix_(counted, counted)],
         " and ".join(filter(None, sources)),
     )
 
@@ -121,16 +120,16 @@ def compliance_changes(model: ErrorModel, uncertain: UncertainNumbers, dyads: Ar
     springs change with the pose, away from its home place.
 
     Args:
-        model: of the machine at n poses.
-        uncertain: numbers.
-        dyads: of its springs [n x 6 x 6 x springs].
+        model: the errors of the machine at n poses.
+        uncertain: its uncertain numbers.
+        dyads: the contributions of its springs to C [n x 6 x 6 x springs].
     """
-    first = len(model.errors) - dyads.shape[3]
+    first_spring = len(model.errors) - dyads.shape[3]
     changes = np.zeros((len(model), 6, 6, len(uncertain.places)))
-    geometry = [n for n, place in enumerate(uncertain.places) if place < first]
+    geometry = [n for n, place in enumerate(uncertain.places) if place < first_spring]
     for n, place in enumerate(uncertain.places):
-        if place >= first:
-            changes[..., n] = dyads[..., place - first]
+        if place >= first_spring:
+            changes[..., n] = dyads[..., place - first_spring]
     if not geometry:
         return changes, ()
     if model.overconstrained or not _agrees(model, dyads):
@@ -143,7 +142,7 @@ def compliance_changes(model: ErrorModel, uncertain: UncertainNumbers, dyads: Ar
 def _agrees(model: ErrorModel, dyads: Array) -> bool:
     """Whether the machine placed without errors has the compliance of the drawn one at all poses.
 
-    It has not where springs change with the pose, as a strut does that is longer elsewhere.
+    The two differ where springs change with the pose, as a strut does that is longer elsewhere.
     """
     drawn = dyads.sum(axis=3)
     off = np.abs(compliances_as_built(np.zeros(len(model.errors)), model) - drawn)
@@ -151,7 +150,7 @@ def _agrees(model: ErrorModel, dyads: Array) -> bool:
 
 
 def _change(model: ErrorModel, place: int) -> Array:
-    """Of the compliance per unit of an error, by central differences [n x 6 x 6]."""
+    """The change of the compliance per unit of an error, by central differences [n x 6 x 6]."""
     size = GEOMETRY_STEP * (model.length if model.errors[place].kind == "length" else 1.0)
     way = size * np.eye(len(model.errors))[place]
     return (compliances_as_built(way, model) - compliances_as_built(-way, model)) / (2.0 * size)
@@ -162,7 +161,7 @@ class MeasuredRow:
     """A measured number beside the computed one, all SI.
 
     Attributes:
-        entry: what was measured.
+        entry: the measured number.
         predicted: the computed number.
         u_num, u_input, u_data: standard uncertainties of the computation, of the machine's numbers and of the
             measurement, as ASME V&V 20 names them.
@@ -191,7 +190,7 @@ class MeasuredRow:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Between what sizes the error of the model lies, SI; the lower one is 0 where uncertainties explain it."""
+        """The sizes between which the model's error lies, SI; the lower one is 0 where uncertainties explain it."""
         least = max(abs(self.error) - COVERAGE_FACTOR * self.u_val, 0.0)
         return least, abs(self.error) + COVERAGE_FACTOR * self.u_val
 
@@ -201,13 +200,13 @@ class MeasuredComparison:
     """A machine beside its measured stiffness.
 
     Attributes:
-        machine: that was measured.
-        path: of the file.
-        rows: in the order of the file.
+        machine: the measured machine.
+        path: the path of the file.
+        rows: the rows in the order of the file.
         chi_square: the sum of squared differences over their uncertainties, correlations counted, theory (72).
-        probability: of at least as much where the model has no error.
-        source: where uncertainties of the machine's numbers are from; empty where there are none.
-        left_out: paths of uncertain numbers that do not count.
+        probability: the probability of at least as large a sum where the model has no error.
+        source: the origin of the uncertainties of the machine's numbers; empty where there are none.
+        left_out: the paths of uncertain numbers that do not count.
     """
 
     machine: Machine

@@ -30,10 +30,10 @@ class MeasuredEntry:
 
     Attributes:
         name: "stiffness_z", "compliance_rx_y", "free_stiffness_x", or "deflection_z" under a load.
-        unit: of SI.
-        value, sigma: SI; the standard deviation is more than 0.
-        line: of the file.
-        row: number of the pose; 0 of an entry.
+        unit: its SI unit.
+        value, sigma: the number and its standard deviation, which is more than 0, SI.
+        line: its line in the file.
+        row: the number of the pose; 0 for an entry of a matrix.
     """
 
     name: str

@@ -41,8 +41,8 @@ class Draft:
     """A study that is being written.
 
     Attributes:
-        name: of the study.
-        machine: that it is about; None for the machine of the session.
+        name: the name of the study.
+        machine: the machine of the study; None for that of the session.
         variables, objectives, constraints, poses, optimizer: tables as in a study file, changed in place by the form.
         rest: tables of a study file that the form does not show.
     """
@@ -144,7 +144,7 @@ def sent_draft(data: bytes, name: str, present: Machine) -> Draft:
 
     Args:
         data: content of the file.
-        name: of the file, for messages.
+        name: the name of the file, for messages.
         present: machine of the session.
 
     Raises:
@@ -174,9 +174,9 @@ def bound_text(quantity: Quantity, typed: str, shown_unit: str) -> str:
     """Return a bound that was typed as a study file may hold it; what cannot be read stays for the reader to refuse.
 
     Args:
-        quantity: of the variable.
-        typed: a quantity, a bare number in the unit that the field showed first, or arithmetic.
-        shown_unit: that unit; empty where the field showed none.
+        quantity: the quantity of the variable.
+        typed: a quantity, a bare number in the unit shown, or arithmetic.
+        shown_unit: the unit that the field showed first; empty where it showed none.
     """
     try:
         value = typed_value(typed, quantity.kind, shown_unit)

@@ -31,16 +31,16 @@ class Progress:
 
     Attributes:
         run: the search as it is listed now.
-        problem: that it solves.
-        steps: that are done.
+        problem: the problem that the search solves.
+        steps: the number of steps done.
         total: steps of the whole search.
-        designs: that have been evaluated.
+        designs: the number of designs evaluated.
         best, mean: objective after each step, None where no design was feasible; empty for several objectives.
-        objectives: of the Pareto front (for one objective, of the best design), sorted by the first
+        objectives: the objectives of the Pareto front (for one objective, of the best design), sorted by the first
             [designs x objectives].
-        genes: of these designs [designs x variables].
+        genes: the genes of these designs [designs x variables].
         knee: place of the recommended design among them.
-        result: as `optimize --json` prints it; None until it is written.
+        result: the result as `optimize --json` prints it; None until it is written.
     """
 
     run: Run

@@ -46,8 +46,8 @@ class ProgressRequest:
     """A request for the list of searches and for the progress of one of them.
 
     Attributes:
-        number: of the search; 0 for the latest.
-        follower: of the search that was shown last, which has read a part of its records already.
+        number: the number of the search; 0 for the latest.
+        follower: the reader of the search shown last, which has read a part of its records already.
     """
 
     number: int

@@ -54,9 +54,9 @@ class Run:
     """A search that is kept.
 
     Attributes:
-        number: of the search.
-        folder: that holds its problem, its records and its result.
-        name: of its study.
+        number: the number of the search.
+        folder: the folder of its problem, its records and its result.
+        name: the name of its study.
         stage: at the time of the listing.
     """
 
@@ -140,8 +140,8 @@ class Runs:
         """Resume a search that was stopped.
 
         Args:
-            number: of the search.
-            tab: as for `start`.
+            number: the number of the search.
+            tab: the browser tab that asks, as for `start`.
 
         Raises:
             InputError: too many searches run, this tab has one, or this search runs already or is done.

@@ -79,8 +79,8 @@ class Favourite:
 
     Attributes:
         number: under which it is kept.
-        path: of its machine file, which every command reads.
-        name: of the machine.
+        path: the path of its machine file, which every command reads.
+        name: the name of the machine.
         note: what the designer wrote about it.
     """
 

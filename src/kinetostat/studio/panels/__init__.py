@@ -20,9 +20,9 @@ class Panel(ABC):
 
     Attributes:
         name: text of the tab.
-        show_change: of the page, to be called where the panel has given the session's machine other numbers.
+        show_change: the page's redrawing, called after the panel has given the session's machine other numbers.
         view: the picture of the machine, for panels that draw in it.
-        is_busy: of the page, whether the last change is still being drawn, for panels that play something.
+        is_busy: whether the page is still drawing the last change, for panels that play something.
     """
 
     name = ""

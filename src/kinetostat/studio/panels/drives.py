@@ -169,7 +169,7 @@ def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, li
 
     Args:
         answer: with curves.
-        kind: of curve, as the panel offers them.
+        kind: the kind of curve, as the panel offers them.
         times: s.
     """
     display, known = answer.machine.display, answer.motion.times

@@ -72,7 +72,7 @@ def contributions_text(report: Report, component: str) -> str:
     """Bars of the parts that make one component of the compliance, all springs of a part added up; first by kind.
 
     Args:
-        report: of one pose.
+        report: the report of one pose.
         component: one of its component names, e.g. "rx".
     """
     analysis = report.analysis

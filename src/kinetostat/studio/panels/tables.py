@@ -79,7 +79,7 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
     """C or K as a table; only its diagonal where the matrix is not finite.
 
     Args:
-        analysis: of one pose.
+        analysis: the analysis of one pose.
         kind: "C" or "K".
     """
     names, rows, display = analysis.components, _rows(analysis, kind), analysis.machine.display

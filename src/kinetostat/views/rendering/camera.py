@@ -108,7 +108,7 @@ class Triangles:
     Attributes:
         points, normals: [n x 3], base frame, m.
         triangles: [m x 3], counter-clockwise as seen from outside.
-        solid, look: of each triangle [m], the number of its solid and of its look among `LOOKS`.
+        solid, look: the number of each triangle's solid, and of its look among `LOOKS` [m].
     """
 
     def __init__(self, solids: Sequence[Solid]) -> None:
@@ -129,11 +129,11 @@ class Hits:
     """Points at which the rays of a camera meet solids.
 
     Attributes:
-        nearness: of all pixels [height * width]: the inverse of the depth, 0 where nothing is met.
+        nearness: the inverse of the depth of all pixels [height * width], 0 where nothing is met.
         pixel: numbers of the pixels that are covered [k].
         sample: number of the sample that each of them shows [k].
-        points, normals, to_eye: of the samples [s x 3], base frame; unit vectors.
-        look: of the samples [s], numbers.
+        points, normals, to_eye: the samples, and unit vectors along their normals and to the eye [s x 3], base frame.
+        look: the numbers of the samples' looks [s].
     """
 
     nearness: Float32s
@@ -206,10 +206,10 @@ def nearest_triangles(
     """Find the nearest triangle in each pixel [height * width]: its nearness and number, 0 and -1 where there is none.
 
     Args:
-        pixels: of all points [n x 2], from the upper left corner.
-        nearness: of all points [n], positive, greater is nearer: linear on the picture of every plane.
+        pixels: the places of all points [n x 2], from the upper left corner.
+        nearness: the nearness of all points [n], positive, greater is nearer: linear on the picture of every plane.
         triangles: [m x 3] numbers of points, counter-clockwise as seen by the viewer; others are not seen.
-        width, height: of the picture.
+        width, height: the size of the picture.
     """
     best = np.zeros(width * height, dtype=np.uint64)
     for pixel, near, triangle in _fragments(pixels, nearness, triangles, width, height):

@@ -73,7 +73,7 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
 
     Args:
         points: base frame, m [n x 3].
-        normals: of the surfaces, unit vectors [n x 3].
+        normals: the normals of the surfaces, unit vectors [n x 3].
         casters: solids that cast shadows.
         detail: pixels across a picture of all of it: shadows need not be finer.
     """
@@ -245,7 +245,7 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
     Args:
         ground: where it is.
         light: on its `points`.
-        camera: of the picture.
+        camera: the camera of the picture.
     """
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     rays = camera.rays(x, y)

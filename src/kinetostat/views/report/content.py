@@ -58,7 +58,7 @@ class Figure:
     Attributes:
         caption: a phrase or a sentence.
         picture: an SVG element as text, or the bytes of a PNG.
-        width: as a share of the width of the text.
+        width: its share of the width of the text.
         live: a scene of solids, in the form of `views.scene`, that a page may show in three dimensions in place of the
             picture.
     """

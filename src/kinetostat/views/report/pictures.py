@@ -49,7 +49,7 @@ class MachinePictures:
     Attributes:
         scene: the machine.
         overlays: compliance ellipsoids, load and deflected shape.
-        factor: by which deflections are exaggerated; None without a load.
+        factor: the factor by which deflections are exaggerated; None without a load.
         swings: name of each mode of vibration, and its solids at both ends of their swing as plain data.
     """
 

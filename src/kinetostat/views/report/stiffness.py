@@ -116,7 +116,7 @@ class Origin:
     """The sources of a report.
 
     Attributes:
-        command: that makes it again.
+        command: the command that makes it again.
         inputs: name and text of each file, as written.
         machine_file: the machine with all overrides, all digits.
         results: the analysis as JSON.
@@ -132,7 +132,7 @@ def record_section(origin: Origin, engine: Sequence[str]) -> Section:
     """Write the section with the command, the versions and the input.
 
     Args:
-        origin: of the report.
+        origin: the origin of the report.
         engine: name and version of the independent engine; empty without one.
     """
     versions = [(name, version(name)) for name in LIBRARIES] + [("Python", platform.python_version())]

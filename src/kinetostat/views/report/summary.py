@@ -142,7 +142,7 @@ def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figur
 
     Args:
         analysis: at the pose.
-        pictures: of the machine.
+        pictures: the pictures of the machine.
         live: whether the report will be a page, which shows the machine in three dimensions if it can.
     """
     machine, turning = analysis.machine, live and can_be_live()

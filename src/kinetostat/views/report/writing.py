@@ -54,10 +54,10 @@ class ReportOptions:
     """Options of a report, by the names of the command line.
 
     Attributes:
-        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
+        ranges: the ranges of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
         without: parts to leave out because they take time, of `REPORT_PARTS`.
-        engine: for the validation; None for the first that is installed.
-        author, date: for the title block; None for none.
+        engine: the engine of the validation; None for the first that is installed.
+        author, date: the entries of the title block; None for none.
         loaded: whether the machine is to be shown under its loads, whatever its file says.
         fit: record of an identification of the machine, or its folder.
         motion: path of the CSV file of a motion of its drives.
@@ -109,11 +109,11 @@ def report(
 
     Args:
         about: a machine at a pose that has an answer, or the result of a study.
-        path: of the file, .html (with the machine in three dimensions) or .pdf; an existing file is replaced.
-        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
+        path: the path of the file, .html (with the machine in three dimensions) or .pdf; an existing file is replaced.
+        ranges: the ranges of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
         without: parts to leave out because they take time: maps, guidelines, sensitivity, validation.
-        engine: for the validation, exudyn or pynite; None for the first that is installed.
-        author, date: for the title block. Without a date, the same input gives the same bytes.
+        engine: the engine of the validation, exudyn or pynite; None for the first that is installed.
+        author, date: the entries of the title block. Without a date, the same input gives the same bytes.
         fit: record of an identification of the machine (fit.json), or the folder in which it lies.
         motion: path of the CSV file of a motion, as `drives` takes it: what it asks of the drives.
         elevations: over which the machine tilts, as `elevation` takes them, "0 deg:90 deg:7"; empty for none.
@@ -167,8 +167,8 @@ def write_report(
     """Write a report from its answers; the file appears whole or not at all.
 
     Args:
-        answers: for a pose whose status is OK.
-        options: of the report.
+        answers: the answers at a pose whose status is OK.
+        options: the options of the report.
         subject: words of the command line that name the machine or study, with its overrides.
         inputs: name and text of each file that it was read from.
         path: from `report_path`.
@@ -214,8 +214,8 @@ def report_of(
     """Assemble the report on a machine, or on a study and its best design.
 
     Args:
-        answers: for a pose whose status is OK.
-        validation: by an independent engine, or why there is none.
+        answers: the answers at a pose whose status is OK.
+        validation: the validation by an independent engine, or why there is none.
         origin: what the report is made from.
         about: further lines of the title block, by name.
         live: whether the report will be a page, which may show the machine in three dimensions.

@@ -39,13 +39,13 @@ class LinkPart:
     """A link between two points, base frame, m.
 
     Attributes:
-        name: of the link, where it has one; unique within the leg.
+        name: the name of the link, where it has one; unique within the leg.
         kind: a bar, two parallel bars, a telescope along which a slide runs, or a cable: a slide that only pulls.
-        start, end: of its axis.
+        start, end: the ends of its axis.
         driven: whether it holds an actuated slide.
         up: in which the cross-section's z axis lies, if that matters.
         side: from the middle to either bar, of two bars.
-        pinned: of two bars, whether they turn on pins instead of balls.
+        pinned: whether two bars turn on pins instead of balls.
     """
 
     name: str
@@ -298,7 +298,7 @@ class Proportions:
         cross_sections: cross-section of each link that has one, by the link's name.
         spans: length of each telescope where the machine was loaded, m, by name: its cylinder does not grow.
         carriages: where each rail's carriage was then, by name, base frame, m: the rail stays.
-        diagonal: of the machine, m.
+        diagonal: the diagonal of the machine, m.
     """
 
     leg: float

@@ -79,8 +79,8 @@ def _joint(joint: JointPart, towards: tuple[Vector, Vector], radius: float, mate
     Args:
         joint: its kind, place and axes.
         towards: vectors from its centre to the part before it and to the part after it, base axes.
-        radius: of the leg, m.
-        material: of the leg.
+        radius: the radius of the leg, m.
+        material: the material of the leg.
     """
     before, after = unit(towards[0]), unit(towards[1])
     match joint.kind:
@@ -176,8 +176,8 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
 
     Args:
         rail: its axis and where the carriage is.
-        sizes: of the machine.
-        radius: of the leg, m.
+        sizes: the proportions of the machine.
+        radius: the radius of the leg, m.
         inward: from the carriage to the rest of the leg.
     """
     outward = unit(rail.axis.cross(rail.axis.cross(inward)))
@@ -217,10 +217,10 @@ def _link(link: LinkPart, radius: float, material: str, profile: Profile | None,
 
     Args:
         link: its kind and ends.
-        radius: of a leg, m.
-        material: of the leg.
+        radius: the radius of a leg, m.
+        material: the material of the leg.
         profile: its cross-section, if the file gives one.
-        span: of a telescope where the machine was loaded, m.
+        span: the length of a telescope where the machine was loaded, m.
     """
     if link.kind == "telescope":
         return _telescope(link, radius, material, span)

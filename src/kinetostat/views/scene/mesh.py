@@ -226,7 +226,7 @@ def _wall(rings: Array, tilts: Array, outward: Array) -> Mesh:
 
     Args:
         rings: corners by height [rows x corners x 3].
-        tilts: of the surface at each row: 0 down, pi/2 outwards, pi up.
+        tilts: the tilt of the surface at each row: 0 down, pi/2 outwards, pi up.
         outward: normals of the outline's edges [corners x 2].
     """
     flats = _ends_of_faces(outward, closed=True)

@@ -152,8 +152,8 @@ def overlays_of(
 
     Args:
         analysis: in base axes; for a pose without an answer nothing is drawn.
-        sizes: of the machine.
-        factor: of exaggeration; None to choose a round one.
+        sizes: the proportions of the machine.
+        factor: the factor of exaggeration; None to choose a round one.
 
     Returns:
         The solids, and the factor; None without a load.
@@ -177,9 +177,9 @@ def loaded_overlays(
     """Draw a machine at rest under its loads over the unloaded one; the factor as `overlays_of`, never below 1.
 
     Args:
-        state: of the machine; where it comes to no rest nothing is drawn.
-        sizes: of the machine.
-        factor: of exaggeration; None to choose a round one.
+        state: the state of the machine; where it comes to no rest nothing is drawn.
+        sizes: the proportions of the machine.
+        factor: the factor of exaggeration; None to choose a round one.
     """
     if not state.has_rest:
         return [], None
@@ -200,9 +200,9 @@ def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> f
     """A round factor, at least 1, that makes the motions of a loaded machine visible.
 
     Args:
-        response: of the machine at its unloaded pose.
+        response: the response of the machine at its unloaded pose.
         moved: from there.
-        diagonal: of the machine, m.
+        diagonal: the diagonal of the machine, m.
     """
     legs, point = response.configuration.legs, response.reference
     reach = max(((leg.path[-1] - point).norm() for leg in legs if leg.path), default=0.0)
@@ -235,7 +235,7 @@ def deflection_overlays(
     Args:
         machine, configuration, sizes: as for `machine_scene`.
         moved: its small motions.
-        factor: of exaggeration; None to choose a round one.
+        factor: the factor of exaggeration; None to choose a round one.
     """
     loads = load_solids(moved.load, machine.tool_point(configuration.platform), sizes)
     if not _finite(moved):
@@ -281,8 +281,8 @@ class _Moving:
     Attributes:
         body: platform and tool.
         point: the tool point.
-        reach: of the platform from there, m.
-        radii: of the links by leg, m.
+        reach: the reach of the platform from there, m.
+        radii: the radii of the links by leg, m.
     """
 
     body: Sequence[Solid]
@@ -309,8 +309,8 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
 
     Args:
         moved: the small motions.
-        reach: of the platform from the tool point, m.
-        diagonal: of the machine, m.
+        reach: the reach of the platform from the tool point, m.
+        diagonal: the diagonal of the machine, m.
     """
     largest = _largest(moved, reach)
     if not 0.0 < largest < math.inf:
