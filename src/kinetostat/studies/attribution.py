@@ -154,8 +154,8 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
     """Add up shares of springs by part, and by kind of part, such as "actuator ×6".
 
     Args:
-        springs: of the machine.
-        shares: by the name of a spring; a name that is not a spring's is a part and a kind of its own.
+        springs: the machine's springs.
+        shares: shares by the name of a spring; a name that is not a spring's is a part and a kind of its own.
     """
     parts: dict[str, float] = {}
     kinds: dict[str, dict[str, float]] = {}

@@ -30,7 +30,7 @@ class Carrying(ImmutableAnswer):
     """The sets of legs that carry at the points of a grid.
 
     Attributes:
-        machine: with its loads; gives all parameters that do not vary.
+        machine: the machine with its loads; gives all parameters that do not vary.
         dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
         legs: names of all legs.
         sets: names of the legs that carry together, the most frequent set first.
@@ -59,7 +59,7 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
     A leg is slack where one of its springs could only carry loads of the other sign; all other legs carry.
 
     Args:
-        machine: with its loads, or its state, as `state_of` returns it; gives all parameters that do not vary.
+        machine: the machine with its loads, or its state (`state_of`); gives all parameters that do not vary.
         ranges: one axis each, "FIELD=from:to:count[:log]".
         progress: receives how far the work is.
 

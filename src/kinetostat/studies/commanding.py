@@ -203,7 +203,7 @@ class Command(ImmutableAnswer):
     """Coordinates of the actuators that put the loaded tool where an unloaded machine would have it.
 
     Attributes:
-        machine: with its loads.
+        machine: the machine with its loads.
         poses: the poses that are wanted; None for the pose of the machine alone.
         actuators: names of the actuators.
         units: unit of each coordinate, "m" or "rad".
@@ -246,7 +246,7 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
     can.
 
     Args:
-        machine: with its loads; its own pose is wanted if no poses are given.
+        machine: the machine with its loads; its own pose is wanted if no poses are given.
         poses: the poses that are wanted: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV
             file, as for `evaluate`.
         fit: folder or fit.json of `identify`, if the machine is the one as built that `identify` has written. Its file
@@ -314,7 +314,7 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
     """Return the coordinates found at some poses, with names, units and a sentence.
 
     Args:
-        machine: with its loads.
+        machine: the machine with its loads.
         poses: the poses; None for the pose of the machine alone.
         answer: the coordinates found at these poses.
     """

@@ -44,7 +44,7 @@ class Buffers:
 
         Args:
             function: the function.
-            places: of each parameter of the function the row of `inputs` that has its values.
+            places: for each parameter of the function, the row of `inputs` that has its values.
             start: values of the inputs to begin with.
             count: number of points.
         """
@@ -130,7 +130,7 @@ class CompiledFunction:
         inputs: paths of the inputs.
         quantities: names of the quantities; of a matrix its entries, row by row.
         distinct: the same names, each once.
-        shape: of the axes in front: () of one quantity, (n,) of a list, (6, 6) or (3, 3) of a matrix.
+        shape: lengths of the axes in front: () of one quantity, (n,) of a list, (6, 6) or (3, 3) of a matrix.
         judged: whether the function knows the status of a pose.
     """
 

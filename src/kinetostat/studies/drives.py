@@ -48,7 +48,7 @@ class DriveLoad:
     """A drive along a motion; quantities of a linear drive are N, m/s, m, those of a rotary one N·m, rad/s, rad.
 
     Attributes:
-        name: of the drive.
+        name: name of the drive.
         slides: whether it is linear.
         turns: rotation of its rotor, rad per m or rad of its coordinate; 1 where the file gives neither lead nor ratio:
             its motor is then the drive itself.
@@ -57,7 +57,7 @@ class DriveLoad:
         speed, acceleration, force: greatest sizes at the drive.
         rms_force: root of the mean square of the force over time.
         parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
-        motor_speed, motor_torque, rms_torque: at the motor: rad/s and N·m, or of a linear motor m/s and N.
+        motor_speed, motor_torque, rms_torque: values at the motor, rad/s and N·m; of a linear motor m/s and N.
         power: greatest power of the motor, W, and the least, which is negative where it brakes.
         energy: energy that the motor gives in the whole motion, and energy that it takes back while it brakes, J.
         reflected: greatest inertia that the motor accelerates beside its rotor, while the other drives stand still:
@@ -108,9 +108,9 @@ class DriveCurves:
     """Drives at all points of a motion [drives x n], SI.
 
     Attributes:
-        coordinate, speed, acceleration, force: at the drive.
-        parts: of the force [drives x parts x n].
-        motor_speed, motor_torque, power, energy: at the motor; the energy is that since the beginning, J.
+        coordinate, speed, acceleration, force: values at the drive.
+        parts: parts of the force [drives x parts x n].
+        motor_speed, motor_torque, power, energy: values at the motor; the energy counts from the beginning, J.
     """
 
     coordinate: Array
@@ -129,7 +129,7 @@ class DriveLoads(ImmutableAnswer):
     """The demands of a motion on the drives of a machine.
 
     Attributes:
-        machine: with its masses.
+        machine: the machine with its masses.
         status: status of the first pose that has no answer, else OK.
         message: the answer in a sentence.
         motion: the motion.
@@ -189,12 +189,12 @@ def drives(
     """Compute what a motion asks of the drives of a machine of rigid parts.
 
     Args:
-        machine: with masses, friction, and lead or ratio of its drives.
+        machine: the machine with masses, friction, and lead or ratio of its drives.
         motion: a motion, or the path of its CSV file: poses with times, poses with a feed rate, or sines; forces on
             the platform may be columns, such as force.x [N]. None for a speed and an acceleration of the platform
             point at the pose of the machine, in the worst directions; without these, for the motion of the file's
             requirements.
-        points: of the motion that are looked at, about.
+        points: about how many points of the motion are looked at.
         speed, acceleration: without a motion: of the platform point, m/s and m/s² or texts with a unit.
 
     Raises:

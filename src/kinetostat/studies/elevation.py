@@ -78,7 +78,7 @@ class Elevation(ImmutableAnswer):
     """A machine at rest under its loads over the elevation, base axes, SI.
 
     Attributes:
-        state: of the machine as it stands upright.
+        state: the state of the machine as it stands upright.
         status: worst `Status` of all elevations.
         message: what is the case at elevations without a result; empty where all have one.
         elevations: rad [n].
@@ -90,9 +90,9 @@ class Elevation(ImmutableAnswer):
         turning: whether each is rotary: N·m, otherwise N.
         loads: what each actuator carries, positive where it is pulled open [n x actuators].
         limit_use: the greatest share that any actuator uses of its limit [n]; NaN where the file limits none.
-        reversals: of loads of drives and joints, by elevation.
+        reversals: reversals of the loads of drives and joints, by elevation.
         budget: the error by tolerances at each elevation; None where the file has no tolerances.
-        corrections: of the actuators, with their law over `load.gravity_angle`.
+        corrections: corrections of the actuators, with their law over `load.gravity_angle`.
         requirements: verdicts on the requirements of the file, each at the elevation that is worst for it.
     """
 
@@ -155,10 +155,10 @@ def elevation(
     The machine is at rest under all its loads, whether its file says `state = "loaded"` or not.
 
     Args:
-        machine: with its loads, gravity and masses among them, or its state, as `state_of` returns it.
+        machine: the machine with its loads, gravity and masses among them, or its state, as `state_of` returns it.
         over: from, to and number of elevations, "0 deg:90 deg:7"; gravity acts as the file says at 90 deg.
         about: axis of the base about which gravity turns in it as the elevation falls; `load.gravity_axis` if empty.
-        tolerance: for the error of the law of the corrections at the tool, m or text with a unit; a thousandth of the
+        tolerance: greatest error of the law of the corrections at the tool, m or text with a unit; a thousandth of the
             error without corrections if None.
         progress: receives how far the work is.
 

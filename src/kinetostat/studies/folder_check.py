@@ -76,7 +76,7 @@ class FolderCheck:
     """Result of checking a folder.
 
     Attributes:
-        steps: of its long study; None if it has none.
+        steps: steps of the folder's long study; None if it has none.
         files: how many are listed; None if there is no list.
         changed: names of listed files that are missing or not as they were written, the list itself among them.
     """
@@ -111,7 +111,7 @@ def check_folder(folder: Path) -> FolderCheck:
     """Compare everything in a folder with the checksums that were written with it.
 
     Args:
-        folder: of a grid or a search, in which another process may be at work, or with a list of files.
+        folder: the folder of a grid or a search, in which another process may be at work, or with a list of files.
 
     Raises:
         InputError: its question and the copy of it cannot be read.

@@ -39,7 +39,7 @@ class GridQuestion:
         machine: gives all parameters that do not vary.
         grid: where; one axis for each range.
         fields: path of the field of each axis.
-        names: of quantities.
+        names: names of quantities.
         labels: coordinates and attributes of the answer, without any variable.
     """
 
@@ -119,7 +119,7 @@ def answer(question: GridQuestion, progress: Progress = silent, compute: Compute
     """Answer a question about a grid in memory; see `evaluate_grid`.
 
     Args:
-        question: of at most `IN_MEMORY` points.
+        question: a question of at most `IN_MEMORY` points.
         progress: receives how far the work is.
         compute: where chunks are computed; results are the same bit for bit.
 

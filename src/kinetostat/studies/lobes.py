@@ -48,15 +48,15 @@ class Lobes(ImmutableAnswer):
     """Widths of cut that stay stable over the speed of the spindle.
 
     Attributes:
-        state: of the machine at its pose.
-        status: of the pose.
+        state: the state of the machine at its pose.
+        status: status of the pose.
         message: why there is no answer; empty where there is one.
         teeth: edges that pass in a turn; 1 for one that stays in the cut.
         pressure: cutting force per area of the chip, N/m².
-        speeds: of the spindle, turns per second [n].
+        speeds: speeds of the spindle, turns per second [n].
         widths: width of cut up to which each is stable at every pose, m; infinite where every width is [n].
         least: width of cut up to which every speed is stable at every pose, m.
-        frequency: of the chatter beyond it, Hz.
+        frequency: frequency of the chatter beyond the width `least`, Hz.
         best: speed of the curve at which the widest cut is stable, and that width; None where none is wider.
         assumed: whether nothing is said of the machine's damping, so that it is a usual one.
         poses: number of poses with an answer.
@@ -110,7 +110,7 @@ def lobes(
     through the cut, as in milling.
 
     Args:
-        machine: with its pose, masses and [cutting], or its state; about its state under load where `machine.loaded`.
+        machine: the machine with pose, masses and [cutting], or its state; under load where `machine.loaded` is set.
         teeth: number of edges of a milling cutter.
         entry, leaving: angles at which an edge enters and leaves the cut, rad or with a unit, from the normal to the
             feed in the sense of the rotation; 0 and 180 deg, a slot, if None. 90 and 180 deg is half of it, down

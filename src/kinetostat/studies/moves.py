@@ -23,8 +23,8 @@ class Curve:
     """A line or an arc in the coordinates of the pose, by the length on the path.
 
     Attributes:
-        start, end: of all coordinates.
-        length: of the path: that of P, or of turns alone, by a point at the machine's length from their axis, m.
+        start, end: values of all coordinates.
+        length: length of the path of P or, of turns alone, of a point at the machine's length from their axis, m.
         arc: centre, two vectors of the size of its radius, and its angle, of the coordinates at `places`; None of a
             line.
         places: which coordinates are those of P.
@@ -62,8 +62,8 @@ def curve_between(table: Array, start: int, end: int, places: Sequence[int], siz
     """The line from a pose of a table to another one, or the arc through the pose before the other one.
 
     Args:
-        table: of poses [n x coordinates].
-        start, end: rows of it.
+        table: coordinates of the poses [n x coordinates].
+        start, end: rows of the table.
         places: which coordinates are those of P.
         size: the machine's length, m.
         round_: whether it is an arc; where the three points are in a line, it is that line.
@@ -105,7 +105,7 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
     """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (98).
 
     Args:
-        length: of the path, m.
+        length: length of the path, m.
         feed, acceleration, jerk: greatest values along it; an infinite jerk leaves three phases of seven.
     """
     if np.isinf(jerk):
@@ -148,7 +148,7 @@ def moment_at(phases: Sequence[tuple[float, float, float]], length: float) -> fl
     """The time at which a move has come so far, s.
 
     Args:
-        phases: of the move, see `profile`.
+        phases: phases of the move, see `profile`.
         length: between 0 and that of its path, m.
     """
     clock = at = speed = 0.0

@@ -33,9 +33,9 @@ class GivenColumn:
     """A column as it was given.
 
     Attributes:
-        name: of the field, as written.
+        name: name of the field, as written.
         entries: numbers, or texts with a unit.
-        unit: of numbers; SI where it is empty.
+        unit: unit of numbers; SI where it is empty.
     """
 
     name: str
@@ -48,8 +48,8 @@ class PoseColumns:
     """Poses, all values in SI.
 
     Attributes:
-        fields: that were given, in order.
-        values: of each of these fields [poses].
+        fields: the given fields, in order.
+        values: values of each of the fields [poses].
         labels: further columns that belong to the poses, as a time; by name.
     """
 
@@ -289,7 +289,7 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
 
     Args:
         machine: whose fields they are.
-        path: of the file.
+        path: path of the file.
 
     Raises:
         InputError: the file cannot be read or holds no poses, a column is not a field of the machine, a line is too
@@ -309,9 +309,9 @@ def columns_of(
     """Read the columns of a CSV file as texts with the units of their heads, and the number of each line below these.
 
     Args:
-        path: of the file.
+        path: path of the file.
         most: lines below the heads that it may have.
-        text: of the file, where it is known; the path then only names it in messages.
+        text: text of the file, where it is known; the path then only names it in messages.
 
     Raises:
         InputError: the file cannot be read or holds no lines below its heads, it has too many lines or columns, or a

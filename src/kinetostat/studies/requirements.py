@@ -58,7 +58,7 @@ class Verdict(Immutable):
         unit: unit of the worst value, SI.
         bound: the bound, SI.
         poses: number of poses at which the condition must hold.
-        where: these poses in words.
+        where: the poses in words.
         met: whether it holds at all of them.
         worst: the worst value, SI; None where the worst pose has no result.
         margin: share of the bound by which the worst value keeps it, negative where it does not; None where the worst
@@ -113,7 +113,7 @@ def requirements(machine: Machine | MachineState) -> tuple[Verdict, ...]:
     """Judge the requirements of a machine's file, condition by condition.
 
     Args:
-        machine: with its pose and its requirements, or its state, as `state_of` returns it.
+        machine: the machine with its pose and requirements, or its state, as `state_of` returns it.
 
     Raises:
         InputError: names the requirement and what is wrong with it: an unknown quantity or field, a bad range or value.

@@ -28,7 +28,7 @@ class Port:
     """An input or an output.
 
     Attributes:
-        name: "fx", or of an actuator.
+        name: "fx", or the name of an actuator.
         unit: SI.
     """
 
@@ -41,11 +41,11 @@ class StateSpace(ImmutableAnswer):
     """A machine at its pose as x' = A x + B u, y = C x + D u; forces and motions from the state of rest.
 
     Attributes:
-        machine: with its masses and its damping.
+        machine: the machine with its masses and its damping.
         equations: A, B, C, D, and what the states are.
         inputs: forces and moments at the tool point, base axes, and forces of actuators on their springs.
         outputs: turns and motions of the tool point, base axes, and deflections of the actuators' springs.
-        frequencies: of the modes that are states, Hz.
+        frequencies: frequencies of the modes that are states, Hz.
         ratios: their damping ratios.
         assumed: whether the file says nothing about damping; then the ratios are the default.
     """
@@ -74,11 +74,11 @@ def state_space(
     """Write the vibrations of a machine as a state space, about its state under load where `machine.loaded` is set.
 
     Args:
-        machine: with its pose and masses.
+        machine: the machine with its pose and masses.
         inputs: names of forces: fx fy fz mx my mz at the tool point, or those of actuators; forces and moments at the
             tool point if None.
         outputs: names of motions: x y z rx ry rz of the tool point, or those of actuators; the tool point's if None.
-        count: of the lowest modes that are states; all if None. Higher modes act as springs without mass.
+        count: number of the lowest modes that are states; all if None. Higher modes act as springs without mass.
 
     Raises:
         InputError: a name is unknown, nothing has a mass, or the pose has no vibrations.

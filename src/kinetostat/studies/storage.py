@@ -119,8 +119,8 @@ def list_files(folder: Path, paths: Iterable[Path]) -> None:
     """Add files to the list of their folder, as they are now.
 
     Args:
-        folder: that commands have written files into.
-        paths: of files; those in other folders, or not there, are left out.
+        folder: the folder into which commands have written files.
+        paths: paths of files; those in other folders, or not there, are left out.
 
     Raises:
         InputError: the list cannot be written.

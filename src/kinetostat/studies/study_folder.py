@@ -58,7 +58,7 @@ def read_history(folder: Path, start: int = 0) -> tuple[list[Record], int]:
     """Read what was noted from a place in the history on, in whole lines, and the place after it, without waiting.
 
     Args:
-        folder: of a study, in which another process may be at work.
+        folder: the folder of a study, in which another process may be at work.
         start: byte of the history where a line begins.
     """
     try:
@@ -143,7 +143,7 @@ class StudyFolder:
     """A folder in which this process alone is at work.
 
     Attributes:
-        path: of the folder.
+        path: path of the folder.
         damaged: lines of its history that were damaged when it was last read.
     """
 

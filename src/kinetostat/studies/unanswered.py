@@ -48,8 +48,8 @@ def known_fields(state: MachineState, turn: Rotation) -> dict[str, Any]:
     """Return the fields of an `Analysis` that are known at a pose without an answer; none where it has no place.
 
     Args:
-        state: of the machine.
-        turn: from base axes to those of K and C.
+        state: the state of the machine.
+        turn: rotation from base axes to those of K and C.
     """
     response = state.free
     if Status(int(response.joint_status)) is not Status.OK or state.status in PLACELESS:

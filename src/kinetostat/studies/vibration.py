@@ -112,7 +112,7 @@ class Vibration(ImmutableAnswer):
     """The natural vibrations of a machine at its pose.
 
     Attributes:
-        state: of the machine, with its masses.
+        state: the state of the machine, with its masses.
         status: of the pose.
         message: what is the case, in a sentence or two.
         components: names of the components of twists: rx ry rz x y z, or rz x y.

@@ -77,7 +77,7 @@ class PoseCondition:
     """A quantity compared with a value.
 
     Attributes:
-        text: as written, with single spaces.
+        text: the condition as written, with single spaces.
         quantity: its name.
         comparison: "<", "<=", ">" or ">=".
         value: SI.
@@ -98,7 +98,7 @@ def parse_condition(text: str, components: Sequence[str]) -> PoseCondition:
 
     Args:
         text: "QUANTITY < VALUE".
-        components: that the machine has.
+        components: components that the machine has.
 
     Raises:
         InputError: not of that form, an unknown quantity, or a value of another kind.
@@ -142,8 +142,8 @@ class Judge:
     """The rule by which a pose belongs to the workspace.
 
     Attributes:
-        state: of the machine with its limits, at the file's pose.
-        conditions: that the pose has to meet.
+        state: the state of the machine with its limits, at the file's pose.
+        conditions: conditions that the pose has to meet.
     """
 
     state: MachineState
@@ -192,8 +192,8 @@ class Judge:
         """Judge poses; a verdict is a place in `labels`.
 
         Args:
-            status, values: of the poses, of any shape.
-            poses: from numbers of some of them to their coordinates.
+            status, values: status and values of the poses, of any shape.
+            poses: a function from numbers of some of the poses to their coordinates.
         """
         codes = np.zeros(status.shape, dtype=np.int8)
         for place, plain in enumerate(STATUS_VERDICTS):
@@ -217,9 +217,9 @@ class Demand:
     """The range of what a limit is about.
 
     Attributes:
-        name: of the limit.
-        title: of the measure.
-        least, greatest: over all poses and parts, in the unit.
+        name: name of the limit.
+        title: title of the measure.
+        least, greatest: extreme values over all poses and parts, in the unit.
         unit: m, deg, N or N·m.
     """
 
@@ -234,7 +234,7 @@ def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
     """Compute the ranges of lengths, angles and loads over poses that can be reached; empty where there are none.
 
     Args:
-        machine: with its load.
+        machine: the machine with its load.
         poses: coordinates by leaf path, SI [poses].
     """
     if not next(iter(poses.values())).size:

@@ -144,11 +144,11 @@ class PaperNumber:
     Attributes:
         place: where it is printed, e.g. "Table III, row 1".
         component: which number there.
-        printed: as printed.
-        computed: by this program, SI.
-        unit: of both.
+        printed: the value as printed.
+        computed: the value that this program computes, SI.
+        unit: unit of both values.
         verdict: whether the computed value rounds to the printed one.
-        reason: of a misprint.
+        reason: reason for a misprint.
     """
 
     place: str
