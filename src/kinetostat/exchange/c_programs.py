@@ -138,7 +138,7 @@ class ModelVariable:
         start: its values at the start; zeros for a variable that is computed.
         given: whether it is an input.
         shape: rows and columns of a matrix; empty for a single number.
-        group: what it belongs to: the word under which the source code knows where the group begins.
+        group: the group to which it belongs: the word under which the source code knows where the group begins.
     """
 
     name: str

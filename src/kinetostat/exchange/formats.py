@@ -24,7 +24,7 @@ class Format:
         suffix: the suffix of its files.
         writer: "module.function" in kinetostat; the function takes an analysis and a path, writes, and returns the
             paths of the files it made.
-        summary: what is in it, for lists.
+        summary: the words on its content, for lists.
         other_suffixes: suffixes that are also common for its files.
         options: what can be chosen: "inputs" and "outputs" by their names, "over" by ranges.
     """

@@ -61,7 +61,7 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
 
     Args:
         machine: the machine as drawn.
-        built: where its legs are as built, at the home pose of the file.
+        built: the places of its legs as built, at the home pose of the file.
         notes: lines of comment at its head.
     """
     document = document_of(machine, built)
@@ -101,7 +101,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
 
     Args:
         machine: the machine whose tables the file takes over.
-        built: where its legs are; at the machine's pose if None.
+        built: the places of its legs; at the machine's pose if None.
 
     Raises:
         InputError: it cannot be placed at its pose.
@@ -140,7 +140,7 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
     Args:
         limits: the limits of the machine as drawn, SI.
         machine: the machine as drawn.
-        built: where its legs are as built, at the home pose.
+        built: the places of its legs as built, at the home pose.
     """
     parted = [leg.name for leg in built.legs if _is_parted(leg)]
     drawn = [rod for rod in rods(state_of(machine).configuration.legs) if rod.telescopic and rod.leg in parted]

@@ -123,7 +123,7 @@ def check_bounds(text: str, origin: str) -> None:
 
     Args:
         text: TOML, or what should be.
-        origin: names it in messages.
+        origin: the name of the file, for messages.
 
     Raises:
         InputError: it has.

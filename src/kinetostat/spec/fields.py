@@ -51,7 +51,7 @@ class Quantity:
         kind: a key of `units.KINDS`.
         meaning: one phrase for people, also the comment in templates.
         positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
-        count: how many values.
+        count: the number of values.
         per_leg: whether there is a value for each actuated leg, in their order.
         apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
@@ -241,7 +241,7 @@ class Range:
     Attributes:
         field: the field as written.
         start, end: the ends, each a value of the field.
-        count: how many values, the ends included.
+        count: the number of values, the ends included.
         logarithmic: whether they are spaced by a constant factor.
     """
 

@@ -67,7 +67,7 @@ def take_requirements(
     """Part a machine file into all that is not a requirement and its requirements, with their overrides.
 
     Args:
-        document: what was written.
+        document: the document as written.
         settings: overrides "path=value".
         origin: name of the file, for messages.
 

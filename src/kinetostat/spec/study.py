@@ -161,7 +161,7 @@ def read_study(document: Document, origin: str, settings: Sequence[str] = ()) ->
     """The study that a document describes.
 
     Args:
-        document: what was written.
+        document: the document as written.
         origin: name of the file, for messages.
         settings: overrides "path=value", as `--set` takes them, e.g. "optimizer.seed=3", "variables.0.to=15 cm".
 

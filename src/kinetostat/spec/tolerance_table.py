@@ -215,7 +215,7 @@ def take_tolerances(document: Document, settings: Sequence[str], origin: str) ->
     """Separate the tolerances of a machine file, with their overrides, from the rest of it.
 
     Args:
-        document: what was written.
+        document: the document as written.
         settings: overrides "path=value"; what follows "tolerances." is what a tolerance is about, dots included. Lines
             that they give come after those of the file.
         origin: name of the file, for messages.

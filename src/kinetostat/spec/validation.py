@@ -58,7 +58,7 @@ def validated_tables(
     """Read what a machine file says, without its table [display], into the tables of its family.
 
     Args:
-        document: what was written; its family has been looked up before overrides.
+        document: the document as written; its family has been looked up before overrides.
         origin: name of the file, for messages.
         family: the name of the family, which no override may change.
         tables: classes of the tables, by dotted name.

@@ -54,7 +54,7 @@ class PictureRequest:
     """The machine to draw.
 
     Attributes:
-        machine: at its present pose.
+        machine: the machine at its present pose.
         sizes: proportions it was loaded with, so that balls and rods keep their thickness while it changes.
         axes: the axes of `pulling`, along and about which its platform can be pulled.
         fit: whether the camera should move until all of it is seen.
@@ -338,7 +338,7 @@ class SwingRequest:
     """A mode to be drawn.
 
     Attributes:
-        answer: with its modes.
+        answer: an answer with modes.
         number: the number of the mode, from 0.
         sizes: proportions of the picture.
     """

@@ -71,7 +71,7 @@ class Control:
     """A number of the machine, or a field whose entries move together.
 
     Attributes:
-        parameter: what it sets.
+        parameter: the number that it sets.
         panel: one of `PANELS`.
         group: heading within the panel.
         low, high: ends of its slider, SI; equal where there is none.
@@ -140,7 +140,7 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
     """Return all controls of a machine, in the order of its file.
 
     Args:
-        machine: whose present numbers the ranges lie about.
+        machine: the machine about whose present numbers the ranges lie.
         length: its characteristic length, m.
     """
     present, derived = values(machine), _derived_fields(machine)

@@ -42,7 +42,7 @@ class MapPanel:
         """Build the panel.
 
         Args:
-            session: whose machine it shows and moves.
+            session: the session whose machine it shows and moves.
             on_change: called after the map has moved the machine.
         """
         self._session, self._on_change = session, on_change

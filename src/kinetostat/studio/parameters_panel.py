@@ -30,7 +30,7 @@ class ParametersPanel:
         """Build the panel.
 
         Args:
-            session: whose numbers it shows and changes.
+            session: the session whose numbers it shows and changes.
             on_change: called after every change of the machine.
             is_busy: whether the last change is still being drawn; a slider's next position then waits for `go_on`.
         """

@@ -36,7 +36,7 @@ class Player:
         """Prepare it.
 
         Args:
-            period: from one step to the next, s.
+            period: the time from one step to the next, s.
             is_busy: whether the last step is still being drawn; the next one then waits.
         """
         self._period, self._is_busy = period, is_busy
@@ -87,7 +87,7 @@ class Playback:
         """Build it where the page is being built.
 
         Args:
-            session: whose machine follows the path.
+            session: the session whose machine follows the path.
             on_change: called after every change of the machine.
             is_busy: whether the last pose is still being drawn; the next one then waits.
         """

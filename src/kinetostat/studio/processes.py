@@ -28,7 +28,7 @@ class Turns:
 
         Args:
             at_a_time: works of all tabs that are done at a time.
-            refusal: what is said to a tab that has one already.
+            refusal: the sentence for a tab that has one already.
         """
         self._places, self._refusal = asyncio.Semaphore(at_a_time), refusal
         self._tabs: set[Hashable] = set()
@@ -38,7 +38,7 @@ class Turns:
         """Wait for a place; those who came first are served first.
 
         Args:
-            tab: names the tab.
+            tab: the key of the tab.
 
         Raises:
             InputError: this tab works or waits already.
@@ -80,7 +80,7 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
         kind: "machine" or "study".
         data: content of the file.
         name: the name of the file, for messages.
-        tab: the browser tab that has sent it.
+        tab: the key of the tab that has sent it.
 
     Raises:
         InputError: it cannot be read, or not within the limits, or the tab's file before is still being read.

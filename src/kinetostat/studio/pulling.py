@@ -70,7 +70,7 @@ class Pull:
         machine: the machine as it is now.
         of, leg: the handle.
         axis: the axis of a platform's handle, one of `MOVES` or `TURNS`.
-        goal: where the platform should be, or at its translation the joint.
+        goal: the place where the platform should be, or at its translation the joint.
     """
 
     machine: Machine

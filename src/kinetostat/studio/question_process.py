@@ -58,7 +58,7 @@ def values_of(question: Question, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a question takes besides the machine, from what was given in the form.
 
     Args:
-        question: whose options they are.
+        question: the question whose options they are.
         given: a text, a flag or a list of texts by the name of an option; one that is missing has its default.
 
     Raises:
@@ -123,7 +123,7 @@ def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
 
     Args:
         request: its `word`, the `options` that were given, and whether tables show every row (`full`).
-        tell: is called with how much is done, and of how much, and perhaps with a few words.
+        tell: the function that is called with how much is done, and of how much, and perhaps with a few words.
 
     Raises:
         InputError: what the question refuses.

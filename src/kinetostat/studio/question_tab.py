@@ -85,7 +85,7 @@ class AskTab:
         """Build the tab; questions are imported when it first comes to the front.
 
         Args:
-            session: whose machine a question is about.
+            session: the session whose machine a question is about.
         """
         self._session = session
         self._forms: dict[str, QuestionForm] = {}

@@ -228,7 +228,7 @@ class Handles:
         """Listen.
 
         Args:
-            session: whose machine is pulled.
+            session: the session whose machine is pulled.
             view: the view of the machine, which sends `pull` and `settle`.
             on_change: called after every change of the machine.
         """

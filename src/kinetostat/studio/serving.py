@@ -52,7 +52,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
         machine: the machine that a new page shows.
         name: the name of the machine if it is bundled, else empty.
         host: address at which to listen.
-        port: at which to listen.
+        port: the port at which to listen.
         browser: whether to open a browser.
         state: folder of searches and favourites.
 

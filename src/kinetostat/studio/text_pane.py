@@ -100,7 +100,7 @@ class TextPane:
         """Build the pane, empty until it comes to the front.
 
         Args:
-            session: whose machine it shows.
+            session: the session whose machine it shows.
             load: takes a machine that was typed into the session, as one step with those typed before it.
         """
         self._session, self._load = session, load

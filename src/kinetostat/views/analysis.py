@@ -47,7 +47,7 @@ def analyze_in_state(
     """Analyse a machine in the state that is meant, and judge the requirements of its file.
 
     Args:
-        machine: with its pose.
+        machine: the machine with its pose.
         axes: "base", or "platform" for results of the free machine in platform axes.
         along: directions in which the stiffness of the free machine is given as well.
 

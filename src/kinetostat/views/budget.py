@@ -90,7 +90,7 @@ def shown_measures(answer: Budget, full: bool = False) -> list[str]:
     """Names of the measures that are worth a row: parasitic parts where they are not simply a component.
 
     Args:
-        answer: with its measures.
+        answer: an answer with measures.
         full: whether parasitic components are shown one by one.
     """
     shown = []
@@ -109,7 +109,7 @@ def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
     """A row for each measure: at the pose, or the largest over all poses with the number of its pose.
 
     Args:
-        answer: with its sizes.
+        answer: an answer with sizes.
         full: whether parasitic components are shown one by one.
     """
     display, many = answer.machine.display, len(answer.status) > 1

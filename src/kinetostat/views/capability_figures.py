@@ -60,9 +60,9 @@ def capability_figure(
     """Draw the cuts of each set in the planes of the base axes.
 
     Args:
-        answer: with its sets.
+        answer: an answer with sets.
         title: over the figure, with braces for the name of the machine.
-        sets: names of those that are drawn.
+        sets: the names of the sets that are drawn.
     """
     rows = _sets_with_planes(answer, sets)
     columns = max(len(planes) for _, planes in rows)

@@ -36,7 +36,7 @@ def three_views(machine: Machine, title: str) -> Figure:
     """Draw front, side and plan of a machine to scale, in mm; of a planar machine only the plan. Actuated legs: blue.
 
     Args:
-        machine: at its pose; P is marked, and T where the machine has a tool.
+        machine: the machine at its pose; P is marked, and T where the machine has a tool.
         title: above the figure.
     """
     configuration = state_of(machine).configuration

@@ -191,7 +191,7 @@ def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
     In all directions at once there is no line through points; what they ask for most is drawn.
 
     Args:
-        panel: whose axes are labelled as well.
+        panel: the panel whose axes are labelled as well.
         answer: along a motion.
         rotary: whether motors that turn are drawn, in turns per minute, or those that are linear drives themselves.
     """

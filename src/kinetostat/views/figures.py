@@ -258,7 +258,7 @@ def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> s
     Args:
         counts: the numbers of poses by their status.
         poses: number of all.
-        shown: how the figure shows them, in brackets.
+        shown: the words in brackets on how the figure shows them.
     """
     words = {status.word.replace("_", " "): count for status, count in counts.items()}
     why = ", ".join(words if len(words) == 1 else (f"{word}: {count:,}" for word, count in words.items()))
@@ -331,11 +331,11 @@ def fill_regions(panel: Axes, x: Array, y: Array, places: Any, known: Any, colou
     """Fill a panel pose by pose, without any value between two poses.
 
     Args:
-        panel: to fill.
+        panel: the panel to fill.
         x, y: the coordinates of the poses, as the axes show them.
         places: the place of each pose's colour [y x x].
-        known: where there is a result; elsewhere the panel is grey [y x x].
-        colours: from which they are taken.
+        known: whether there is a result; elsewhere the panel is grey [y x x].
+        colours: the colours from which they are taken.
     """
     panel.set_facecolor("#eeeeee")
     panel.grid(visible=False)

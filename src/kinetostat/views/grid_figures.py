@@ -110,7 +110,7 @@ def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
     """Draw quantities along a path, a panel for each unit; poses without a result are grey.
 
     Args:
-        answers: at the poses, which are taken as neighbours in the order in which they are given.
+        answers: the answers at the poses, which are taken as neighbours in the order in which they are given.
         title: over the figure, with braces for the name of the machine.
     """
     names = list(answers.values)

@@ -108,7 +108,7 @@ def page_functions(
     """Return the functions of a machine for a page, which shows the usual indices where no quantity is named.
 
     Args:
-        machine: at its pose.
+        machine: the machine at its pose.
         inputs, outputs: as for `write`.
 
     Raises:

@@ -101,10 +101,10 @@ def moved_machine(
     """Return how to draw a machine with exaggerated motions over the machine where it was, and the exaggeration.
 
     Args:
-        machine: at its pose.
+        machine: the machine at its pose.
         response: the response of the machine.
         moved: motions of tool and links from there.
-        slack_legs: names of those whose links are dashed.
+        slack_legs: the names of the legs whose links are dashed.
     """
     configuration = response.configuration
     factor = exaggeration_of(response, moved, proportions_of(machine, configuration).diagonal)

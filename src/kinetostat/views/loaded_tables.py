@@ -46,7 +46,7 @@ def loaded_lines(state: LoadedState) -> Lines:
     """Say what a machine at rest does under its loads: stiffness, softest direction, sag, actuators, stability.
 
     Args:
-        state: at rest.
+        state: a state of rest.
     """
     display, names = state.machine.display, state.components
     if not state.loaded:
@@ -120,7 +120,7 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
     """The stiffness to further loads in each direction, beside that of the machine without loads.
 
     Args:
-        state: at rest; None is returned where its stiffness is not finite.
+        state: a state of rest; None is returned where its stiffness is not finite.
         free: diagonal of 1/C without loads, SI; left out if empty.
         stiff: diagonal of K without loads, SI.
     """

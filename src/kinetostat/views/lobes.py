@@ -77,8 +77,8 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
     """Draw the width of cut that stays stable over the speed of the spindle.
 
     Args:
-        answer: with an answer.
-        title: over the figure, with braces for the name of the machine.
+        answer: an answer with lobes.
+        title: the title over the figure, with braces for the name of the machine.
     """
     scale = answer.machine.display.scale("m")
     top = HEADROOM * answer.least * scale.factor

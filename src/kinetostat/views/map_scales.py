@@ -34,7 +34,7 @@ def trim_height(figure: Figure, panel: Axes, height: float) -> None:
     """Take out of a figure what panels of equal scales leave empty above and below them.
 
     Args:
-        figure: whose layout is not fixed yet.
+        figure: a figure whose layout is not fixed yet.
         panel: one of the panels, which are all alike.
         height: the height of all rows of panels together if they were square, inches.
     """

@@ -56,7 +56,7 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
     """Draw the speed-torque diagram of the best motors, with the motion and its mean squares in it.
 
     Args:
-        answer: with its motors.
+        answer: an answer with motors.
         title: over the figure, with braces for the name of the machine.
     """
     shown = answer.fits[:MOST_DRAWN]

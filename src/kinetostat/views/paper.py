@@ -214,7 +214,7 @@ def page(reproduction: Reproduction, drawn: Mapping[str, Figure]) -> str:
     """The page.
 
     Args:
-        reproduction: what to show.
+        reproduction: the recomputed paper.
         drawn: the figures by name; each name has a caption in `CAPTIONS`.
     """
     pictures = {name: figure(as_svg(picture), CAPTIONS[name]) for name, picture in drawn.items()}

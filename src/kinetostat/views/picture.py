@@ -92,7 +92,7 @@ def machine_picture(
     """Draw a machine at its pose as a PNG.
 
     Args:
-        machine: at the pose to draw.
+        machine: the machine at the pose to draw.
         size: width and height, pixels.
         view: "iso", "front", "side" or "top", or the direction from the machine to the camera, base axes.
         theme: the theme of the page, "light" or "dark".

@@ -43,7 +43,7 @@ class Field:
             an axis, such as x, y, z.
         unit: unit of its numbers in files, SI; empty if it has none.
         long_name: its meaning in a phrase.
-        axes: names of the axes of its array; of a mapping, the name of its one axis.
+        axes: the names of the axes of its array, or of the one axis of a mapping.
         forms: kinds of files that have it, of "json", "csv" and "nc".
         optional: whether JSON leaves it out if it is None.
         column: its name in CSV and NetCDF if that is not the key. In CSV a mapping has a column for each entry with the

@@ -136,7 +136,7 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     """Draw the dynamic stiffness along directions over frequency, with loops closed and with motors that stand still.
 
     Args:
-        answer: with its loops.
+        answer: an answer with loops.
         title: over the figure, with braces for the name of the machine.
 
     Raises:

@@ -99,7 +99,7 @@ def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str
     """A line for each mode: frequency, damping, how the tool moves, what would ring there alone.
 
     Args:
-        modes: from the lowest.
+        modes: the modes from the lowest on.
         display: the units of the machine's display.
         components: the components that the machine has: a planar one does not answer along z.
     """

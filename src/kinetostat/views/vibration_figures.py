@@ -48,7 +48,7 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
     """Draw magnitude, phase and real part of the receptance over frequency, and the Nyquist curve.
 
     Args:
-        answer: with its modes; along x, y and z where it has no direction.
+        answer: an answer with modes; along x, y and z where it has no direction.
         title: over the figure, with braces for the name of the machine.
     """
     machine = answer.machine
@@ -114,7 +114,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
     All stand side by side in one panel without numbers: a panel each takes twice the time.
 
     Args:
-        answer: with its modes.
+        answer: an answer with modes.
         title: over the figure, with braces for the name of the machine.
     """
     machine, response = answer.machine, answer.state.free

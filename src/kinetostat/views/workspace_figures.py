@@ -63,7 +63,7 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Po
     Args:
         dataset: the dataset of a `studies.workspace.Workspace`.
         labels: its verdicts.
-        conditions: whose contours are drawn.
+        conditions: the conditions whose contours are drawn.
         title: over each picture.
     """
     dims = [str(dim) for dim in dataset["verdict"].dims]

@@ -262,7 +262,7 @@ def validate_measured(
     """Compare the stiffness of a machine at its tool point with a measured one, theory (69) to (72).
 
     Args:
-        machine: at the pose at which it was measured, with [tolerances] that say how sure its numbers are.
+        machine: the machine at the pose at which it was measured, with [tolerances] that say how sure its numbers are.
         data: path of a CSV file; its columns are described in docs/validation.md.
         fit: path of the fit.json of `kinetostat identify`, whose values and covariance then count.
         sigma: standard deviation of what has none in the file: a share ("3 %"), or of deflections a length.

@@ -57,7 +57,7 @@ class MeasuredStiffness:
 
     Attributes:
         path: of the file.
-        entries: in the order of the file.
+        entries: the measured numbers in the order of the file.
         deflections: poses and loads where deflections were measured; None of a file of entries.
     """
 

@@ -49,7 +49,7 @@ class DesignTab:
         """Build the panels to the left and to the right of the machine.
 
         Args:
-            session: whose machine is designed.
+            session: the session whose machine is designed.
             workshop: searches and favourites of the server.
             load: takes a machine into the session.
         """

@@ -57,7 +57,7 @@ class Run:
         number: the number of the search.
         folder: the folder of its problem, its records and its result.
         name: the name of its study.
-        stage: at the time of the listing.
+        stage: its stage at the time of the listing.
     """
 
     number: int
@@ -120,7 +120,7 @@ class Runs:
 
         Args:
             problem: to search.
-            tab: names the tab that asks for it; None where no tab does.
+            tab: the key of the tab that asks for it; None where no tab does.
 
         Raises:
             InputError: too many searches run or are kept, this tab has one, or the folder cannot be written.
@@ -141,7 +141,7 @@ class Runs:
 
         Args:
             number: the number of the search.
-            tab: the browser tab that asks, as for `start`.
+            tab: the key of the tab that asks, as for `start`.
 
         Raises:
             InputError: too many searches run, this tab has one, or this search runs already or is done.

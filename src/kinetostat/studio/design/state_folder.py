@@ -81,7 +81,7 @@ class Favourite:
         number: under which it is kept.
         path: the path of its machine file, which every command reads.
         name: the name of the machine.
-        note: what the designer wrote about it.
+        note: the designer's words about it.
     """
 
     number: int

@@ -51,7 +51,7 @@ class StudyForm:
         """Build the form, with a new study for the machine of the session.
 
         Args:
-            session: whose machine a new study is about.
+            session: the session whose machine a new study is about.
             start: starts a study; raises InputError where it cannot.
         """
         self._session, self._start = session, start

@@ -168,7 +168,7 @@ def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, li
     Drives of the kind of the first one are drawn, so that all have one unit.
 
     Args:
-        answer: with curves.
+        answer: an answer with curves.
         kind: the kind of curve, as the panel offers them.
         times: s.
     """

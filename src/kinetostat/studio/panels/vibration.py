@@ -265,8 +265,8 @@ def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
     """Bars of the energies of a mode: what deforms, by spring, and what moves, by part.
 
     Args:
-        mode: with its shares.
-        number: from 1.
+        mode: the mode with its shares.
+        number: the number of the mode, from 1.
         legs: legs by the name of a joint or link; the picture lights them with the bar under the pointer.
     """
     text = ""

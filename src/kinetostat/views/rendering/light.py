@@ -59,7 +59,7 @@ class Light:
     """Light on points [n], 1 on an open surface that faces the lamp.
 
     Attributes:
-        sun, sky: with shadows.
+        sun, sky: the lights, with shadows.
         openness: share of the sky before the surface that nothing hides.
     """
 
@@ -243,7 +243,7 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
     """Compute how the ground covers a background [height x width]: shares of shadow and of the grid's ink.
 
     Args:
-        ground: where it is.
+        ground: the ground below the machine.
         light: on its `points`.
         camera: the camera of the picture.
     """

@@ -90,7 +90,7 @@ class InnerPage:
     """A whole page inside of a report that is a page itself; no other report has one.
 
     Attributes:
-        title: what it shows.
+        title: the words on its content.
         text: HTML.
     """
 
@@ -157,8 +157,8 @@ def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:
     """Convert a table of the terminal for a report.
 
     Args:
-        table: from one of the `*_tables` of `views`.
-        caption: in place of its title.
+        table: a table of one of the `*_tables` of `views`.
+        caption: the caption in place of its title.
         split: see `content.Table`.
     """
     columns = [without_round_off([*map(str, column.cells)]) for column in table.columns]

@@ -141,7 +141,7 @@ def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figur
     """The picture of the machine on the first page.
 
     Args:
-        analysis: at the pose.
+        analysis: the analysis at the pose.
         pictures: the pictures of the machine.
         live: whether the report will be a page, which shows the machine in three dimensions if it can.
     """

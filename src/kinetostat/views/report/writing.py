@@ -171,7 +171,7 @@ def write_report(
         options: the options of the report.
         subject: words of the command line that name the machine or study, with its overrides.
         inputs: name and text of each file that it was read from.
-        path: from `report_path`.
+        path: the path that `report_path` returns.
         progress: called for the last two of `REPORT_STEPS`.
 
     Raises:
@@ -216,7 +216,7 @@ def report_of(
     Args:
         answers: the answers at a pose whose status is OK.
         validation: the validation by an independent engine, or why there is none.
-        origin: what the report is made from.
+        origin: the sources of the report.
         about: further lines of the title block, by name.
         live: whether the report will be a page, which may show the machine in three dimensions.
 

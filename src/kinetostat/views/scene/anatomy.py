@@ -43,8 +43,8 @@ class LinkPart:
         kind: a bar, two parallel bars, a telescope along which a slide runs, or a cable: a slide that only pulls.
         start, end: the ends of its axis.
         driven: whether it holds an actuated slide.
-        up: in which the cross-section's z axis lies, if that matters.
-        side: from the middle to either bar, of two bars.
+        up: the direction in which the cross-section's z axis lies, if that matters.
+        side: the vector from the middle to either of two bars.
         pinned: whether two bars turn on pins instead of balls.
     """
 
@@ -92,8 +92,8 @@ class Anatomy:
         leg: name.
         label: what a drawing writes beside it.
         actuated: whether it has an actuator; `removed` if all of those are without stiffness.
-        joints, links, rails, springs: in order.
-        foot, head: where it stands on the base and holds the platform, base frame, m.
+        joints, links, rails, springs: its parts in order.
+        foot, head: the points on the base and on the platform between which it stands, base frame, m.
     """
 
     leg: str

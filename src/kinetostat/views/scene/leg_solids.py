@@ -178,7 +178,7 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
         rail: its axis and where the carriage is.
         sizes: the proportions of the machine.
         radius: the radius of the leg, m.
-        inward: from the carriage to the rest of the leg.
+        inward: the direction from the carriage to the rest of the leg.
     """
     outward = unit(rail.axis.cross(rail.axis.cross(inward)))
     start, end = rail_ends(rail, sizes)

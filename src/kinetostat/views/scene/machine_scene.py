@@ -44,7 +44,7 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     Args:
         machine: gives the tool.
         configuration: its pose, with every joint placed.
-        sizes: from `proportions_of`.
+        sizes: the proportions that `proportions_of` returns.
     """
     legs = [anatomy(leg) for leg in configuration.legs]
     base, platform = plates(configuration, legs, sizes.leg)

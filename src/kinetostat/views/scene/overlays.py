@@ -151,7 +151,7 @@ def overlays_of(
     """Draw the results of an analysis, and return the factor by which the deflected shape is exaggerated.
 
     Args:
-        analysis: in base axes; for a pose without an answer nothing is drawn.
+        analysis: the analysis in base axes; for a pose without an answer nothing is drawn.
         sizes: the proportions of the machine.
         factor: the factor of exaggeration; None to choose a round one.
 
@@ -201,7 +201,7 @@ def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> f
 
     Args:
         response: the response of the machine at its unloaded pose.
-        moved: from there.
+        moved: the displacements from that pose.
         diagonal: the diagonal of the machine, m.
     """
     legs, point = response.configuration.legs, response.reference
