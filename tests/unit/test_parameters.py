@@ -75,3 +75,17 @@ def test_what_is_not_a_parameter_gets_a_way_out(text, words):
     with refused() as caught:
         find(MACHINE.family, text)
     assert all(word in str(caught.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("name", "link"), [("tricept", "tube"), ("passive-leg-3dof-pu", "ram"), ("zhang-gosselin-4dof", "legs")]
+)
+def test_meanings_of_links_fit_one_and_several(name, link):
+    said = [
+        find(load(name).family, f"{table}.{link}").quantity.meaning
+        for table in ("temperature_rise", "bending_rigidity")
+    ]
+    assert said == [
+        f"rise of the temperature of the {link} since the machine was built",
+        f"least E I of the {link}, from which the buckling load follows; 0: not known",
+    ]

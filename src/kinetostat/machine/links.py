@@ -44,9 +44,9 @@ class LinkKind:
 
 LINK_TABLES = {
     "linear_density": ("linear density", "mass per length of the {}; 0: not counted"),
-    "bending_rigidity": ("E I", "least E I of the {}, which says when they buckle; 0: not known"),
+    "bending_rigidity": ("E I", "least E I of the {}, from which the buckling load follows; 0: not known"),
     "expansion": ("thermal expansion", "relative growth of the {} per kelvin; 0: not known"),
-    "temperature_rise": ("temperature difference", "how much warmer the {} are than the machine was when built"),
+    "temperature_rise": ("temperature difference", "rise of the temperature of the {} since the machine was built"),
 }
 """Tables with one number for each kind of links, all of which may be left out: kind of quantity, and what it means."""
 OF_CROSS_SECTIONS = ("linear_density", "bending_rigidity", "expansion")
