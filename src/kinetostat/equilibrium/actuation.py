@@ -112,10 +112,10 @@ def _tensions_of_cables(mechanism: Mechanism, least: Array, most: Array, rule: R
 def _solution(matrices: Array, right: Array) -> Array:
     """Solutions of n equations with one right side [n x size]; NaN where they are singular or have no place."""
     finite: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    here = np.where(finite[:, None, None], matrices, np.eye(len(right)))
-    regular = finite & (np.abs(np.linalg.det(here)) > UNRESISTED)
-    here = np.where(regular[:, None, None], here, np.eye(len(right)))
-    solved = np.linalg.solve(here, np.broadcast_to(right[:, None], (len(here), len(right), 1)))[:, :, 0]
+    solvable = np.where(finite[:, None, None], matrices, np.eye(len(right)))
+    regular = finite & (np.abs(np.linalg.det(solvable)) > UNRESISTED)
+    solvable = np.where(regular[:, None, None], solvable, np.eye(len(right)))
+    solved = np.linalg.solve(solvable, np.broadcast_to(right[:, None], (len(solvable), len(right), 1)))[:, :, 0]
     return np.where(regular[:, None], solved, np.nan)
 
 
@@ -152,8 +152,8 @@ def _tensions_at(equations: Balance, pose: int, least: float, most: float, rule:
         return None
     _, values, rows = np.linalg.svd(matrix)
     free = rows[int((values > UNRESISTED * values[0]).sum()) :].T
-    every, sign = np.concatenate(felt), np.concatenate(signs)
-    base, turn = every @ start - np.concatenate(weight), every @ free
+    felt_by_all, sign = np.concatenate(felt), np.concatenate(signs)
+    base, turn = felt_by_all @ start - np.concatenate(weight), felt_by_all @ free
     pulls = sign != 0.0
     inner = _inner_loads(sign[pulls] * base[pulls], sign[pulls, None] * turn[pulls], least, most, rule)
     return None if inner is None else base + turn @ inner
@@ -163,8 +163,8 @@ def _inner_loads(base: Array, turn: Array, least: float, most: float, rule: Rule
     """The z for which base + turn z is within bounds and as the rule says; None where there is none."""
     across, sizes, along = np.linalg.svd(turn, full_matrices=False)
     kept = sizes > UNRESISTED * max(sizes.max(initial=0.0), UNRESISTED)
-    across, back = across[:, kept], along[kept].T / sizes[kept]
+    across, inverse = across[:, kept], along[kept].T / sizes[kept]
     # base + turn z = given + across y with y = across^T (base + turn z), and given is at right angles to it.
-    every = Balancing((base - across @ (across.T @ base))[None], across[None], np.array([True]))
-    loads, exist = within_bounds(every, np.array([least]), np.array([most]), rule)
-    return np.asarray(back @ (across.T @ (loads[0] - base))) if exist[0] else None
+    balances = Balancing((base - across @ (across.T @ base))[None], across[None], np.array([True]))
+    loads, exist = within_bounds(balances, np.array([least]), np.array([most]), rule)
+    return np.asarray(inverse @ (across.T @ (loads[0] - base))) if exist[0] else None

@@ -89,10 +89,10 @@ def admissible(equations: Balance, conditions: Array, rows: Integers | None = No
     least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps_of(equations)[rows])
     ranks = (values > least[:, None] * values[:, :1]).sum(axis=1)
     for rank in np.unique(ranks):
-        here = ranks == rank
-        shrink = 1.0 / values[here, None, :rank]
-        inverse = np.swapaxes(right[here, :rank], 1, 2) * shrink @ np.swapaxes(left[here, :, :rank], 1, 2)
-        yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
+        of_rank = ranks == rank
+        shrink = 1.0 / values[of_rank, None, :rank]
+        inverse = np.swapaxes(right[of_rank, :rank], 1, 2) * shrink @ np.swapaxes(left[of_rank, :, :rank], 1, 2)
+        yield Admissible(rows[of_rank], np.swapaxes(right[of_rank, rank:], 1, 2), inverse)
 
 
 def _motions_of_platform(equations: Balance, conditions: Array, rows: Integers) -> Admissible | None:
@@ -138,14 +138,14 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     sound = [np.isfinite(part).all(axis=(1, 2)) for part in (elastic, geometric, conditions, right)]
     result = np.full_like(right, np.nan)
     for part in admissible(equations, conditions, np.flatnonzero(np.all(sound, axis=0))):
-        whole = elastic[part.rows] + geometric[part.rows]
+        tangent = elastic[part.rows] + geometric[part.rows]
         motion = part.inverse @ gap[part.rows]
         transposed = np.swapaxes(part.motions, 1, 2)
         if part.motions.shape[2]:
-            remaining = transposed @ (force[part.rows] - whole @ motion)
+            remaining = transposed @ (force[part.rows] - tangent @ motion)
             turning = transposed @ geometric[part.rows] @ part.motions
             motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), turning, remaining)
-        wrenches = np.swapaxes(part.inverse, 1, 2) @ (whole @ motion - force[part.rows])
+        wrenches = np.swapaxes(part.inverse, 1, 2) @ (tangent @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
 
@@ -153,9 +153,9 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
 def places_of(equations: Balance) -> tuple[Integers, Integers]:
     """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
     ways, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
-    every = np.arange(starts[-1])
-    carried = np.concatenate([every[end - ways : end] for end in starts[1:]])
-    return np.setdiff1d(every, carried), carried
+    places = np.arange(starts[-1])
+    carried = np.concatenate([places[end - ways : end] for end in starts[1:]])
+    return np.setdiff1d(places, carried), carried
 
 
 def spring_factor(equations: Balance, part: Admissible) -> Array:
@@ -186,12 +186,12 @@ def _balanced_motion(springs: Array, turning: Array, force: Array) -> Array:
     result = np.zeros_like(force)
     if holds.any():
         inverse = np.linalg.inv(springs[holds])
-        back = np.swapaxes(inverse, 1, 2)
-        scaled = np.eye(springs.shape[1]) + back @ turning[holds] @ inverse
-        result[holds] = inverse @ finite_solution(scaled, back @ force[holds])
+        transposed = np.swapaxes(inverse, 1, 2)
+        scaled = np.eye(springs.shape[1]) + transposed @ turning[holds] @ inverse
+        result[holds] = inverse @ finite_solution(scaled, transposed @ force[holds])
     if not holds.all():
-        whole = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + turning[~holds]
-        result[~holds] = finite_solution(whole, force[~holds])
+        tangent = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + turning[~holds]
+        result[~holds] = finite_solution(tangent, force[~holds])
     return result
 
 

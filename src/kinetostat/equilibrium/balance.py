@@ -323,13 +323,13 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
         coordinates, wrenches = (
             np.concatenate([of[k] for k in legs.numbers]) for of in (state.coordinates, state.wrenches)
         )
-        every = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (len(legs.numbers), 1)))
-        gap = closing_gap(state.platform.at(np.tile(np.arange(len(load)), len(legs.numbers))), every.end)
+        alike = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (len(legs.numbers), 1)))
+        gap = closing_gap(state.platform.at(np.tile(np.arange(len(load)), len(legs.numbers))), alike.end)
         for place, number in enumerate(legs.numbers):
             rows = slice(len(load) * place, len(load) * (place + 1))
-            terms[number], gaps[number] = every.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
+            terms[number], gaps[number] = alike.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
     numbers = range(len(mechanism.legs))
     left = [part for k in numbers for part in (terms[k].left, gaps[k])]
     carried = sum(state.wrenches, np.zeros_like(load))
-    whole = np.concatenate([(carried - load) @ ways, *left], axis=1)
-    return Balance(mechanism, state, tuple(terms[k] for k in numbers), whole, load, change)
+    residuals = np.concatenate([(carried - load) @ ways, *left], axis=1)
+    return Balance(mechanism, state, tuple(terms[k] for k in numbers), residuals, load, change)

@@ -62,13 +62,13 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         part = mechanism.at(rows)
         step = _step(part, state.at(rows), radius[rows])
         before = step.equations.state
-        there, closed = _closed_state(part, state_after(part, before, step.unknowns))
-        fall = potential(part, before, before.platform) - potential(part, there, before.platform)
+        after, closed = _closed_state(part, state_after(part, before, step.unknowns))
+        fall = potential(part, before, before.platform) - potential(part, after, before.platform)
         share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
         lower = share > LEAST_SHARE
         wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], 2.0 * step.size), radius[rows])
         radius[rows] = np.where(lower, np.minimum(wider, LARGEST_RADIUS), 0.25 * step.size)
-        state = state.with_part(rows, before).with_part(rows[lower], there.at(np.flatnonzero(lower)))
+        state = state.with_part(rows, before).with_part(rows[lower], after.at(np.flatnonzero(lower)))
         rows = rows[step.size > NEARLY_AT_REST]
     return state
 

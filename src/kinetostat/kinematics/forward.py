@@ -210,8 +210,8 @@ class LegByLeg:
     def poses(self, unknowns: Array, goal: Array) -> dict[str, Array]:
         """See `System` [n x unknowns]."""
         joints = self._whole(unknowns, goal)
-        every = pose_of(leg_ends(self.chains, [column(c) for c in joints.T])[0].platform)
-        return {name: np.broadcast_to(every[name], (len(joints),)) for name in self.chains.pose}
+        coordinates = pose_of(leg_ends(self.chains, [column(c) for c in joints.T])[0].platform)
+        return {name: np.broadcast_to(coordinates[name], (len(joints),)) for name in self.chains.pose}
 
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
         """See `System` [unknowns]."""
@@ -225,12 +225,12 @@ class LegByLeg:
     def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array) -> list[bool]:
         """See `System` [actuators]."""
         columns = {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in self.chains.pose}
-        there = closure.solve_joints(with_values(self.machine, columns))
-        amounts = [actuator.at(there.coordinates).coordinate for actuator in self.driven]
+        solved = closure.solve_joints(with_values(self.machine, columns))
+        amounts = [actuator.at(solved.coordinates).coordinate for actuator in self.driven]
         off = goal - stacked_columns(amounts, len(poses))
         off = np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
         close = np.abs(off).max(axis=1, initial=0.0) < ONE_PLACEMENT
-        return [bool(same) for same in close & (np.asarray(there.status) == Status.OK)]
+        return [bool(same) for same in close & (np.asarray(solved.status) == Status.OK)]
 
     def drift(self) -> Array:
         """See `System` [6 x unknowns]."""
@@ -346,9 +346,9 @@ def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
         rows = np.flatnonzero(sound)
         if not rows.size:
             break
-        here = start + way[rows] * (step / steps)
-        unknowns, largest = _solutions(system, at[rows], here, NEWTON_SETTLED if step == steps else CLOSED)
-        rates = system.residuals(unknowns, here)[1]
+        target = start + way[rows] * (step / steps)
+        unknowns, largest = _solutions(system, at[rows], target, NEWTON_SETTLED if step == steps else CLOSED)
+        rates = system.residuals(unknowns, target)[1]
         turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
         leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
         sound[rows] = (largest <= CLOSED) & (leap <= LEAP) & ~(turn * hand[rows] < 0.0)

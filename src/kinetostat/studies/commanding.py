@@ -140,21 +140,21 @@ def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int)
     if not len(rows):
         return None
     placed = {path: column[rows] for path, column in columns.items()}
-    here = _targets_at(state.at(rows), machine, placed)
+    reached = _targets_at(state.at(rows), machine, placed)
     if len(rows) == count:
-        return here
-    whole = _empty_targets(here.actuators, count)
+        return reached
+    targets = _empty_targets(reached.actuators, count)
     for name in TARGET_ARRAYS:
-        getattr(whole, name)[rows] = getattr(here, name)
-    return whole
+        getattr(targets, name)[rows] = getattr(reached, name)
+    return targets
 
 
 def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> ActuatorTargets:
     """Solve poses all of which the machine reaches; NaN where the state of rest is not stable."""
     mechanism, count = state.mechanism, state.count
     actuators, stands, senses = _actuators(machine, columns, state.free, state.joints, count)
-    known = [actuator.name for actuator in actuators]
-    chosen = [known.index(name) for name in mechanism.actuators]
+    names = [actuator.name for actuator in actuators]
+    chosen = [names.index(name) for name in mechanism.actuators]
     actuators, stands, senses = [actuators[i] for i in chosen], stands[:, chosen], senses[:, chosen]
     if not actuators:
         return _empty_targets((), count)
@@ -167,10 +167,10 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
     turned = np.linalg.norm(answer.off[:, :3], axis=1)
     rates = answer.rates[:, 3:] * (length[:, None] / units)[:, None]
-    whole = ActuatorTargets(
+    targets = ActuatorTargets(
         tuple(actuators), stands + equations.state.amounts * units, stands, before, left, turned, rates
     )
-    return whole.where(stable)
+    return targets.where(stable)
 
 
 def _actuators(
@@ -335,10 +335,10 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
 
 
 def _message(machine: Machine, settled: Mask, before: Array, left: Array) -> str:
-    known, show = int(settled.sum()), machine.display.show_deflection
-    if not known:
+    at_rest, show = int(settled.sum()), machine.display.show_deflection
+    if not at_rest:
         return "The machine comes to rest at none of these poses; reduce the load, or preload what only pulls."
-    without = "" if settled.all() else f" {len(settled) - known} of {len(settled)} poses have no state of rest."
+    without = "" if settled.all() else f" {len(settled) - at_rest} of {len(settled)} poses have no state of rest."
     return (
         f"Commanded so, the tool point is off by at most {show(float(np.nanmax(left)), 'm')}; without a correction by "
         f"{show(float(np.nanmax(before)), 'm')}.{without}"
@@ -350,8 +350,8 @@ def _limits_passed(machine: Machine, columns: Mapping[str, Array], settled: Mask
     names, rows = [limit.name for limit in limits_set(machine.tables["limits"])], np.flatnonzero(settled)
     if not (names and rows.size):
         return ""
-    path, here = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
-    placed = {path: np.full(len(settled), here), **columns}
+    path, number = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
+    placed = {path: np.full(len(settled), number), **columns}
     first = first_limit_passed(machine, {path: column[rows] for path, column in placed.items()}, names)
     passed = np.flatnonzero(first >= 0)
     if not passed.size:

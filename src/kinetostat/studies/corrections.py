@@ -167,7 +167,7 @@ class CorrectionTable(ImmutableAnswer):
         unknown: how many cells have a corner or middle without a state of rest.
         law: the shortest law of the corrections.
         law_error: its largest error at points and middles of cells, m.
-        tolerance: for the error of the law, m.
+        tolerance: greatest error of the law, m.
         exact: whether that error is only round-off.
         message: what is the case, in sentences.
     """
@@ -217,7 +217,7 @@ def correction_table(
         machine: with its loads.
         over: one axis each, "FIELD=from:to:count[:log]", as for `evaluate_grid`; for instance
             "gravity_angle=0 deg:90 deg:7".
-        tolerance: for the error of the law at the tool, m or text with a unit; a thousandth of the error without
+        tolerance: greatest error of the law at the tool, m or text with a unit; a thousandth of the error without
             corrections if None.
         progress: receives how far the work is.
 

@@ -249,19 +249,19 @@ def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int
         kept: numbers of those of rx ry rz x y z, 0 to 5, that the machine has.
     """
     with np.errstate(all="ignore"):
-        whole = without_rounding(response.compliance.diagonal(), response)[kept]
-        bounded = np.isfinite(whole)
-        whole = np.where((whole > 0.0) & bounded, whole, math.nan)
+        diagonal = without_rounding(response.compliance.diagonal(), response)[kept]
+        bounded = np.isfinite(diagonal)
+        diagonal = np.where((diagonal > 0.0) & bounded, diagonal, math.nan)
         shares, rigid, gains = [], [], []
         for element in elements:
             part = without_rounding(element_share(response, element), response)[kept]
-            has_role = part / np.where(np.isfinite(whole), whole, 1.0) > NO_ROLE
+            has_role = part / np.where(np.isfinite(diagonal), diagonal, 1.0) > NO_ROLE
             factor = 1.0 / rigid_from(response, element, EXCESS)[kept]
             rigid.append(np.where(bounded, np.where(has_role, factor, 0.0), math.nan))
-            share = 0.0 if element.stiffness == math.inf else part / whole
-            shares.append(np.where(share > NO_ROLE, share, whole * 0.0))
-            gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / whole)
-    none = np.zeros((0, *np.shape(whole)))
+            share = 0.0 if element.stiffness == math.inf else part / diagonal
+            shares.append(np.where(share > NO_ROLE, share, diagonal * 0.0))
+            gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / diagonal)
+    none = np.zeros((0, *np.shape(diagonal)))
     return Roles(*(np.stack(np.broadcast_arrays(*rows)) if rows else none for rows in (shares, rigid, gains)))
 
 
@@ -282,10 +282,10 @@ def roles_over(
     response = responses(machine, grid)
     progress(1, 2)
     good = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
-    every = roles_at(response, elements, kept)
+    roles = roles_at(response, elements, kept)
     progress(2, 2)
     shape = (len(elements), len(kept), grid.size)
-    part = [np.broadcast_to(rows, shape)[:, :, good] for rows in (every.shares, every.rigid, every.gains)]
+    part = [np.broadcast_to(rows, shape)[:, :, good] for rows in (roles.shares, roles.rigid, roles.gains)]
     return Roles(*part), (int(good.sum()), grid.size)
 
 
@@ -360,11 +360,11 @@ def parameters_by_path(machine: Machine) -> dict[str, Parameter]:
 def _path_of_element(machine: Machine, path: str) -> str:
     """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
     field = path.rpartition(".")[0]
-    whole = parameters_by_path(machine).get(field)
-    here = values(machine)
-    if whole is None or not (whole.quantity.stiff and whole.quantity.per_leg):
+    parameter = parameters_by_path(machine).get(field)
+    numbers = values(machine)
+    if parameter is None or not (parameter.quantity.stiff and parameter.quantity.per_leg):
         return path
-    return field if len({here[leaf] for leaf in whole.leaves}) == 1 else path
+    return field if len({numbers[leaf] for leaf in parameter.leaves}) == 1 else path
 
 
 def with_signs_over_grid(
