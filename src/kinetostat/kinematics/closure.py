@@ -14,15 +14,7 @@ from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
-from kinetostat.kinematics.leg_gaps import (
-    Coordinates,
-    Problems,
-    free_coordinates,
-    goal_of,
-    problems_of,
-    some,
-    undetermined,
-)
+from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, with_undetermined
 from kinetostat.kinematics.posture import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
@@ -142,7 +134,7 @@ class ClosedForms:
         if not free:
             return status
         (problems,) = problems_of(task.chains, len(status), free)
-        return _with_undetermined(problems, problems.unknowns_of(coordinates), goal_of(problems, task.goal), status)
+        return with_undetermined(problems, problems.unknowns_of(coordinates), goal_of(problems, task.goal), status)
 
     @staticmethod
     def over_scalars(chains: Chains) -> Joints:
@@ -203,19 +195,9 @@ def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> 
         unknowns, codes = follow(problems, tried_goal)
         reached = np.flatnonzero(codes == Status.OK)
         unknowns[reached] = nearest_home(problems.take(reached), unknowns[reached], some(tried_goal, reached))
-        verdicts = _with_undetermined(problems, unknowns, tried_goal, codes) if free else codes
+        verdicts = with_undetermined(problems, unknowns, tried_goal, codes) if free else codes
         problems.fill(coordinates, unknowns)
         # The worst status of a pose's legs wins, so the worst is written last.
         for code in (Status.SINGULAR, Status.NOT_CONVERGED, Status.OUT_OF_REACH):
             status[problems.poses[verdicts == code]] = int(code)
     return coordinates, status
-
-
-def _with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, codes: Codes) -> Codes:
-    """The codes of solved problems, SINGULAR where the given coordinates leave the platform free to move."""
-    solved = np.flatnonzero(codes == Status.OK)
-    if not solved.size:
-        return codes
-    codes = codes.copy()
-    codes[solved[undetermined(problems.take(solved), unknowns[solved], some(goal, solved))]] = int(Status.SINGULAR)
-    return codes

@@ -14,9 +14,10 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
-from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
@@ -333,22 +334,29 @@ def goal_of(problems: Problems, goal: Array) -> Coordinates:
     return problems.at_home() | {name: goal[problems.poses, i] for i, name in enumerate(problems.chains.pose)}
 
 
-def undetermined(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
-    """Tell in which solved problems the platform can move without opening a leg or changing a given coordinate.
+def with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, codes: Codes) -> Codes:
+    """The codes, SINGULAR instead of OK where the platform can move without opening a leg or changing the pose given.
 
-    The damped inverse of what determines it is then as large as the damping is small.
+    The damped inverse of what determines the platform is then as large as the damping is small.
 
     Args:
-        problems: the problems that have been solved.
+        problems, codes: the problems, and the `Status` code of each.
         unknowns: their solutions [problems x unknowns].
         goal: coordinates of the platform in each of them.
     """
-    rates = problems.gaps(unknowns, goal)[1]
+    solved = np.flatnonzero(codes == Status.OK)
+    if not solved.size:
+        return codes
+    problems = problems.take(solved)
+    rates = problems.gaps(unknowns[solved], some(goal, solved))[1]
     square = np.swapaxes(rates, 1, 2) @ rates
     damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
     moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
     freedom = np.linalg.solve(with_damping(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
-    return np.asarray((freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED)
+    loose = (freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED
+    codes = codes.copy()
+    codes[solved[loose]] = int(Status.SINGULAR)
+    return codes
 
 
 def least_norm(rates: Array, left: Array) -> Array:
