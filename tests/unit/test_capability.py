@@ -88,6 +88,11 @@ def test_loads_that_are_not_held_are_said():
     assert heavy.set_of("force").least < 0.0
     assert heavy.message == "The drives do not hold the loads that count already."
     assert not capability_figures(heavy)
+    force = heavy.set_of("force")
+    assert math.isnan(force.greatest)
+    assert math.isnan(force.along([1, 0, 0]))
+    table = next(CAPABILITY.tables(heavy, False))
+    assert next(iter(table.columns[-1].cells)) == "–"
 
 
 def test_structure_that_carries_without_a_drive_has_no_limit():

@@ -64,7 +64,8 @@ class CapabilitySet(ImmutableAnswer):
         unit: SI.
         least: radius of the largest ball in it: what the drives allow in whichever direction; negative where they do
             not hold the loads that count already.
-        greatest: in the best direction; infinite where structure holds it without a drive.
+        greatest: in the best direction; infinite where structure holds it without a drive, NaN where the loads that
+            count already are not held or only just.
         weakest: unit vector of the direction in which it is least [3].
         limited_by: names of the drives that are at their limits there.
         normals: of its half-spaces [m x 3].
@@ -86,7 +87,7 @@ class CapabilitySet(ImmutableAnswer):
     vertices: Array
 
     def along(self, direction: Sequence[float]) -> float:
-        """The greatest amount along a direction, in SI; 0 where the machine cannot move so.
+        """The greatest amount along a direction, in SI; 0 where the machine cannot move so, NaN if loads are not held.
 
         Args:
             direction: three numbers of any size, base axes.
@@ -95,6 +96,8 @@ class CapabilitySet(ImmutableAnswer):
             InputError: the direction is zero.
         """
         way = np.array(unit_direction(direction, "direction"))
+        if self.least < 0.0:
+            return math.nan
         stopped = np.linalg.norm(way - self.directions @ (self.directions.T @ way)) > DEPENDENT
         if stopped:
             return math.inf if self.name in ("force", "moment") else 0.0
@@ -275,11 +278,11 @@ def _set(
 ) -> CapabilitySet:
     sizes = np.linalg.norm(normals, axis=1)
     reaches = bounds / sizes
-    ended = None
-    if len(bounds) and (bounds > 0.0).all():
-        ended = vertices((normals / sizes[:, None]) @ directions, reaches)
+    held = least > 0.0
+    ended = vertices((normals / sizes[:, None]) @ directions, reaches) if held and len(bounds) else None
     corners = np.zeros((0, 3)) if ended is None else ended @ directions.T
-    greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else math.inf
+    without_end = math.inf if held else math.nan
+    greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else without_end
     if not np.isfinite(least):
         return CapabilitySet(name, unit, least, greatest, np.zeros(0), (), normals, bounds, directions, corners)
     worst = int(np.argmin(reaches))

@@ -6,6 +6,7 @@ Source: theory (81)-(84).
 import math
 from collections.abc import Iterator
 
+from kinetostat.display import DASH
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.capability import Capability, capability
 from kinetostat.views.analysis_tables import direction_words
@@ -26,6 +27,8 @@ NO_END = "no limit"
 
 
 def _amount_text(answer: Capability, value: float, unit: str) -> str:
+    if math.isnan(value):
+        return DASH
     return NO_END if math.isinf(value) else answer.machine.display.show(value, unit)
 
 
@@ -52,7 +55,7 @@ def _names(names: tuple[str, ...]) -> str:
 def _along(answer: Capability) -> str:
     """The greatest amounts both ways of the direction that was asked for."""
     phrases = []
-    for part in answer.sets:
+    for part in (part for part in answer.sets if part.least >= 0.0):
         ways = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
         shown = list(dict.fromkeys(_amount_text(answer, way, part.unit) for way in ways))
         phrases.append(f"{part.name} {' and, the other way, '.join(shown)}")
@@ -94,7 +97,11 @@ SETS = (
     Field("set", "name", long_name="force, moment, speed, rate or acceleration", column="quantity"),
     Field("unit"),
     Field("least", lambda part: _finite(part.least), long_name="in whichever direction, SI"),
-    Field("greatest", lambda part: _finite(part.greatest), long_name="in the best direction, SI"),
+    Field(
+        "greatest",
+        lambda part: _finite(part.greatest),
+        long_name="in the best direction, SI; none if endless or not held",
+    ),
     Field("weakest", lambda part: part.weakest, long_name="direction of the least, base axes", forms=("json",)),
     Field("limited_by", lambda part: list(part.limited_by), long_name="drives at their limits there", forms=("json",)),
     Field("vertices", lambda part: part.vertices.tolist(), long_name="of the polytope, SI, base axes", forms=("json",)),
