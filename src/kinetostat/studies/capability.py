@@ -278,10 +278,10 @@ def _set(
 ) -> CapabilitySet:
     sizes = np.linalg.norm(normals, axis=1)
     reaches = bounds / sizes
-    held = least > 0.0
-    ended = vertices((normals / sizes[:, None]) @ directions, reaches) if held and len(bounds) else None
+    has_room = least > 0.0
+    ended = vertices((normals / sizes[:, None]) @ directions, reaches) if has_room and len(bounds) else None
     corners = np.zeros((0, 3)) if ended is None else ended @ directions.T
-    without_end = math.inf if held else math.nan
+    without_end = math.inf if has_room else math.nan
     greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else without_end
     if not np.isfinite(least):
         return CapabilitySet(name, unit, least, greatest, np.zeros(0), (), normals, bounds, directions, corners)
