@@ -248,8 +248,8 @@ SURELY_MORE = 1e-6
 """The same share above which it is surely more. Between the two nobody can say whether rigid parts share a load, and
 the answer says so; of a thousand random poses none lies there."""
 UNREACHED_COMPONENT = 1e-18
-"""Square of `CLOSING_ROUND_OFF`: share of the largest component of a screw, squared, below which a rigid or free spring
-does not reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
+"""Square of `CLOSING_ROUND_OFF`: share of the squared size of a screw below which a rigid or free spring does not reach
+along a component. Without it, round-off times infinity would make entries of K or C infinite."""
 UNFELT = 1e-11
 """Share of the load that a spring can have per unit load of the platform below which what it adds to C is round-off:
 legs that share a load by least energy leave some 1e-12 of it in a spring that should feel nothing."""

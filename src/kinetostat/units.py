@@ -47,7 +47,7 @@ class Kind:
     def unsigned(self) -> bool:
         """Whether it cannot be negative, though it may be 0."""
         return self.heavy or self.name.endswith(
-            ("damping", "friction", "ratio", "rate", "speed", "duration", "pressure")
+            ("damping", "friction", "ratio", "error", "rate", "speed", "duration", "pressure")
         )
 
 
@@ -93,7 +93,7 @@ KINDS = {
         Kind("angular acceleration", "rad/s**2", "50 rad/s**2"),
         Kind("jerk", "m/s**3", "100 m/s**3"),
         Kind("direction", "", "1.0"),
-        Kind("ratio", "m/m", "20 um/m"),
+        Kind("relative error", "m/m", "20 um/m"),
     )
 }
 
@@ -126,6 +126,7 @@ USUAL = {
     "rad/s**2": {"rad/s**2": 1.0},
     "K": {"K": 1.0},
     "m/(m*K)": {"m/(m*K)": 1.0, "um/(m*K)": 1e-6},
+    "": {"%": 0.01},
     "m/m": {"m/m": 1.0, "mm/m": 1e-3, "um/m": 1e-6, "%": 0.01, "ppm": 1e-6},
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint

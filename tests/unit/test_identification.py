@@ -1,16 +1,20 @@
 """Identification from synthetic measurements whose truth is known, and what it says about bad data."""
 
+import math
+
 import numpy as np
 import pytest
 
 from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.model import error_model
+from kinetostat.kinematics.forward import system_of
 from kinetostat.machine.machine import springs
+from kinetostat.machine.parameters import with_values
 from kinetostat.numerics.motions import Motions
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.identification.fit import Wishes, best_fit
 from kinetostat.studies.identification.identification import identification_of, identify
-from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements
+from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
 from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, observation, place_unknown
 from kinetostat.studies.identification.unseen import sparse
@@ -188,6 +192,16 @@ def test_a_pose_beyond_reach_is_refused_with_its_line(tmp_path):
     path.write_text("x [mm], measured.x [mm]\n0, 0\n900, 0\n")
     with pytest.raises(InputError, match="line 3: the drawn machine is not at the commanded pose"):
         identify(load_without_limits("delta"), path)
+
+
+def test_a_crank_may_be_commanded_beyond_half_a_turn(tmp_path):
+    """Of a platform 181 degrees are a mistake, of a motor they are not."""
+    path, machine = tmp_path / "data.csv", load_without_limits("hexapod-rus")
+    path.write_text("actuator.leg 4 [deg], measured.z [mm]\n-181, 300\n")
+    commanded = read_measurements(machine, path, Sigmas(1e-5, 1e-5)).pose
+    placed = with_values(machine, {name: float(values[0]) for name, values in commanded.items()})
+    turned = next(actuator for actuator in system_of(placed).actuators if actuator.leg == "leg 4")
+    assert math.remainder(turned.coordinate - math.radians(-181.0), math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_positions_in_another_unit_are_noticed(tmp_path):

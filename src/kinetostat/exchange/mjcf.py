@@ -144,7 +144,7 @@ def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
 
 
 def _shapes(element: Element, body: Body, radius: float, material: str) -> None:
-    """Draw the links of a body: rods from its origin to the points where other bodies begin."""
+    """Draw a body: balls of the base where other bodies begin, else links as rods from its origin to these points."""
     for point in body.reach:
         if material == "base":
             SubElement(element, "geom", type="sphere", size=_n(1.6 * radius), pos=_n(*point), material=material)

@@ -70,8 +70,8 @@ class _Search:
         """Return the unknowns at the nearest pose, found from the home pose by damped Newton steps.
 
         Each step minimises the squared distance along the motions that the closed legs allow. It is tried with several
-        dampings, which are added to the absolute values of the curvatures, so that every step leads nearer. The search
-        ends when the next step would gain less than people see in the numbers.
+        dampings, which are added to the absolute values of the curvatures, so that a step damped enough leads nearer.
+        The search ends when the next step would gain less than people see in the numbers.
         """
         best, damping = np.zeros(self.problems.size), 1e-3
         gap, rates = (each[0] for each in self.problems.gaps(best[None], self.home))

@@ -235,7 +235,7 @@ def stiffness_matrix(statics: Statics) -> Symmetric6:
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
     """K = sum_i W_i G_i^-1 W_i^T for legs that all deflect (G_i > 0), however many; infinite if one does not.
 
-    Source: theory (5), eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
+    Source: theory (5), eq. 32. A second route, by which `stiffness_matrix` is checked.
     """
     shares = [Symmetric6.dyad(b, b) * k for leg in legs for b, k in leg_modes(leg)]
     return Symmetric6.total(shares)

@@ -1,4 +1,4 @@
-"""Sweeps and maps: the questions, and the descriptions of their answers, a dataset or a file. Nothing is computed."""
+"""Sweeps and maps: the questions, and the descriptions of their answers, a dataset or a file."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import attrgetter

@@ -1,8 +1,8 @@
 """Orthoglide: three actuated slides along x, y and z, each with a pair of bars to the platform; freedoms x, y, z.
 
 Source: Chablat and Wenger, "Architecture optimization of a 3-DOF translational parallel mechanism for machining
-applications, the Orthoglide" (2003), for the architecture; bars on spherical joints
-and symbols as in theory section 4. At the origin all bars point along their slides: there the machine is isotropic.
+applications, the Orthoglide" (2003), for the architecture; bars on spherical joints and symbols as in theory
+section 4. At the origin all bars point along their slides: there the machine is isotropic.
 """
 
 from dataclasses import replace
@@ -68,7 +68,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
 def _leg(
     name: str, tip: Vector, axes: tuple[Vector, Vector], actuator: Scalar, geometry: Geometry, stiffness: Stiffness
 ) -> tuple[Leg, Closure]:
-    """P - foot - pair of bars; `axes` of the slide and from one bar to the other, the foot square to both."""
+    """Slide - foot - pair of bars; `axes` of the slide and from one bar to the other, the foot square to both."""
     forward, side = axes
     joint = tip - forward * geometry.platform_radius
     travel, aside = slide_travel(ZERO, joint, forward, geometry.bar_length)

@@ -177,8 +177,12 @@ def _pose_names(machine: Machine) -> list[str]:
 
 
 def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
-    """The values of a column, SI, NaN where a cell is empty; `kinds` has their kinds by name."""
+    """The values of a column, SI, NaN where a cell is empty; `kinds` has their kinds by name.
+
+    An angle of a platform is at most half a turn; an actuator may turn farther.
+    """
     kind, result = kinds[name or _name_in_group(column)], np.full(len(column.entries), np.nan)
+    of_platform = kind == "angle" and not column.name.startswith(("sigma", "actuator."))
     bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
     for row, entry in enumerate(column.entries):
         text = str(entry).strip()
@@ -189,7 +193,7 @@ def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Callable[[str
             result[row] = bounds.number(f"{text} {column.unit}" if without_unit else text)
         except UnitError as error:
             raise InputError(f"{where(column.name, row)} is {shorten(text)}: {error}.") from None
-        if kind == "angle" and not column.name.startswith("sigma") and abs(result[row]) > HALF_TURN:
+        if of_platform and abs(result[row]) > HALF_TURN:
             raise InputError(
                 f"{where(column.name, row)} is {np.degrees(result[row]):.6g} deg, more than half a turn, which no "
                 "orientation has; check the unit in the head of the column."

@@ -1,6 +1,7 @@
 """Results of the design tab as HTML: the best design next to the initial one, and two to five designs side by side.
 
-The numbers are those of `optimize --json` and of `studies.comparison`; here they are only rounded and arranged.
+The numbers are those of `optimize --json` and of `studies.comparison`; here they are rounded and arranged, with
+their ratios.
 """
 
 import math

@@ -171,12 +171,12 @@ def stiffness_section(analysis: Analysis) -> Section:
         as_table(compliance_table(analysis), f"Compliance C. {_blocks('compliance', analysis)}", split),
     ]
     if analysis.stiffness is None or analysis.compliance is None:
-        endless = "rigid: K is infinite there" if analysis.stiffness is None else "free: C is infinite there"
-        matrices.append(
-            Paragraph(
-                f"Some directions are {endless}, so that the diagonal stands for the matrix. Rank {analysis.rank}."
-            )
-        )
+        endless = [
+            f"Some directions are {kind}: {matrix} is infinite there, so that its diagonal stands for it."
+            for kind, matrix, values in (("rigid", "K", analysis.stiffness), ("free", "C", analysis.compliance))
+            if values is None
+        ]
+        matrices.append(Paragraph(" ".join([*endless, f"Rank {analysis.rank}."])))
     return Section(
         "Stiffness at the pose",
         (
