@@ -205,8 +205,8 @@ def forces_joint_by_joint(machine, rates, gains):
     for number, leg in enumerate(legs):
         for place in range(leg.passive + len(leg.drives)):
             row, asked = np.zeros(size), sum(demand.legs[number][place] for demand in demands)
-            for screw, follows in zip(leg.screws, leg.follows, strict=True):
-                if follows == place:
+            for screw, coordinate in zip(leg.screws, leg.coordinates, strict=True):
+                if coordinate == place:
                     row[6 * number : 6 * number + 6] += np.array(screw.components(), dtype=float)
             if place >= leg.passive:
                 row[6 * len(legs) + leg.drives[place - leg.passive]] = 1.0

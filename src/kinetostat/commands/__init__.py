@@ -1,1 +1,1 @@
-"""Commands of the command line that fill a file each, and what all of them share. No formula lives here."""
+"""A module for each larger command of the command line, and what all commands share. No formula lives here."""

@@ -60,7 +60,7 @@ def _pareto(options: argparse.Namespace) -> int:
 
 
 def _search(options: argparse.Namespace, least: int = 1) -> "Result":
-    """Search with a progress bar; into the folder if there is one."""
+    """Search with a progress bar, and keep the search in the folder of `-o` if one is named."""
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.optimisation.problem import load_problem

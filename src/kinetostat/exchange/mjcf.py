@@ -188,7 +188,7 @@ def _platform(world: Element, model: Model, pace: Pace, radius: float, tool: Arr
 def _constraints(root: Element, model: Model) -> None:
     equality = SubElement(root, "equality")
     places = {body.name: body.at for body in [*model.world.every(), model.platform]}
-    for closing in model.closings:
+    for closing in model.closings:  # MuJoCo wants the anchor of `connect` in the first body, of `weld` in the second
         first, second = closing.bodies
         if closing.ball:
             anchor = closing.point - places[first]

@@ -40,7 +40,8 @@ class Statics:
 
     Attributes:
         wrenches: per leg, a basis of what it carries.
-        sharing: per leg, and per wrench of its basis, the amount of it per unit platform wrench, as a twist.
+        sharing: per leg, a twist for each wrench of its basis: its work with a platform wrench is the amount that the
+            leg carries of this basis wrench.
         flexibility: per spring, the load in it per unit platform wrench (xi_e); in a machine without redundancy also
             the platform twist per unit deformation of it alone.
         compliance: per spring, s_e.

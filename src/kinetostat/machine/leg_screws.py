@@ -26,10 +26,10 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
-        load_squares: order of the square of each load, moments of wrenches over the characteristic length (N², N²m²).
+        load_squares: square of the size each load has, wrenches' moments over the characteristic length (N², N²m²).
         singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
-        wrench_squares: of each wrench that counts as one of unit size where the margin of a platform is judged, the
-            square of its size, moments over the characteristic length; nothing of a basis that counts as it is.
+        wrench_squares: squared size of each wrench, moments over the characteristic length, where wrenches are not of
+            unit size: the margin of a platform counts them as if they were. Empty where it counts them as they are.
     """
 
     passive: tuple[Twist, ...]
@@ -67,11 +67,11 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
     """Wrenches that do no work on any of `passive`: a basis of the reciprocal space (J_p^T W = 0).
 
     Args:
-        passive: a independent unit twists, at P in base axes.
+        passive: n independent unit twists, at P in base axes.
         length: m; translations are compared with rotations through it, the space does not depend on it.
 
     Returns:
-        W, 6 - a wrenches at P in base axes (orthonormal once moments are divided by `length`), and the singularity
+        W, 6 - n wrenches at P in base axes (orthonormal once moments are divided by `length`), and the singularity
         margin: 0 where the twists are dependent.
     """
     if not passive:

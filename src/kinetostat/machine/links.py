@@ -95,7 +95,7 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
 
 
 def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> tuple[Station, ...]:
-    """Both ends of a piece of a leg's path, or of the whole path; a driven joint at the base is its beginning.
+    """Both ends of a piece of a leg's path, or of the whole path, which begins at the first joint if that is driven.
 
     Args:
         leg: the leg.
@@ -116,7 +116,7 @@ def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> t
 
 
 def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
-    """Links of the actuated legs, as long as a field of [geometry] says, of all or of each; in pairs where `bars` is 2.
+    """Links of the actuated legs, in pairs where `bars` is 2; a field of [geometry] has their length or lengths.
 
     Args:
         what: name of the links.

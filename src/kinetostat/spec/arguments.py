@@ -190,7 +190,7 @@ Misfit = tuple[str, object] | None
 
 
 def _misfit(value: Any, kind: Any, name: str) -> Misfit:
-    """Return what is not of a kind: an entry, where the whole is; None where all is."""
+    """Return the first entry that does not fit a kind, or the whole if it is not a list; None if all fits."""
     parts = _parts(kind)
     misfits = [_misfit_of(value, part, name) for part in parts]
     if None in misfits:

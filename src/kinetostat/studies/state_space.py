@@ -110,9 +110,9 @@ def _ports(
 ) -> tuple[tuple[Port, ...], Array]:
     """The chosen inputs or outputs, and how each moves in all modes; units are those of turning and of sliding."""
     rows = {name: COMPONENTS.index(part) for name, part in tool.items()}
-    # Rows 0 to 2 of a screw turn, and so do drives that say so: False takes the unit of turning, True that of sliding.
-    known = {name: (units[row > 2], solution.tool[row]) for name, row in rows.items()}
-    known |= {drive.name: (units[not drive.turning], drive.motion) for drive in solution.drives}
+    turning, sliding = units
+    known = {name: (turning if row < 3 else sliding, solution.tool[row]) for name, row in rows.items()}
+    known |= {drive.name: (turning if drive.turning else sliding, drive.motion) for drive in solution.drives}
     names = [choice(name, known, what) for name in (tool if wanted is None else wanted)]
     ports = tuple(Port(name, known[name][0]) for name in names)
     return ports, np.array([known[name][1] for name in names]).reshape(len(names), len(solution.squares))

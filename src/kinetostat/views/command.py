@@ -26,8 +26,9 @@ MOST_LISTED_TERMS = 40
 COEFFICIENT_DIGITS = 7
 """Significant digits of coefficients, which are typed into a controller."""
 UNNAMED_TABLES = ("pose.", "load.")
-"""Tables whose names are left out."""
+"""Tables of a file whose fields are understood without the name of the table."""
 RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Digits as exponents."""
 
 
 def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:

@@ -25,7 +25,7 @@ MOST_TICKS = 4
 MILLIMETRES = 1e3
 LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
 BESIDE = 0.3
-"""Share of the distance of the farthest base joint below which another one is beside it, so that names would meet."""
+"""Two base joints whose distance is a smaller share of that of the farthest are neighbours: their names would meet."""
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
 """Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 

@@ -207,8 +207,7 @@ def readable_value(value: float, quantity: Quantity, display: Display = ENGINEER
     """Return a value of a machine file as people read it, e.g. "500 mm", "rigid", "none"."""
     if math.isinf(value):
         return quantity.show(value)
-    unit = KINDS[quantity.kind].unit
-    return display.show(value, "" if unit == "m/m" else unit, digits=DIGITS_OF_INPUT)
+    return display.show(value, KINDS[quantity.kind].unit, digits=DIGITS_OF_INPUT)
 
 
 class Piped(Console):
