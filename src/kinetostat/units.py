@@ -47,7 +47,7 @@ class Kind:
     def unsigned(self) -> bool:
         """Whether it cannot be negative, though it may be 0."""
         return self.heavy or self.name.endswith(
-            ("damping", "friction", "ratio", "error", "rate", "speed", "duration", "pressure")
+            ("damping", "friction", "ratio", "share", "rate", "speed", "duration", "pressure")
         )
 
 
@@ -93,7 +93,7 @@ KINDS = {
         Kind("angular acceleration", "rad/s**2", "50 rad/s**2"),
         Kind("jerk", "m/s**3", "100 m/s**3"),
         Kind("direction", "", "1.0"),
-        Kind("relative error", "m/m", "20 um/m"),
+        Kind("share", "m/m", "20 um/m"),
     )
 }
 

@@ -71,7 +71,7 @@ def test_shares_are_what_the_variance_loses_without_a_line(name):
     """The first-order Sobol index of a line: how much smaller the variance is if its numbers are exact."""
     whole = budget(load(name), tolerances=LINES[name], samples=256)
     line = next(iter(whole.shares_by("line")))
-    none = {"length": "0 mm", "angle": "0 deg", "relative error": "0 %"}
+    none = {"length": "0 mm", "angle": "0 deg", "share": "0 %"}
     exact = [none[kind] for kind in dict.fromkeys(part.kind for part in whole.parts if part.line == line)]
     rest = budget(load(name), tolerances={**LINES[name], line: exact}, samples=256)
     variance, left = (answer.size("rms", "position")[0] ** 2 for answer in (whole, rest))

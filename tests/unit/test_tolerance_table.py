@@ -35,9 +35,9 @@ def read(value):
         ("sigma 0.02 mm", "length", 6e-5, "normal"),
         ("1 deg", "angle", math.pi / 180, "uniform"),
         ("sigma 0.1 mrad", "angle", 3e-4, "normal"),
-        ("20 um/m", "relative error", 2e-5, "uniform"),
-        ("0.01 %", "relative error", 1e-4, "uniform"),
-        ("5 ppm", "relative error", 5e-6, "uniform"),
+        ("20 um/m", "share", 2e-5, "uniform"),
+        ("0.01 %", "share", 1e-4, "uniform"),
+        ("5 ppm", "share", 5e-6, "uniform"),
         ("0 mm", "length", 0.0, "uniform"),
     ],
 )
@@ -47,7 +47,7 @@ def test_a_value_is_read_with_its_unit(text, kind, limit, spread):
     assert deviation.limit == pytest.approx(limit, rel=1e-12)
     assert deviation.within(kind, 0.0) == deviation.limit
     assert deviation.fits(kind)
-    assert not any(deviation.fits(other) for other in {"length", "angle", "relative error"} - {kind})
+    assert not any(deviation.fits(other) for other in {"length", "angle", "share"} - {kind})
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_good_quantities(written, kind, value):
 
 
 FIX = {"length": "12 cm", "angle": "30 deg", "linear stiffness": "20 N/um", "torsional stiffness": "1e7 N*m/rad"}
-FIX |= {"rate": "3 rad/s", "frequency": "120 Hz", "ratio": "0.02", "relative error": "20 um/m", "moment": "20 N*m"}
+FIX |= {"rate": "3 rad/s", "frequency": "120 Hz", "ratio": "0.02", "share": "20 um/m", "moment": "20 N*m"}
 """The example that a message about each kind must show."""
 
 BAD = [
@@ -108,7 +108,7 @@ BAD = [
     ("3 rad/s", "frequency", "is not a unit of frequency"),
     ("10 mm/turn", "length", "is not a unit of length"),
     ("3 deg", "ratio", "is not a unit of ratio"),
-    ("3 deg", "relative error", "is not a unit of relative error"),
+    ("3 deg", "share", "is not a unit of share"),
     ("3 N*m/deg", "moment", "is not a unit of moment"),
     ("3 /s", "rate", '"/s" is not a unit'),
 ]

@@ -44,7 +44,7 @@ class MachineError:
 
     Attributes:
         path: "legs.leg 1.base joint.x", "legs.leg 1.actuator.zero"; or the field of a family that many legs share.
-        kind: kind of its quantity: "length", "angle" or "relative error".
+        kind: kind of its quantity: "length", "angle" or "share".
         group: "geometry", "zeros", "gains", "clearances", "compliances" or "shared".
         words: its name for people, "position of the base joint of leg 1 on the base along x".
         leg: name of its leg; empty if several legs share the number.
@@ -283,7 +283,7 @@ class _JointErrors:
         kind = "length" if drive.slides else "angle"
         yield ZEROS, self._source("zero", kind, f"zero of the {self.title}", twist, group="zeros")
         words = f"gain of the {self.title}"
-        yield ZEROS, self._source("gain", "relative error", words, twist, factor=travel, group="gains")
+        yield ZEROS, self._source("gain", "share", words, twist, factor=travel, group="gains")
 
     def clearance(self, name: str, axis: Vector) -> Source:
         """A joint that is free to move a little where it should hold."""

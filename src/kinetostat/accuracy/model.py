@@ -390,5 +390,5 @@ def _flexible_springs(response: Response, count: int) -> tuple[tuple[FlexibleSpr
         part = (spring.of if alone else spring.name).removeprefix(f"{leg} ").replace(".", " ")
         words = f"compliance of the {part} of {leg}, relative"
         flexible.append(FlexibleSpring(stacked_columns(twist.components(), count), size))
-        names.append(MachineError(f"legs.{leg}.{part}.compliance", "relative error", "compliances", words, leg))
+        names.append(MachineError(f"legs.{leg}.{part}.compliance", "share", "compliances", words, leg))
     return tuple(flexible), names

@@ -39,7 +39,7 @@ ERROR_GROUPS = {
 """Groups of errors by the names that a line may have."""
 CLEARANCE_WORD = "clearance"
 """Part of the path of free motions of joints; paths with * are about these only where they name it."""
-TOLERANCE_EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "relative error": "20 um/m"}
+TOLERANCE_EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "share": "20 um/m"}
 """A tolerance of each kind of number, for messages."""
 WRITE = (
     'write for example the lines joints = ["0.05 mm", "0.02 deg"] (where joints sit, how their axes stand) and zeros = '
@@ -59,7 +59,7 @@ class TolerancedPart:
         errors: their places in the error model.
         path: path of the number, as a line may name it.
         words: for people.
-        kind: "length", "angle" or "relative error".
+        kind: "length", "angle" or "share".
         group: of the errors.
         leg: name of its leg; empty of what legs share.
         line: what the line is about that holds for it.

@@ -102,7 +102,7 @@ LINE_WIDTH = 120
 SIGMAS = 3.0
 """Standard deviations that a plus-minus stands for, where a number is normally distributed."""
 UNIFORM, NORMAL = "uniform", "normal"
-LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "relative error": 0.5}
+LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "share": 0.5}
 """The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
 COSTS = (1e-6, 1e6)
 """The least and the greatest cost of a line, in units of those of other lines."""
@@ -127,7 +127,7 @@ class PlusMinus:
     Attributes:
         text: the text as it was written.
         spread: "uniform" or "normal", between or about the limits.
-        kind: "length", "angle" or "relative error".
+        kind: "length", "angle" or "share".
         limit: plus and minus, SI: three standard deviations of a normal distribution.
     """
 

@@ -177,7 +177,7 @@ def _percent(share: float) -> str:
 
 def limit_of(kind: str, limit: float, display: Display) -> str:
     """A tolerance with its unit, "0.05 mm"."""
-    if kind == "relative error":
+    if kind == "share":
         return f"{number(limit / PER_METRE, digits=display.digits)} µm/m"
     return display.show(limit, "m" if kind == "length" else "rad")
 
@@ -212,7 +212,7 @@ def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
     if math.isinf(factor):
         return "any"
     texts = []
-    for kind in ("length", "angle", "relative error"):
+    for kind in ("length", "angle", "share"):
         limits = sorted(part.limit for part in answer.parts if part.line == line and part.kind == kind)
         ends = dict.fromkeys(limit_of(kind, limit * factor, answer.machine.display) for limit in limits)
         if ends:

@@ -200,7 +200,7 @@ def _unknowns(answer: Identification) -> list[dict[str, Any]]:
             "path": unknown.path,
             "words": unknown.words,
             "group": unknown.group,
-            "unit": KINDS[unknown.kind].unit if unknown.kind != "relative error" else "1",
+            "unit": KINDS[unknown.kind].unit if unknown.kind != "share" else "1",
             "value": float(value),
             "half_interval_95": float(half),
             "seen": bool(np.isfinite(half)),

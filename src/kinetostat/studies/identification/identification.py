@@ -31,7 +31,7 @@ from kinetostat.units import KINDS, UnitError, parse
 
 USUALLY_FITTED = ("geometry", "zeros")
 """Groups of errors that are fitted by default."""
-PLAUSIBLE_SIZES = {"length": 1e-3, "angle": 1e-3, "relative error": 1e-3}
+PLAUSIBLE_SIZES = {"length": 1e-3, "angle": 1e-3, "share": 1e-3}
 """Plausible sizes of unknowns: a millimetre, a milliradian, a thousandth."""
 PLAUSIBLE_COMPLIANCE_ERROR = 0.1
 """Plausible size of the relative error of a compliance."""

@@ -122,9 +122,7 @@ def _entry(machine: Machine, name: str, value: str, sure: str, line: int) -> Mea
     if not sure:
         raise refusal(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
     share = sure.endswith("%")
-    sigma = _number(
-        sure, "relative error" if share else KIND_OF[unit], lambda text: refusal(f"the sigma of {name} is {text}")
-    )
+    sigma = _number(sure, "share" if share else KIND_OF[unit], lambda text: refusal(f"the sigma of {name} is {text}"))
     sigma = sigma * abs(size) if share else sigma
     if not sigma > 0.0:
         raise refusal(f"the sigma of {name} is {sure}; it must be more than 0.")
