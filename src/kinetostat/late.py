@@ -1,4 +1,4 @@
-"""Modules that are imported when something in them is first used, and slow habits of libraries that nobody needs.
+"""Modules that are imported only when something in them is used, and slow habits that libraries are kept from.
 
 A module that most of its importers never use is named twice: to the type checker, and here.
 

@@ -136,7 +136,7 @@ def shown(path: str) -> str:
 
 
 def data_name(path: str) -> str:
-    """Return a path as data have it, where entries have numbers: x, load.force.2."""
+    """Return a path as CSV files and datasets name it, with the numbers of entries: x, load.force.2."""
     return path.removeprefix(POSE)
 
 

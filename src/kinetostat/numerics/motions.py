@@ -213,7 +213,7 @@ def _quotients(angle: Array) -> tuple[Array, Array, Array]:
 
 
 def _series(angle: Array) -> tuple[Array, Array, Array]:
-    """The quotients of `_quotients` by their series, for small angles."""
+    """Compute what `_quotients` returns, by series, for small angles."""
     square = angle * angle
     fourth, sixth = square**2, square**3
     first = 1.0 - square / 6.0 + fourth / 120.0 - sixth / 5040.0

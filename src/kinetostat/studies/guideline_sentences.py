@@ -232,7 +232,7 @@ def limit_of(stiffness: float, factor: float) -> float:
 
 
 def _many(element: Element) -> bool:
-    """Whether an element consists of several parts, so that a sentence about it is in the plural."""
+    """Whether an element has several parts; a sentence about it is then in the plural."""
     return len(element.parts) > 1
 
 

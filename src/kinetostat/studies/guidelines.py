@@ -370,7 +370,7 @@ def _path_of_element(machine: Machine, path: str) -> str:
 def with_signs_over_grid(
     state: MachineState, grid: Points, effects: Sequence[ParameterEffect]
 ) -> list[ParameterEffect]:
-    """Add to each effect the shares of the poses of a grid at which it stiffens and at which it softens a direction."""
+    """Add to each effect at which share of the poses of a grid it stiffens a direction, and at which it softens it."""
     machine, known = state.machine, parameters_by_path(state.machine)
     paths = [leaf for effect in effects for leaf in known[effect.path].leaves]
     names = [f"compliance_{name}" for name in machine.family.component_names]

@@ -90,7 +90,7 @@ def cable_count(machine: Machine) -> int:
 
 
 def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
-    """The sentence about an unknown quantity: the name that was probably meant, or all that there are."""
+    """Say that there is no such quantity, and name the one that was probably meant, or all."""
     members = [member for group in groups.values() for member in group]
     others = [other for other, quantity in QUANTITIES.items() if not quantity.components and other not in members]
     matrix, _, parts = name.partition("_")

@@ -25,7 +25,7 @@ from kinetostat.units import KINDS
 from kinetostat.views.levels import usual_range
 
 UNITS_OF_LENGTH = ("m", "mm")
-"""Units of axes that are drawn to one scale if both axes have the same."""
+"""A map whose two axes have the same one of these units is drawn to scale."""
 LOADED_PREFIX = "loaded_"
 """Beginning of the names of quantities of the machine under its loads."""
 MARGIN_POINTS = 2

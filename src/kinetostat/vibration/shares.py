@@ -1,4 +1,4 @@
-"""Shares of springs and parts in the modes of a machine: of their strain energy, kinetic energy, and momentum.
+"""The share that each spring and each part has in a mode: in its strain energy, its kinetic energy and its momentum.
 
 The strain energy of each mode is one half in units of the mechanism, and so is its kinetic energy: shares add up to 1.
 

@@ -1,4 +1,4 @@
-"""Natural frequencies and load factor of a machine whose legs close loops, over the deflections of its springs.
+"""Natural frequencies and load factor of a machine whose legs close loops, from the deflections of its springs.
 
 The unknowns y are the deflections of all springs, times the roots of their stiffnesses, so that the springs by
 themselves have the stiffness matrix 1. They determine how the platform moves, and how the coordinates of each leg
@@ -184,8 +184,8 @@ class SpringMotions:
         Returns:
             T, H, F [ways x springs], A [conditions x springs], A+ [springs x conditions], D, E.
         """
-        mixed_mass, mass = self._over_springs(self._inertia, self._leg_inertias())
-        mixed_stiffness, stiffness = self._over_springs(self._tangent.turning, self._leg_stiffnesses())
+        mixed_mass, mass = self._form_over_springs(self._inertia, self._leg_inertias())
+        mixed_stiffness, stiffness = self._form_over_springs(self._tangent.turning, self._leg_stiffnesses())
         rows = [self._twists, mixed_mass, mixed_stiffness, self._conditions, self._inverse]
         upper = [matrix[i, j] for matrix in (mass, stiffness) for i in range(self.size) for j in range(i, self.size)]
         return [entry for row in rows for entry in row.ravel().tolist()] + upper
@@ -203,7 +203,7 @@ class SpringMotions:
         """The stiffness of each leg over its coordinates that comes from wrenches which turn with its parts."""
         return (leg.terms.geometric[0].astype(object) for leg in self._tangent.legs)
 
-    def _over_springs(self, platform: Array, legs: Iterable[Array]) -> tuple[Array, Array]:
+    def _form_over_springs(self, platform: Array, legs: Iterable[Array]) -> tuple[Array, Array]:
         """Write a quadratic form of all motions over y: the factor of its mixed part, and the part that has no twist.
 
         Args:

@@ -5,7 +5,6 @@ Nothing is drawn here.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from kinetostat.views.lettering import letter
+
+MEASURING = ("_update_ticks", "_get_ticklabel_bboxes")
+"""Private methods of Matplotlib that place and measure the numbers along an axis; without them all takes longer."""
 
 
 def fix_layout(figure: Figure) -> None:
@@ -38,19 +40,19 @@ def steady_ticks(panels: Sequence[Axes]) -> Iterator[None]:
 
     It would do so again for the edges, the labels and the axes themselves, four times for each picture.
     """
-    axes: list[Any] = [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)]
-    for axis in axes:
-        axis._update_ticks = cache(axis._update_ticks)
-        axis._get_ticklabel_bboxes = _first_result(axis._get_ticklabel_bboxes)
+    axes = [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)]
+    replaced = [(axis, name) for axis in axes for name in MEASURING if hasattr(axis, name)]
+    for axis, name in replaced:
+        setattr(axis, name, _first_result(getattr(axis, name)))
     try:
         yield
     finally:
-        for axis in axes:
-            del axis._update_ticks, axis._get_ticklabel_bboxes
+        for axis, name in replaced:
+            delattr(axis, name)
 
 
 def _first_result(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that computes once, and gives the same whatever it is asked with."""
+    """Make a function that computes at its first call, and returns that result at every later one."""
     results: list[Any] = []
 
     def first(*arguments: Any) -> Any:

@@ -68,7 +68,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
 def _leg(
     name: str, tip: Vector, axes: tuple[Vector, Vector], actuator: Scalar, geometry: Geometry, stiffness: Stiffness
 ) -> tuple[Leg, Closure]:
-    """Slide - foot - pair of bars; `axes` of the slide and from one bar to the other, the foot square to both."""
+    """Slide, foot and pair of bars; `axes` are those of the slide and from bar to bar; the foot is square to both."""
     forward, side = axes
     joint = tip - forward * geometry.platform_radius
     travel, aside = slide_travel(ZERO, joint, forward, geometry.bar_length)

@@ -158,7 +158,7 @@ class BallLeg:
 def _ball_turns(
     ball: Sequence[Joint], arm: Rotation, centre: Vector, motion: Displacement
 ) -> tuple[list[Turn], Scalar]:
-    """Turns of the ball's axes: what remains of the motion once the joints before the ball have made theirs.
+    """The turns of the ball's axes, which make the part of the motion that the joints before the ball have not made.
 
     Source: theory (75).
 
