@@ -98,7 +98,7 @@ KINDS = {
 }
 
 UNITS = Path(__file__).with_name("units.txt")
-"""The units that there are."""
+"""The file with all units that are known, in the form that pint reads."""
 USUAL = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "nm": 1e-9},
     "rad": {"rad": 1.0, "deg": 0.017453292519943295, "mrad": 1e-3, "urad": 1e-6},
@@ -148,7 +148,7 @@ IN_FILES = {
 }
 """Units in which a file gives a number where nothing was written before; the one with the fewest digits is taken."""
 PLAIN = (1e-4, 1e6)
-"""Between these a number is written without an exponent."""
+"""Between these a number is written without an exponent: at most six digits or three zeros stand before the rest."""
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"(?:[A-Za-zµμ°]+|%)(?:\s*(?:\*\*|\^)\s*[1-4]|[²³⁴])?"
@@ -157,6 +157,7 @@ UNIT = re.compile(rf"(?:1\s*/\s*)?{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
 """Pattern of the text of a unit, e.g. "N/um" or "1/s"."""
 _PLAIN_SIGNS = str.maketrans({"·": "*", "µ": "u", "μ": "u", "²": "**2", "³": "**3", "⁴": "**4"})
 _LONGEST = 64
+"""Characters up to which a text is read as a quantity: all digits of a float and any unit, and no more to search."""
 
 
 class UnitError(ValueError):
@@ -164,7 +165,7 @@ class UnitError(ValueError):
 
 
 def parse(value: object, kind: str, bare: str = "") -> float:
-    """SI value of a number or of text such as "12 cm".
+    """Return the SI value of a number or of text such as "12 cm".
 
     Args:
         value: a finite number (SI), or text: a number and a unit.
@@ -240,6 +241,21 @@ def _ascii(unit: str) -> str:
     return unit.translate(_PLAIN_SIGNS)
 
 
+def load_unit(turning: bool) -> str:
+    """Return the unit of a load: of a moment where it turns, else of a force."""
+    return "N·m" if turning else "N"
+
+
+def motion_unit(turning: bool) -> str:
+    """Return the unit of a small motion: of a rotation, else of a displacement."""
+    return "rad" if turning else "m"
+
+
+def component_units(components: Iterable[str]) -> list[str]:
+    """Return the units of components of a small motion by their names: those about axes begin with r, "rx"."""
+    return [motion_unit(name.startswith("r")) for name in components]
+
+
 def as_read(value: float, unit: str) -> tuple[float, str]:
     """Return a value and its unit as people read them: angles in degrees, all else unchanged."""
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
@@ -259,14 +275,14 @@ def multiple_of_unit(unit: str, known: Collection[str], example: str) -> tuple[s
     Raises:
         UnitError: it is a multiple of none of them.
     """
-    usual = [si for si in known if _usual(unit, si)]
-    if usual:
-        return usual[0], _usual(unit, usual[0])
-    given = _in_root_units(unit) if UNIT.fullmatch(unit) else None
+    for si in known:
+        if (factor := _usual_factor(unit, si)) is not None:
+            return si, factor
+    written = _in_root_units(unit) if UNIT.fullmatch(unit) else None
     for si in known:
         target = _in_root_units(si)
-        if given is not None and target is not None and given.units == target.units:
-            return si, float(given.magnitude / target.magnitude)
+        if written is not None and target is not None and written.units == target.units:
+            return si, float(written.magnitude / target.magnitude)
     shown = unit if len(unit) <= _LONGEST else f"{unit[:_LONGEST]}…"
     raise UnitError(f'"{shown}" is not a unit of any result; write for example "{example}"')
 
@@ -296,9 +312,9 @@ def _allowed_form(wanted: Kind) -> str:
     return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or {bare}'
 
 
-def _usual(unit: str, si: str) -> float:
-    """SI value of one `unit`, where it is one of the usual ones of this SI unit; otherwise 0."""
-    return USUAL.get(_ascii(si), {}).get(_ascii(unit), 0.0)
+def _usual_factor(unit: str, si: str) -> float | None:
+    """Return the SI value of one `unit`; None where it is not one of the usual ones of this SI unit."""
+    return USUAL.get(_ascii(si), {}).get(_ascii(unit))
 
 
 @cache
@@ -322,18 +338,21 @@ def _in_root_units(unit: str) -> "PlainQuantity[float] | None":
 
 @cache
 def _factor(unit: str, wanted: Kind) -> float:
-    """SI value of one `unit`."""
+    """Return the SI value of one `unit` of this kind.
+
+    Angles are no dimension to pint, so that their powers are compared apart: see `TURNS_COUNT`.
+    """
     if UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed_form(wanted)}')
     if unit == WITHOUT_ANGLE.get(wanted.name):
         return 1.0
-    if usual := _usual(unit, wanted.unit):
-        return usual
-    given, target = _in_root_units(unit), _in_root_units(wanted.unit)
-    if given is None or target is None:
+    if (factor := _usual_factor(unit, wanted.unit)) is not None:
+        return factor
+    written, target = _in_root_units(unit), _in_root_units(wanted.unit)
+    if written is None or target is None:
         raise UnitError(f'the unit "{unit}" is unknown; write {_allowed_form(wanted)}')
-    angle, in_kind = (dict(quantity.unit_items()).get("radian", 0) for quantity in (given, target))
-    misread = angle != in_kind and (angle or wanted.name in TURNS_COUNT)
-    if given.dimensionality != target.dimensionality or misread:
+    power, wanted_power = (dict(quantity.unit_items()).get("radian", 0) for quantity in (written, target))
+    misread = power != wanted_power and (power or wanted.name in TURNS_COUNT)
+    if written.dimensionality != target.dimensionality or misread:
         raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed_form(wanted)}')
-    return float(given.magnitude / target.magnitude)
+    return float(written.magnitude / target.magnitude)

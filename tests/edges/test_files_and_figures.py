@@ -20,10 +20,11 @@ from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import contour_maps, curves, save_figure
+from kinetostat.views.figures import save_figure
+from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.layout import _Surroundings
-from kinetostat.views.levels import levels_of
+from kinetostat.views.map_scales import levels_of
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
@@ -215,7 +216,7 @@ def test_numbers_that_are_placed_once_stand_where_matplotlib_places_them_again(s
 
 def test_stiffness_curves_are_log_log_with_one_panel_per_unit():
     dataset = evaluate_grid(load(MACHINE), ["stiffness.passive_links=1e3:1e10:8:log"], ["stiffness"])
-    figure = curves(dataset, resolve_quantities(["stiffness"]), "title")
+    figure = grid_curves(dataset, resolve_quantities(["stiffness"]), "title")
     assert [axes.get_ylabel() for axes in figure.axes] == ["stiffness (N·m/rad)", "stiffness (N/m)"]
     assert {(axes.get_xscale(), axes.get_yscale()) for axes in figure.axes} == {("log", "log")}
 
@@ -261,6 +262,6 @@ def test_a_figure_says_where_its_numbers_hold():
     grid = evaluate_grid(
         load("hexapod", ["tool.offset=[0, 0, 0.08]", "pose.z=140 mm"]), ["x=-1 cm:1 cm:3"], ["compliance"]
     )
-    said = curves(grid, ["compliance_x"], "one").get_supxlabel()
+    said = grid_curves(grid, ["compliance_x"], "one").get_supxlabel()
     assert said.startswith("base axes at the tool point T; y 0 mm, z 140 mm, roll 0 deg")
     assert "x 0 mm" not in said

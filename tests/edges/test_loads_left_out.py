@@ -16,7 +16,7 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.studies.datasets import evaluate
 from kinetostat.studies.grid import evaluate_grid
-from kinetostat.views.figures import setting_lines
+from kinetostat.views.grid_figures import setting_lines
 from kinetostat.views.report import writing
 
 CABLES = str(Path(__file__).parent.parent / "cases" / "cables-at-rest.toml")

@@ -11,7 +11,8 @@ from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.vibration import modes
 from kinetostat.views.answers import plot
-from kinetostat.views.figures import curves, look_of
+from kinetostat.views.figures import look_of
+from kinetostat.views.grid_figures import grid_curves
 from kinetostat.views.vibration import MOST_PARTS, cut_of, mode_table, share_table, strain_of
 from kinetostat.views.vibration_figures import response_figure
 
@@ -69,7 +70,7 @@ def test_a_cutting_pressure_without_a_direction_asks_for_one():
 def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
     machine = changed(load("hexapod"), LIGHT_LEGS)
     names = [f"{kind}_{number}" for kind in ("frequency", "loaded_frequency") for number in range(1, 7)]
-    (panel,) = curves(evaluate_grid(machine, ["z=0.12:0.15:3"], names), names, "").axes
+    (panel,) = grid_curves(evaluate_grid(machine, ["z=0.12:0.15:3"], names), names, "").axes
     assert len(panel.lines) == len(names)
     assert len({str(look_of(place)) for place in range(36)}) == 36
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from kinetostat.views.question import Description
 
 LONGEST_COUNT = 9
-"""Digits of the whole numbers that options take."""
+"""Digits of the whole numbers that options take: a billion of anything would never end."""
 
 
 def add_question(
@@ -83,35 +83,36 @@ def _fill(command: Parser, summary: str, question: Question) -> None:
     if question.full:
         command.add_argument("--full", action="store_true", help=question.full)
     if question.suffixes:
-        words: dict[str, Any] = {"metavar": "FILE", "type": Path, "action": "append", "default": []}
-        command.add_argument("-o", "--output", help=question.output, **words)
+        command.add_argument(
+            "-o", "--output", help=question.output, metavar="FILE", type=Path, action="append", default=[]
+        )
     elif question.output:
         takes_figures(command, question.output)
     takes_json(command)
 
 
 def _add_option(command: Parser, option: Option) -> None:
-    """Add an option, or what stands after the machine without a name."""
-    words: dict[str, Any] = {"help": option.meaning}
+    """Add an option, or what stands after the machine without a name; its settings are those of `add_argument`."""
+    settings: dict[str, Any] = {"help": option.meaning}
     if option.kind == "flag":
-        command.add_argument(option.flag, action="store_true", dest=option.name, **words)
+        command.add_argument(option.flag, action="store_true", dest=option.name, **settings)
         return
-    words["type"] = READERS.get(option.kind, str)
-    words["default"] = list(option.default or ()) if option.many else option.default
+    settings["type"] = READERS.get(option.kind, str)
+    settings["default"] = list(option.default or ()) if option.many else option.default
     if option.choices:
-        words["choices"] = option.choices
+        settings["choices"] = option.choices
     else:
-        words["metavar"] = option.metavar or METAVARS.get(option.kind, option.name.upper())
+        settings["metavar"] = option.metavar or METAVARS.get(option.kind, option.name.upper())
     if option.many:
-        words["action"] = "append"
+        settings["action"] = "append"
     if option.first:
-        words |= {} if option.required else {"nargs": "?"}
-        command.add_argument(option.name, **words)
+        settings |= {} if option.required else {"nargs": "?"}
+        command.add_argument(option.name, **settings)
         return
-    command.add_argument(option.flag, dest=option.name, required=option.required, **words)
+    command.add_argument(option.flag, dest=option.name, required=option.required, **settings)
     for former in option.former:
-        words |= {"help": argparse.SUPPRESS, "action": partial(_Former, option.flag), "default": argparse.SUPPRESS}
-        command.add_argument(former, dest=option.name, **words)
+        settings |= {"help": argparse.SUPPRESS, "action": partial(_Former, option.flag), "default": argparse.SUPPRESS}
+        command.add_argument(former, dest=option.name, **settings)
 
 
 class _Former(argparse.Action):

@@ -436,8 +436,8 @@ GROUPS = {
 
 
 def plain_name(name: str) -> str:
-    """The name of a quantity in words, such as "stiffness x"."""
-    return name.replace("_", " ")
+    """Return the name of a quantity in words, such as "stiffness x" or "Frobenius condition"."""
+    return name.replace("_", " ").replace("frobenius", "Frobenius")
 
 
 def group_of(names: Sequence[str]) -> str:

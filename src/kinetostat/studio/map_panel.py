@@ -22,7 +22,7 @@ from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session, read_typed
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
-from kinetostat.views.levels import usual_range
+from kinetostat.views.map_scales import usual_range
 
 UNITS_OF_LENGTH = ("m", "mm")
 """A map whose two axes have the same one of these units is drawn to scale."""

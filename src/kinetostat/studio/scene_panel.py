@@ -24,6 +24,7 @@ from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow, icon_
 from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.pulling import PLATFORM, Pull, goal_of, numbers_after_pull, point_goal
 from kinetostat.studio.session import Session, file_stem
+from kinetostat.units import motion_unit
 
 LAYERS = {
     "ellipsoids": "compliance ellipsoids",
@@ -207,7 +208,7 @@ def headline(report: Report) -> str:
     tiles, display = [], report.analysis.machine.display
     if report.loaded is not None:
         for name, moved in zip(report.loaded.components, report.loaded.displacement, strict=True):
-            value, _, unit = display.show_deflection(moved, "rad" if name.startswith("r") else "m").partition(" ")
+            value, _, unit = display.show_deflection(moved, motion_unit(name.startswith("r"))).partition(" ")
             tiles.append(_tile(f"u {name}", value, unit))
         return f"<dl>{''.join(tiles)}</dl>"
     for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal.tolist(), strict=True):

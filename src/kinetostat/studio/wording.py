@@ -95,6 +95,11 @@ def table(
     return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{heads}<tbody>{body}</tbody></table>'
 
 
+def titled_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
+    """Return an HTML table under a heading that says what it shows; arguments are those of `table`."""
+    return heading(title) + table(title, head, rows, kind)
+
+
 def _cells(cells: Sequence[str], kinds: Sequence[str]) -> str:
     return "".join(f"<td{name}>{escape(cell)}</td>" for cell, name in zip(cells, kinds, strict=True))
 

@@ -10,7 +10,8 @@ from kinetostat.machine.machine import setting_of
 from kinetostat.studies.budget import Budget
 from kinetostat.views.budget import ranked_by
 from kinetostat.views.budget_data import budget_dataset
-from kinetostat.views.figures import COLOURS, contour_maps, curves, new_figure
+from kinetostat.views.figures import COLOURS, new_figure
+from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 
@@ -41,7 +42,7 @@ def _over_poses(budget: Budget, title: str = "{}: error of the tool") -> Figure:
         # Percentiles of drawn machines have noise, of which a map would draw contours.
         return contour_maps(dataset, [f"rms_{name}" for name in measures], title)
     names = [f"{statistic}_{name}" for name in measures for statistic in ("rms", "usual", "worst")]
-    return curves(dataset, names, title)
+    return grid_curves(dataset, names, title)
 
 
 def contributions_figure(budget: Budget, title: str = "{}: what the error of the tool is made of") -> Figure:

@@ -1,4 +1,4 @@
-"""Drawing of a machine at its pose: front, side and plan. Geometry comes from the configuration, style is set here."""
+"""Drawing of a machine at its pose: front, side and plan, to scale. Geometry comes from the configuration alone."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,17 +19,23 @@ from kinetostat.views.layout import fix_layout
 
 THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 VIEW_MARGIN = 0.12
-"""Room beside a machine, as a share of its size."""
+"""Room beside a machine, as a share of its size: its marks and names reach beyond its joints."""
 MOST_TICKS = 4
 """Intervals of an axis at most: views are for shapes, and half of the time of drawing one goes into its numbers."""
 MILLIMETRES = 1e3
+"""Millimetres of a metre: views are labelled in mm whatever units the file displays."""
 LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
-BESIDE = 0.3
+NEIGHBOUR_SHARE = 0.3
 """Two base joints whose distance is a smaller share of that of the farthest are neighbours: their names would meet."""
+NAME_DISTANCE = 6
+"""Distance of a name from its base joint, points: beyond the mark of the joint."""
+CENTRED_COMPONENT = 0.38
+"""Component of a unit vector (sine of 22 deg) below which a text is centred along this axis: half of the way from a
+side to a corner."""
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
 """Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 
-Loop = list[Vector]
+Points = list[Vector]
 
 
 def three_views(machine: Machine, title: str) -> Figure:
@@ -80,7 +86,7 @@ def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: 
     reference = configuration.platform.translation
     actuated = [leg for leg in configuration.legs if leg.actuated]
     standing = [leg for leg in actuated if len(leg.path) > 1]
-    for plate in (loop([leg.path[0] for leg in standing]), loop([leg.path[-1] for leg in standing])):
+    for plate in (ring_of([leg.path[0] for leg in standing]), ring_of([leg.path[-1] for leg in standing])):
         panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
@@ -115,43 +121,48 @@ def _write_name(panel: Axes, name: str, leg: Leg, others: Sequence[Leg]) -> None
 
     It stands away from the leg, or from the origin where the leg goes up, and also away from a base joint beside it.
     """
-    ends = list(zip(*flat(list(leg.path), "x", "y"), strict=True))
-    x, y = ends[0]
-    across, up = _way([*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)])
-    apart = [(x - a, y - b) for a, b in zip(*flat([other.path[0] for other in others], "x", "y"), strict=True)]
-    nearest = min(apart, key=lambda way: math.hypot(*way), default=(0.0, 0.0))
-    if 0.0 < math.hypot(*nearest) < BESIDE * max(math.hypot(*way) for way in apart):
-        far = math.hypot(*nearest)
-        across, up = across + nearest[0] / far, up + nearest[1] / far
+    (x, y), *further = zip(*flat(list(leg.path), "x", "y"), strict=True)
+    across, up = _first_direction([*((x - a, y - b) for a, b in further), (x, y), (-1.0, 0.0)])
+    from_others = [(x - a, y - b) for a, b in zip(*flat([other.path[0] for other in others], "x", "y"), strict=True)]
+    nearest = min(from_others, key=lambda offset: math.hypot(*offset), default=(0.0, 0.0))
+    distance = math.hypot(*nearest)
+    if 0.0 < distance < NEIGHBOUR_SHARE * max(math.hypot(*offset) for offset in from_others):
+        across, up = across + nearest[0] / distance, up + nearest[1] / distance
         size = math.hypot(across, up) or 1.0
         across, up = across / size, up / size
     panel.annotate(
-        name, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=LEG_COLOUR, zorder=5,
+        name, (x, y), xytext=(NAME_DISTANCE * across, NAME_DISTANCE * up), textcoords="offset points",
+        color=LEG_COLOUR, zorder=5,
         ha=_alignment(across, "right", "left"), va=_alignment(up, "top", "bottom"),
         path_effects=[withStroke(linewidth=2.0, foreground="white")],
     )  # fmt: skip
 
 
-def _way(ways: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the first of some ways that leads anywhere, with the length 1."""
-    long = MILLIMETRES * SAME_TO_THE_EYE
-    return next((dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > long)
+def _first_direction(offsets: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the direction of the first of some offsets (mm) that is not zero to the eye, as a unit vector."""
+    least = MILLIMETRES * SAME_TO_THE_EYE
+    return next((dx / length, dy / length) for dx, dy in offsets if (length := math.hypot(dx, dy)) > least)
 
 
-def _alignment(part: float, low: str, high: str) -> str:
-    """Alignment of a text along one axis, so that it does not cover its point."""
-    return "center" if abs(part) < 0.38 else high if part > 0.0 else low
+def _alignment(component: float, low: str, high: str) -> str:
+    """Align a text along one axis so that it does not cover its point, from which it stands in some direction.
+
+    Args:
+        component: of this direction (a unit vector) along the axis.
+        low, high: alignments where the text stands on the negative and on the positive side.
+    """
+    return "center" if abs(component) < CENTRED_COMPONENT else high if component > 0.0 else low
 
 
-def loop(points: Loop) -> Loop:
-    """Return points sorted by their angle about their centre in the x-y plane."""
+def ring_of(points: Points) -> Points:
+    """Sort points by their angle about their centre in the x-y plane, so that the line through them is a plate."""
     if not points:
         return []
     cx, cy = sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points)
     return sorted(points, key=lambda p: math.atan2(p.y - cy, p.x - cx))
 
 
-def flat(points: Loop, across: str, up: str) -> tuple[list[float], list[float]]:
+def flat(points: Points, across: str, up: str) -> tuple[list[float], list[float]]:
     """Return the coordinates of points along two axes, mm."""
     return [MILLIMETRES * getattr(p, across) for p in points], [MILLIMETRES * getattr(p, up) for p in points]
 

@@ -14,9 +14,11 @@ from matplotlib.figure import Figure
 
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
+from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, look_of, new_figure
@@ -33,6 +35,11 @@ from kinetostat.views.question import (
     Records,
 )
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
+
+KINDS_OF_LOADS = ((False, "force"), (True, "moment"))
+"""Whether an actuator turns, and the kind of its load."""
+ROOM_ABOVE_CURVE = 1.15
+"""Height of a panel with a single curve over its greatest value; it begins at zero, so that heights can be compared."""
 
 
 def _lines(answer: Elevation) -> Lines:
@@ -73,14 +80,14 @@ def _at_most(answer: Elevation, sizes: Array, unit: str) -> str:
 def _forces_sentence(answer: Elevation) -> str:
     """The greatest load of each kind, and how much of the limits is used."""
     parts = []
-    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
-        columns = [i for i, turning in enumerate(answer.turning) if turning is turns]
+    for turning, kind in KINDS_OF_LOADS:
+        unit, columns = load_unit(turning), [i for i, turns in enumerate(answer.turning) if turns is turning]
         if columns:
             sizes = np.nan_to_num(np.abs(answer.loads[:, columns]))
             place, column = np.unravel_index(int(sizes.argmax()), sizes.shape)
             size = answer.machine.display.show(float(sizes[place, column]), unit)
             name = answer.actuators[columns[int(column)]]
-            parts.append(f"the greatest {what} is {size}, of {name} {_elevation_text(answer, int(place))}")
+            parts.append(f"the greatest {kind} is {size}, of {name} {_elevation_text(answer, int(place))}")
     text = f"{'; '.join(parts)}."
     text = f"{text[0].upper()}{text[1:]}"
     if not np.isfinite(answer.limit_use).any():
@@ -94,9 +101,9 @@ def _reversals_sentence(answer: Elevation) -> str:
     if not answer.reversals:
         return "No load of a drive or a joint reverses, so that no clearance is crossed."
     show, small = answer.machine.display.show, answer.machine.display.show_deflection
-    where = ", ".join(f"{each.leg} at {show(each.elevation, 'rad', digits=3)}" for each in answer.reversals)
-    jumps = [each.jump for each in answer.reversals if each.jump is not None]
-    text = f"Loads reverse in {where}."
+    legs = ", ".join(f"{reversal.leg} at {show(reversal.elevation, 'rad', digits=3)}" for reversal in answer.reversals)
+    jumps = [reversal.jump for reversal in answer.reversals if reversal.jump is not None]
+    text = f"Loads reverse in {legs}."
     if jumps:
         return f"{text} The tool point jumps by up to {small(max(jumps), 'm')} as clearances are crossed."
     return f"{text} Clearances in [tolerances], or backlash in [drives], say how far the tool point jumps there."
@@ -116,13 +123,13 @@ def _columns(answer: Elevation, full: bool = False) -> dict[str, tuple[str, Arra
     """Columns of the main table: head, unit and values."""
     columns = {"sag": ("m", answer.sag), "rotation": ("rad", answer.rotation)}
     if full:
-        units = ("rad" if name.startswith("r") else "m" for name in answer.components)
+        units = component_units(answer.components)
         columns |= {n: (u, v) for n, u, v in zip(answer.components, units, answer.displacement.T, strict=True)}
     columns["first frequency"] = ("Hz", answer.frequency)
-    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
-        chosen = [turning is turns for turning in answer.turning]
+    for turning, kind in KINDS_OF_LOADS:
+        chosen = [turns is turning for turns in answer.turning]
         if any(chosen):
-            columns[f"greatest {what}"] = (unit, np.abs(answer.loads[:, chosen]).max(axis=1))
+            columns[f"greatest {kind}"] = (load_unit(turning), np.abs(answer.loads[:, chosen]).max(axis=1))
     if answer.budget is not None:
         columns["error, 95 %"] = ("m", answer.error)
     return columns
@@ -142,13 +149,14 @@ def _elevation_table(answer: Elevation, full: bool) -> FittedTable:
 
 def _loads_table(answer: Elevation) -> FittedTable:
     display = answer.machine.display
-    scales = [display.scale("N·m" if turning else "N") for turning in answer.turning]
+    units = [load_unit(turning) for turning in answer.turning]
+    scales = [display.scale(unit) for unit in units]
     heads = [f"{name}\n{scale.head}" for name, scale in zip(answer.actuators, scales, strict=True)]
     title = "Loads of actuators, positive where they are pulled"
     table = numeric_table(title, f"elevation\n{display.scale('rad').head}", heads)
     for height, row in zip(answer.elevations, answer.loads, strict=True):
-        cells = (display.number(float(load), "N·m" if t else "N") if math.isfinite(load) else DASH
-                 for load, t in zip(row, answer.turning, strict=True))  # fmt: skip
+        cells = (display.number(float(load), unit) if math.isfinite(load) else DASH
+                 for load, unit in zip(row, units, strict=True))  # fmt: skip
         table.add_row(display.number(float(height), "rad"), *cells)
     return table
 
@@ -158,10 +166,11 @@ def _reversals_table(answer: Elevation) -> FittedTable:
     table = text_table("Loads that reverse", "elevation", "leg", "between the parts of")
     for head in ("tool point jumps", "platform turns"):
         table.add_column(head, justify="right", no_wrap=True)
-    for each in answer.reversals:
-        sizes = ((each.jump, "m"), (each.turn, "rad"))
+    for reversal in answer.reversals:
+        sizes = ((reversal.jump, "m"), (reversal.turn, "rad"))
         shown = (DASH if size is None else display.show_deflection(size, unit) for size, unit in sizes)
-        table.add_row(display.show(each.elevation, "rad", digits=3), each.leg, ", ".join(each.parts), *shown)
+        place = display.show(reversal.elevation, "rad", digits=3)
+        table.add_row(place, reversal.leg, ", ".join(reversal.parts), *shown)
     return table
 
 
@@ -193,38 +202,14 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
         answer: the answer of a machine that comes to rest.
         title: over the figure, with braces for the name of the machine.
     """
-    display, commands = answer.machine.display, answer.corrections.command
-    parts = [(name, "rad" if name.startswith("r") else "m") for name in answer.components]
-    units = zip(commands.actuators, commands.units, commands.corrections.T, strict=True)
-    corrections = [(name, unit, values) for name, unit, values in units]
-    moved = [(name, unit, values) for (name, unit), values in zip(parts, answer.displacement.T, strict=True)]
-    loads = [(name, "N·m" if t else "N", values)
-             for name, t, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True)]  # fmt: skip
-    panels = [
-        ("displacement", "m", [row for row in moved if row[1] == "m"]),
-        ("rotation", "rad", [row for row in moved if row[1] == "rad"]),
-        ("first frequency", "Hz", [("", "Hz", answer.frequency)]),
-        ("force, pulling", "N", [row for row in loads if row[1] == "N"]),
-        ("moment", "N·m", [row for row in loads if row[1] == "N·m"]),
-        ("error, 95 %", "m", [] if answer.budget is None else [("", "m", answer.error)]),
-        *(("correction", unit, [row for row in corrections if row[1] == unit]) for unit in ("m", "rad")),
-    ]  # fmt: skip
-    panels = [panel for panel in panels if any(np.isfinite(values).any() for _, _, values in panel[2])]
+    panels = _panels(answer)
     rows = -(-len(panels) // 2)
-    heights = display.scale("rad")
+    heights = answer.machine.display.scale("rad")
     notes = setting_of(answer.machine), "dotted lines: loads reverse" if answer.reversals else ""
     with new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), *notes) as figure:
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
-        for panel, (what, unit, curves) in zip(axes, panels, strict=False):
-            small = what.startswith(("displacement", "rotation", "error", "correction"))
-            scale = (display.fitting if small else lambda u, _: display.scale(u))(
-                unit, np.concatenate([values for _, _, values in curves])
-            )
-            for place, (name, _, values) in enumerate(curves):
-                panel.plot(answer.elevations * heights.factor, values * scale.factor, label=name, **look_of(place))
-            _finish(panel, answer, scale.label(what), heights.factor, reverses=unit in ("N", "N·m"))
-            if len(curves) == 1 and not curves[0][0]:
-                panel.set_ylim(0.0, 1.15 * float(np.nanmax(curves[0][2])) * scale.factor)
+        for panel, content in zip(axes, panels, strict=False):
+            _draw_panel(panel, answer, content, heights.factor)
         for unused in list(figure.axes)[len(panels) :]:
             unused.set_visible(False)
         for panel in list(figure.axes)[max(0, len(panels) - 2) : len(panels)]:
@@ -233,14 +218,63 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
     return figure
 
 
-def _finish(panel: Axes, answer: Elevation, label: str, factor: float, reverses: bool) -> None:
-    panel.set_ylabel(label)
+@dataclass(frozen=True)
+class PanelContent:
+    """The content of a panel over the elevation.
+
+    Attributes:
+        meaning: of the values.
+        unit: of the values, SI.
+        curves: values over the elevation by name; the name is empty where there is one curve alone.
+        small: whether they are deflections, which are shown in small units.
+    """
+
+    meaning: str
+    unit: str
+    curves: dict[str, Array]
+    small: bool = False
+
+
+def _panels(answer: Elevation) -> list[PanelContent]:
+    """List the panels in which something is known."""
+    commands = answer.corrections.command
+    motions = answer.components, component_units(answer.components), answer.displacement.T
+    loads = answer.actuators, map(load_unit, answer.turning), answer.loads.T
+    corrections = commands.actuators, commands.units, commands.corrections.T
+    moved, carried, corrected = (list(zip(*columns, strict=True)) for columns in (motions, loads, corrections))
+
+    def of_unit(unit: str, rows: list[Any]) -> dict[str, Array]:
+        return {name: values for name, unit_of_values, values in rows if unit_of_values == unit}
+
+    panels = [
+        PanelContent("displacement", "m", of_unit("m", moved), small=True),
+        PanelContent("rotation", "rad", of_unit("rad", moved), small=True),
+        PanelContent("first frequency", "Hz", {"": answer.frequency}),
+        PanelContent("force, pulling", "N", of_unit("N", carried)),
+        PanelContent("moment", "N·m", of_unit("N·m", carried)),
+        PanelContent("error, 95 %", "m", {} if answer.budget is None else {"": answer.error}, small=True),
+        *(PanelContent("correction", unit, of_unit(unit, corrected), small=True) for unit in ("m", "rad")),
+    ]
+    return [panel for panel in panels if any(np.isfinite(values).any() for values in panel.curves.values())]
+
+
+def _draw_panel(panel: Axes, answer: Elevation, content: PanelContent, angle_factor: float) -> None:
+    """Draw the curves of a panel; elevations are multiplied by a factor that brings them from rad to what is shown."""
+    display, curves = answer.machine.display, content.curves
+    scale = display.scale(content.unit)
+    if content.small:
+        scale = display.fitting(content.unit, np.concatenate(list(curves.values())))
+    for place, (name, values) in enumerate(curves.items()):
+        panel.plot(answer.elevations * angle_factor, values * scale.factor, label=name, **look_of(place))
+    panel.set_ylabel(scale.label(content.meaning))
     panel.margins(x=0.0)
-    if reverses:
+    if content.unit in ("N", "N·m"):
         panel.axhline(0.0, color="#444444", linewidth=0.8)
-        for each in answer.reversals:
-            panel.axvline(each.elevation * factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
-    if any(line.get_label() and not str(line.get_label()).startswith("_") for line in panel.get_lines()):
+        for reversal in answer.reversals:
+            panel.axvline(reversal.elevation * angle_factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
+    if "" in curves:
+        panel.set_ylim(0.0, ROOM_ABOVE_CURVE * float(np.nanmax(curves[""])) * scale.factor)
+    else:
         # Six drives are six curves all over the panel: a legend inside would cover some of them.
         panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=6.5, borderaxespad=0.2)
 
@@ -266,7 +300,7 @@ ELEVATION = Description(
         Records("reversals", "reversal", (
             Field("elevation", unit="rad", column="at_elevation"),
             Field("leg"),
-            Field("parts", lambda each: ", ".join(each.parts)),
+            Field("parts", lambda reversal: ", ".join(reversal.parts)),
             Field("jump", unit="m"),
             Field("turn", unit="rad"),
         ), forms=("json",)),

@@ -1,43 +1,48 @@
-"""Figures of answers at many poses: curves, contours, regions where the same legs carry, quantities along a path.
+"""Figures of answers at many poses: curves, contour maps, regions where the same legs carry, quantities along a path.
 
 Nothing is computed here.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from kinetostat.arrays import Array, Integers
+from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import named_entry
+from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.evaluation import PoseAnswers
+from kinetostat.studies.grid import failures
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
-from kinetostat.views.figures import (
-    contour_maps,
-    curves,
-    fill_regions,
-    look_of,
-    missing_line,
-    new_figure,
-    region_colours,
-    setting_lines,
-)
-from kinetostat.views.grid import axis_values, frequent_sets, quantities_of
-from kinetostat.views.map_scales import set_axis_scales
+from kinetostat.views.figures import STYLE, fill_regions, look_of, missing_line, new_figure, region_colours, slim_bar
+from kinetostat.views.grid import axis_values, display_of, frequent_sets, quantities_of
+from kinetostat.views.map_scales import levels_of, set_axis_scales, thin_numbers, trim_height
 from kinetostat.views.question import Drawing
 
 if TYPE_CHECKING:
     from kinetostat.studies.carrying import Carrying
 
+MOST_TICK_INTERVALS = 5
+"""Intervals between the numbers along an axis of a map: as many across as up, whatever shape the panel has."""
+MOST_CURVES_WITH_LEGEND_INSIDE = 6
+"""Number of curves up to which the legend stands in the panel; the legend of more would cover them."""
+SAME_ON_MAP = 1e-9
+"""Relative spread of values up to which a map is constant: its contours would only follow round-off."""
+MOST_COLOURED_COUNTS = 12
+"""Number of whole values up to which each has a colour; more colours cannot be told apart, and contours are drawn."""
 LEGEND_ROW = 0.17
 """Height of a line of the legend below a map, inches."""
 NO_RESULT_COLOUR = "#dddddd"
@@ -54,7 +59,7 @@ def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
         title: the title of the figure; the name of the machine if empty.
     """
     shown: dict[int, tuple[Callable[..., Figure], str, str]] = {
-        1: (curves, "sweep", "The quantities over the parameter that varies."),
+        1: (grid_curves, "sweep", "The quantities over the parameter that varies."),
         2: (contour_maps, "map", "The quantities over the two parameters that vary."),
     }
     if dataset["status"].ndim not in shown:
@@ -77,6 +82,153 @@ def carrying_figures(carrying: "Carrying") -> dict[str, Drawing]:
     caption, title = "Regions in which the same legs carry.", f"{carrying.machine.name}: legs that carry"
     draw = partial(carrying_map, carrying, title=title)
     return {"map": Drawing(caption, draw, file="carrying")} if carrying.is_map else {}
+
+
+def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+    """Draw a panel for each quantity over the two dimensions of a dataset, its contours labelled with their values.
+
+    Args:
+        dataset: two-dimensional, from `studies.grid.evaluate_grid`.
+        names: the quantities.
+        title: title of the whole figure.
+    """
+    across, up = dataset["status"].dims
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    with new_figure((2.75 * columns + 0.3, 2.45 * rows + 0.4), title, *setting_lines(dataset)) as figure:
+        mpl.rcParams["axes.grid"] = False
+        panels = figure.subplots(rows, columns, squeeze=False).flat
+        x, x_label = axis_values(dataset, str(across))
+        y, y_label = axis_values(dataset, str(up))
+        lines = []
+        for place, (panel, name) in enumerate(zip(panels, names, strict=False)):
+            scale = display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
+            panel_of = _count_panel if _is_count(dataset[name]) else _contour_panel
+            lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
+            _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
+            set_axis_scales(panel, dataset, str(across), str(up))
+            thin_numbers(panel)
+        trim_height(figure, figure.axes[0], 1.4 * rows)
+        for unused in list(figure.axes)[len(names) : rows * columns]:
+            unused.remove()
+    with mpl.rc_context(STYLE):
+        for contours in lines:
+            _write_levels(contours)
+    return figure
+
+
+def grid_curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+    """Draw quantities over the one dimension of a dataset, a panel for each unit; logarithmic where the range is.
+
+    Args:
+        dataset: one-dimensional, from `studies.grid.evaluate_grid`.
+        names: the quantities.
+        title: title of the whole figure.
+    """
+    (across,) = dataset["status"].dims
+    units = list(dict.fromkeys(dataset[name].attrs["units"] for name in names))
+    with new_figure((3.4 * len(units) + 0.2, 3.0), title, *setting_lines(dataset)) as figure:
+        for panel, unit in zip(figure.subplots(1, len(units), squeeze=False).flat, units, strict=True):
+            shown = [name for name in names if dataset[name].attrs["units"] == unit]
+            _curve_panel(panel, dataset, str(across), shown)
+    return figure
+
+
+def setting_lines(dataset: xr.Dataset) -> tuple[str, str, str]:
+    """Say in which frame and pose a grid lies, which loads do not count, and how many of its poses have no result."""
+    missing = missing_line(failures(dataset), dataset["status"].size)
+    frame_and_pose = "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text)
+    return frame_and_pose, dataset.attrs.get(LOADS_LEFT_OUT, ""), missing
+
+
+def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
+    """Fill a panel with bands of colour; return its lines, whose values can be written once the layout is fixed."""
+    values = np.ma.masked_invalid(data.values * scale.factor)
+    panel.set_title(scale.label(data.attrs["symbol"]))
+    panel.set_facecolor("#eeeeee")
+    panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
+    panel.locator_params(nbins=MOST_TICK_INTERVALS)
+    if values.count() == 0:
+        _write_in_middle(panel, "no result")
+        return []
+    if np.ptp(values.compressed()) <= SAME_ON_MAP * np.abs(values).max():
+        panel.set_facecolor("#b5dbe3")
+        _write_in_middle(panel, f"constant: {with_unit(number(float(values.compressed()[0])), scale.unit)}")
+        return []
+    levels = levels_of(values.compressed())
+    norm = LogNorm(levels.bounds[0], levels.bounds[-1]) if levels.logarithmic else None
+    filled = panel.contourf(x, y, values, levels.bounds, cmap="viridis", norm=norm, extend=levels.extend)
+    bar = panel.figure.colorbar(filled, ax=panel, shrink=0.85, pad=0.03)
+    if levels.logarithmic:
+        bar.set_ticks(levels.bounds.tolist(), labels=[f"{bound:g}" for bound in levels.bounds])
+    slim_bar(bar)
+    return [panel.contour(filled, levels=levels.bounds[::2], colors="white", linewidths=0.5)]
+
+
+def _label_outside(panel: Axes, below: str, beside: str) -> None:
+    """Label the axes of a panel of several that share them; a label is empty where another panel has it."""
+    panel.set(xlabel=below, ylabel=beside)
+    panel.tick_params(labelbottom=bool(below), labelleft=bool(beside))
+
+
+def _is_count(data: xr.DataArray) -> bool:
+    """Whether a quantity counts, and takes so few values that each can have a colour."""
+    name = str(data.name)
+    return name in QUANTITIES and QUANTITIES[name].whole and np.unique(data.values).size <= MOST_COLOURED_COUNTS
+
+
+def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
+    """Fill a panel with a colour for each whole number; between two poses there is no line to draw."""
+    values = np.unique(data.values[np.isfinite(data.values)])
+    if values.size < 2:
+        return _contour_panel(panel, x, y, data, scale)
+    panel.set_title(scale.label(data.attrs["symbol"]))
+    colours = region_colours(values.size)
+    mesh = fill_regions(panel, x, y, np.searchsorted(values, data.values), np.isfinite(data.values), colours)
+    bar = panel.figure.colorbar(mesh, ax=panel, shrink=0.85, pad=0.03, ticks=np.arange(values.size))
+    bar.set_ticklabels([f"{value:g}" for value in values])
+    slim_bar(bar)
+    return []
+
+
+def _write_levels(lines: QuadContourSet) -> None:
+    """Write the values of lines where they fit into the panel; the layout of the figure must be fixed."""
+    frame, uncut = lines.axes.get_window_extent(), [*lines.get_paths()]
+    texts = lines.clabel(fontsize=6, fmt="%.6g")
+    boxes = [text.get_window_extent() for text in texts]
+    fitting = [frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1) for box in boxes]
+    if not all(fitting):
+        for text in texts:
+            text.remove()
+        lines.set_paths(uncut)
+        if any(fitting):
+            places = [text.get_position() for text, fits in zip(texts, fitting, strict=True) if fits]
+            lines.clabel(fontsize=6, fmt="%.6g", manual=places)
+
+
+def _write_in_middle(panel: Axes, text: str) -> None:
+    panel.text(0.5, 0.5, text, transform=panel.transAxes, ha="center", va="center", fontsize=7.5)
+
+
+def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[str]) -> None:
+    x, x_label = axis_values(dataset, across)
+    logarithmic = bool(dataset[across].attrs["log"])
+    values = np.concatenate([dataset[name].values for name in names])
+    unit = dataset[names[0]].attrs["units"]
+    scale = display_of(dataset).fitting(unit, values)
+    for place, name in enumerate(names):
+        panel.plot(x, dataset[name].values * scale.factor, label=dataset[name].attrs["symbol"], **look_of(place))
+    if logarithmic:
+        panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
+    meaning = dataset[names[0]].attrs.get("long_name") or ", ".join(
+        plain_name(group) for group in dict.fromkeys(group_of([name]) or name for name in names)
+    )
+    panel.set(xlabel=x_label, ylabel=scale.label(meaning))
+    panel.margins(x=0.0)
+    if len(names) > MOST_CURVES_WITH_LEGEND_INSIDE:
+        panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        panel.legend(loc="best")
 
 
 def carrying_map(carrying: "Carrying", title: str) -> Figure:

@@ -24,7 +24,7 @@ from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import UNIT_OF_PERCENTS, Sensitivity
 from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
-from kinetostat.views.levels import usual_range
+from kinetostat.views.map_scales import usual_range
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
 

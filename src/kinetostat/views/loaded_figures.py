@@ -15,7 +15,7 @@ from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
-from kinetostat.views.drawing import Loop, flat, loop, views_of
+from kinetostat.views.drawing import Points, flat, ring_of, views_of
 from kinetostat.views.figures import COLOURS, STYLE, look_of, new_figure, set_title
 from kinetostat.views.layout import fix_layout
 from kinetostat.views.lettering import width_of
@@ -25,16 +25,16 @@ from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.scene.overlays import exaggerated_displacement, exaggeration_of, motions_of
 
 UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
-BAR = 0.24
-"""Inches of a bar."""
-NAMES = 2.0
-"""Inches for the names of legs, at least."""
-BENDS = 12
-"""Pieces of which a bent link is drawn."""
+BAR_HEIGHT = 0.24
+"""Height of the figure for each bar, inches: names of legs stand line by line beside them."""
+LEAST_NAME_WIDTH = 2.0
+"""Least room for the names of legs, inches: figures of different machines then begin alike."""
+PIECES_OF_LINK = 12
+"""Straight pieces of which a bent link is drawn: its corners cannot be seen in a view of a few centimetres."""
 MOST_SPRINGS = 12
 """Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
 
-Projection: TypeAlias = Callable[[Loop], tuple[list[float], list[float]]]
+Projection: TypeAlias = Callable[[Points], tuple[list[float], list[float]]]
 """Gives the coordinates of points in a picture, across and up."""
 
 
@@ -110,7 +110,7 @@ def moved_machine(
     factor = exaggeration_of(response, moved, proportions_of(machine, configuration).diagonal)
     point = machine.tool_point(configuration.platform)
     motion = exaggerated_displacement(moved.motion, point, factor)
-    heads = loop([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
+    heads = ring_of([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
 
     def draw(panel: Axes, project: Projection) -> None:
         for leg in configuration.legs:
@@ -118,7 +118,7 @@ def moved_machine(
         for points, colour in ((heads, UNLOADED), ([motion.apply(head) for head in heads], LOADED)):
             panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
         for link in moved.links:
-            bent = [link.point(i / BENDS, factor) for i in range(BENDS + 1)]
+            bent = [link.point(i / PIECES_OF_LINK, factor) for i in range(PIECES_OF_LINK + 1)]
             slack = link.leg in slack_legs
             dash, wide = ("--", 0.9) if slack else ("-", 1.6)
             panel.plot(*project(bent), dash, color=SLACK if slack else LOADED, linewidth=wide)
@@ -146,8 +146,8 @@ def bars_figure(state: LoadedState) -> Figure:
         (unit, turns) for unit, turns in (("N", False), ("N·m", True)) if any(s.turning is turns for _, s in shown)
     ]
     groups = [[(name, spring) for name, spring in shown if spring.turning is turns] for _, turns in kinds]
-    beside = max(NAMES, width_of(name for name, _ in shown))
-    with new_figure((beside + 4.6, 0.6 * len(groups) + BAR * len(shown))) as figure:
+    beside = max(LEAST_NAME_WIDTH, width_of(name for name, _ in shown))
+    with new_figure((beside + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
         heights = [len(group) + 1 for group in groups]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
         for panel, (unit, _), group in zip(panels, kinds, groups, strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.under_load import LoadedState, SpringState
+from kinetostat.units import component_units, load_unit, motion_unit
 from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiffness_sentence
 from kinetostat.views.question import Lines
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -99,7 +100,7 @@ def actuator_loads(state: LoadedState) -> list[tuple[str, bool, float]]:
 
 def displacement_table(state: LoadedState, display: Display) -> FittedTable:
     """Displacement of the tool under its loads, beside that of linear equations."""
-    units = ["rad" if name.startswith("r") else "m" for name in state.components]
+    units = component_units(state.components)
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
     table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
     for what, values in (("under load", state.displacement), ("to first order", state.linear)):
@@ -157,13 +158,12 @@ def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
     table = numeric_table("Springs by kind", "spring", ["least load", "greatest load", "deformation", "slack"])
     for (kind, turning), members in kinds.items():
         loads = [spring.load for spring in members]
-        ends = (display.show(end, "N·m" if turning else "N") for end in (min(loads), max(loads)))
+        ends = (display.show(end, load_unit(turning)) for end in (min(loads), max(loads)))
         most = max((spring.deformation for spring in members), key=abs)
         name = f"{kind} ×{len(members)}" if len(members) > 1 else members[0].name
         slack = sum(spring.slack for spring in members)
-        table.add_row(
-            name, *ends, display.show_deflection(most, "rad" if turning else "m"), str(slack) if slack else DASH
-        )
+        deformation = display.show_deflection(most, motion_unit(turning))
+        table.add_row(name, *ends, deformation, str(slack) if slack else DASH)
     return table
 
 
@@ -171,8 +171,8 @@ def spring_table(state: LoadedState, display: Display) -> FittedTable:
     """Load, deformation and state of every spring."""
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
-        load = display.show(spring.load, "N·m" if spring.turning else "N")
-        amount = display.show_deflection(spring.deformation, "rad" if spring.turning else "m")
+        load = display.show(spring.load, load_unit(spring.turning))
+        amount = display.show_deflection(spring.deformation, motion_unit(spring.turning))
         table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
     return table
 

@@ -1,25 +1,106 @@
-"""Scales of a map: which are equal or logarithmic, which numbers stand along them, and the room that they leave.
+"""Scales of a map: levels of its contours that few extreme poses cannot spoil, and the scales and numbers of its axes.
 
-Nothing is drawn here, and no values of the map are known.
+Nothing is drawn here. Next to a singularity compliance has no bound: levels follow the usual values.
 """
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from kinetostat.arrays import Array
+from kinetostat.frozen import dataclass
 from kinetostat.views.lettering import width_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
+USUAL_PERCENTILES = (2.0, 98.0)
+"""Percentiles between which values are usual: one pose in twenty-five may lie next to a singularity."""
+FAR_EXTREME = 1.0
+"""Distance of an extreme from the usual values, in units of their range, beyond which a map leaves it out."""
+WIDE_RATIO = 30.0
+"""Ratio of the usual values of a map, if all are positive, from which its colours follow the logarithm."""
+LEVELS = 12
+"""Number of bands of a map, about: as many colours as the eye tells apart."""
+SAME_LEVEL = 1e-9
+"""Share of the range of levels within which a level and an extreme differ by round-off alone."""
+STEPS_OF_DECADE = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
+"""Levels within a decade, from few decades to many."""
 MAP_WIDTH, LONG_NUMBER = 1.8, 0.3
 """Width of a map among others without its scales, and of a number that is long below it, inches."""
 
 
+def usual_range(values: Array) -> tuple[float, float]:
+    """Return the ends between which a map should resolve values: extremes only where they lie near all others.
+
+    A map of 41 x 41 poses with a single pose next to a singularity would otherwise be of one colour.
+
+    Args:
+        values: an array of any shape; those that are not finite are ignored, at least one must be finite.
+    """
+    finite = values[np.isfinite(values)]
+    least, low, high, greatest = np.percentile(finite, [0.0, *USUAL_PERCENTILES, 100.0])
+    far = FAR_EXTREME * (high - low)
+    return float(low if low - least > far else least), float(high if greatest - high > far else greatest)
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Levels of a map.
+
+    Attributes:
+        bounds: bounds of the bands, increasing.
+        logarithmic: whether they follow the logarithm.
+        extend: at which ends values lie beyond the bounds, as matplotlib calls it.
+    """
+
+    bounds: Array
+    logarithmic: bool
+    extend: Literal["neither", "min", "max", "both"]
+
+
+def levels_of(values: Array) -> Levels:
+    """Choose about `LEVELS` round levels over the usual range, by the logarithm where that is wide.
+
+    Args:
+        values: an array of any shape; two finite ones must differ.
+    """
+    finite = values[np.isfinite(values)]
+    low, high = usual_range(finite)
+    if low == high:  # nearly all values are equal, and only the extremes say something
+        low, high = float(finite.min()), float(finite.max())
+    logarithmic = low > 0.0 and high > WIDE_RATIO * low
+    linear = MaxNLocator(LEVELS + 1, min_n_ticks=1).tick_values
+    bounds = np.asarray(_round_powers(low, high) if logarithmic else linear(low, high))
+    for end, extreme in ((0, finite.min()), (-1, finite.max())):
+        if abs(bounds[end] - extreme) <= SAME_LEVEL * (bounds[-1] - bounds[0]):
+            bounds[end] = extreme  # a level that misses an extreme by round-off would leave a hole there
+    return Levels(bounds, logarithmic, _ends(bounds, finite))
+
+
+def _ends(bounds: Array, finite: Array) -> Literal["neither", "min", "max", "both"]:
+    below, above = bool(finite.min() < bounds[0]), bool(finite.max() > bounds[-1])
+    return "both" if below and above else "min" if below else "max" if above else "neither"
+
+
+def _round_powers(low: float, high: float) -> Array:
+    """Return 1, 2, 5 (1, 3; 1) times powers of ten from at most `low` to at least `high`: as many as a bar can show."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    for steps in STEPS_OF_DECADE:
+        every = [step * 10.0**power for power in range(first, last + 1) for step in steps]
+        inner = [n for n, value in enumerate(every) if low < value < high]
+        chosen = every[inner[0] - 1 : inner[-1] + 2]
+        if len(chosen) <= LEVELS + 2:
+            return np.array(chosen)
+    return np.array(chosen[:: -(-len(chosen) // LEVELS)])
+
+
 def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) -> None:
-    """Equal scales for two lengths of similar range, logarithmic ones where the grid is."""
+    """Set equal scales for two lengths of similar range, and logarithmic ones where the grid is."""
     lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
     spans = [np.ptp(dataset[name].values) for name in (across, up)]
     if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:

@@ -27,7 +27,8 @@ from kinetostat.studies.storage import write_text
 from kinetostat.views.answers import write_files
 from kinetostat.views.data_forms import csv_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import Tell, as_svg, contour_maps, curves, save
+from kinetostat.views.figures import Tell, as_svg, save
+from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.optimisation import designs_dataset
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.page import Markup, figure, table, whole_page
@@ -100,7 +101,7 @@ def figures(reproduction: Reproduction) -> dict[str, Drawing]:
     section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
     draw = {
         "machine": partial(three_views, reproduction.machine, title=MACHINE_TITLE),
-        "figure-4": partial(curves, reproduction.curves, GROUPS["stiffness"], title=FIGURE_4),
+        "figure-4": partial(grid_curves, reproduction.curves, GROUPS["stiffness"], title=FIGURE_4),
         "figure-5": partial(contour_maps, section, GROUPS["compliance"], title=FIGURE_5),
         "figure-6": partial(convergence, reproduction.search.log, title=FIGURE_6),
     }

@@ -17,9 +17,8 @@ from kinetostat.vibration.receptance import along, receptance
 from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
-from kinetostat.views.vibration import RESPONSE, axis_of
+from kinetostat.views.vibration import RESPONSE, drawn_directions
 
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 RIGID = "rigid"
 SAME_SHARE = 1e-9
 """Share by which two stiffnesses may differ by round-off."""
@@ -144,22 +143,20 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     """
     if answer.loops is None:
         raise ValueError("there is nothing to draw")
-    given = answer.frequencies
     scale = answer.machine.display.scale("N/m")
-    ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
-    free = [name for name, each in zip(answer.components, answer.standing, strict=True) if not math.isinf(each)]
-    ways = {name: way for name, way in ways.items() if name not in AXES or name in free}
-    closed = answer.receptance(given.tolist())
-    still = receptance(answer.loops.modes, answer.loops.damping, given)
+    stiffnesses = zip(answer.components, answer.standing, strict=True)
+    compliant = [name for name, stiffness in stiffnesses if not math.isinf(stiffness)]
+    directions = drawn_directions(answer.direction, compliant)
+    closed = answer.receptance(answer.frequencies.tolist())
+    standing = receptance(answer.loops.modes, answer.loops.damping, answer.frequencies)
     with new_figure(
         (5.6, 3.8), title.format(answer.machine.name), setting_of(answer.machine), "thin: motors that stand still"
     ) as figure:
         panel = figure.add_subplot()
-        for place, (name, way) in enumerate(ways.items()):
-            colour = COLOURS[place]
-            curves = [1.0 / np.abs(along(part, np.array(way))) * scale.factor for part in (closed, still)]
-            panel.loglog(given, curves[0], color=colour, linestyle=DASHES[place], label=f"along {name}")
-            panel.loglog(given, curves[1], color=colour, linewidth=0.7, alpha=0.6)
+        for colour, dashes, (name, axis) in zip(COLOURS, DASHES, directions.items(), strict=False):
+            thick, thin = (1.0 / np.abs(along(part, np.array(axis))) * scale.factor for part in (closed, standing))
+            panel.loglog(answer.frequencies, thick, color=colour, linestyle=dashes, label=f"along {name}")
+            panel.loglog(answer.frequencies, thin, color=colour, linewidth=0.7, alpha=0.6)
         panel.margins(x=0.0)
         panel.set_xlabel("frequency (Hz)")
         panel.set_ylabel(scale.label("dynamic stiffness"))

@@ -1,6 +1,6 @@
 """Natural frequencies and modes: the question, and the description of its answer. Nothing is computed here."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from kinetostat.algebra.screw import COMPONENTS
@@ -15,6 +15,8 @@ from kinetostat.views.analysis_tables import first_names
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 
+AXES: Mapping[str, Sequence[float]] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Axes of the base, along which the tool is looked at where no direction was asked for."""
 LEAST_SHARE = 0.005
 """Share of the energy of every mode below which a part has no line of its own."""
 MOST_PARTS = 12
@@ -84,9 +86,20 @@ def cut_of(answer: Vibration) -> str:
 
 
 def axis_of(direction: Sequence[float]) -> str:
-    """A direction by the name of its axis, "x", or by its three numbers, "1,0,2"."""
+    """Name a direction by its axis, "x", or by its three numbers, "1,0,2"."""
     axes = [name for name, part in zip("xyz", direction, strict=True) if part]
     return axes[0] if len(axes) == 1 else ",".join(f"{part:g}" for part in direction)
+
+
+def drawn_directions(direction: Sequence[float], components: Collection[str]) -> dict[str, Sequence[float]]:
+    """Return the directions of which a figure has curves, by name: the one that was asked for, or else the base axes.
+
+    Args:
+        direction: the direction that was asked for; empty if there was none.
+        components: names of the components of a motion that there are, such as "rx" and "z"; other axes are left out.
+    """
+    directions = {axis_of(direction): direction} if direction else AXES
+    return {name: axis for name, axis in directions.items() if name not in AXES or name in components}
 
 
 def strain_of(modes: Sequence[Mode]) -> list[Mapping[str, float]]:

@@ -35,8 +35,7 @@ from kinetostat.studies.workspace_verdicts import (
 )
 from kinetostat.views.figures import COLOURS, Drawings, fill_regions, new_figure, slim_bar
 from kinetostat.views.grid import axis_values, display_of
-from kinetostat.views.levels import WIDE_RATIO, usual_range
-from kinetostat.views.map_scales import set_axis_scales, trim_height
+from kinetostat.views.map_scales import WIDE_RATIO, set_axis_scales, trim_height, usual_range
 from kinetostat.views.question import Drawing
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")

@@ -17,7 +17,7 @@ from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import EXACT, Progress
 from kinetostat.studio.question_process import figure_html
-from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
+from kinetostat.studio.wording import engineering, gains, heading, paragraph, titled_table
 from kinetostat.views.comparison import (
     COMPARISON,
     change_kind,
@@ -31,7 +31,7 @@ from kinetostat.views.comparison import (
 from kinetostat.views.optimisation import percent_text
 
 SACRIFICED = 0.01
-"""A remark says so if a direction keeps less than this share of its initial stiffness."""
+"""Share of its initial stiffness below which a direction has been given up for the others, so that a remark says so."""
 
 
 def result_text(progress: Progress) -> str:
@@ -59,44 +59,41 @@ def _so_far(progress: Progress) -> str:
         space = progress.problem.space
         pairs = zip(space.searched_variables, space.values(progress.genes[0]), strict=True)
         rows += [[variable.name, variable.in_words(value, display)] for variable, value in pairs]
-    return heading("Best so far") + table("Best so far", ["", "best"], rows)
+    return titled_table("Best so far", ["", "best"], rows)
 
 
 def _objectives(progress: Progress, result: dict[str, Any], best: str) -> str:
     problem, rows = progress.problem, []
     for aim in problem.objectives:
-        before, after = (given["objectives"][aim.term.label] for given in (result["initial"], result))
+        before, after = (design["objectives"][aim.term.label] for design in (result["initial"], result))
         rows.append([progress.label(aim), *_exact(progress.scale(aim), before, after), _ratio(before, after)])
     for bound in problem.constraints:
-        values = (given["constraints"][bound.label] for given in (result["initial"], result))
+        values = (design["constraints"][bound.label] for design in (result["initial"], result))
         texts = (problem.machine.display.show(value, bound.term.unit) for value in values)
         rows.append([bound.in_words(problem.machine.display), *texts, ""])
     title = "Objectives and constraints" if problem.constraints else "Objectives" if len(rows) > 1 else "Objective"
-    return heading(title) + table(title, ["", "initial", best, "ratio"], rows)
+    return titled_table(title, ["", "initial", best, "ratio"], rows)
 
 
 def _design(problem: Problem, result: dict[str, Any]) -> str:
-    rows = []
+    rows, display = [], problem.machine.display
     bounds, slopes = result["at_bounds"], result["sensitivity"]
-    first = {variable.name: variable for variable in problem.space.searched_variables}
+    variables = {variable.name: variable for variable in problem.space.searched_variables}
     for path, value in result["variables"].items():
-        variable = first.get(path)
-        if variable is None or variable.choices is not None:
-            before, after = DASH, f"{value:.6g}"
-            before = variable.in_words(variable.initial, problem.machine.display) if variable else before
-        else:
-            before, after = (variable.in_words(v, problem.machine.display) for v in (variable.initial, value))
+        variable = variables.get(path)
+        before = DASH if variable is None else variable.in_words(variable.initial, display)
+        after = variable.in_words(value, display) if variable and variable.choices is None else f"{value:.6g}"
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(map(percent_text, percents))])
     note = paragraph(
         "% per %: by how many percent the objective changes if the variable grows by 1 % (an angle by 0.01 rad).",
         "note",
     )
-    return heading("Design") + table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design") + note
+    return titled_table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design") + note
 
 
 def _directions(result: dict[str, Any]) -> str:
-    rows = [(each["name"].removeprefix("compliance_"), each["gain"]) for each in result["directions"]]
+    rows = [(row["name"].removeprefix("compliance_"), row["gain"]) for row in result["directions"]]
     over = "" if result["poses"]["count"] == 1 else " (worst of all poses)"
     title = f"Stiffness, times that of the initial design{over}"
     return heading(title) + gains("stiffness gain", [row for row in rows if row[1] is not None])
@@ -111,17 +108,16 @@ def _robustness(progress: Progress, result: dict[str, Any]) -> str:
         spread = scatter["objectives"][aim.term.label]
         rows.append([progress.label(aim), *_exact(progress.scale(aim), *(spread[key] for key in keys))])
     title = f"With tolerances: {scatter['machines']:,} machines"
-    return heading(title) + table(title, ["", "nominal", "mean", "reached by 95 %", "worst"], rows)
+    return titled_table(title, ["", "nominal", "mean", "reached by 95 %", "worst"], rows)
 
 
 def _remarks(result: dict[str, Any]) -> list[str]:
     bounded = [f"{name} ({bound})" for name, bound in result["at_bounds"].items()]
     remarks = [f"At a bound: {', '.join(bounded)}. Wider bounds would allow a better design."] if bounded else []
-    for each in result["directions"]:
-        if each["gain"] is not None and each["gain"] < SACRIFICED:
-            name = each["name"].removeprefix("compliance_")
-            gain = f"{each['gain']:.2g}"
-            remarks.append(f"In the direction {name}, the best design keeps only {gain} of the initial stiffness.")
+    for direction in result["directions"]:
+        gain, name = direction["gain"], direction["name"].removeprefix("compliance_")
+        if gain is not None and gain < SACRIFICED:
+            remarks.append(f"In the direction {name}, the best design keeps only {gain:.2g} of the initial stiffness.")
     return remarks + (result["ridges_text"] if result["front"] is None else [])
 
 
@@ -140,22 +136,22 @@ def comparison_text(comparison: Comparison) -> str:
         _legend(comparison, letters),
         heading("Stiffness, times that of A (logarithmic bars; orange: less stiff)"),
         _gains(comparison, letters),
+        _numbers_table("At the pose of each design", comparison, comparison.rows),
     ]
-    parts += _rows("At the pose of each design", comparison, comparison.rows)
     if comparison.where:
         over = [replace(row, name=f"{row.group} {row.name}") for row in comparison.over]
-        parts += _rows(f"{comparison.where[0].upper()}{comparison.where[1:]}", comparison, over)
+        parts.append(_numbers_table(f"{comparison.where[0].upper()}{comparison.where[1:]}", comparison, over))
     if comparison.verdicts:
         display = comparison.machine.display
-        judged = [[": ".join(condition_of(row)), *(verdict_text(each, display) for each in row)]
+        judged = [[": ".join(condition_of(row)), *(verdict_text(verdict, display) for verdict in row)]
                   for row in comparison.verdicts]  # fmt: skip
         title = "Requirements, with the worst value and its distance from the bound"
-        parts += [heading(title), table(title, ["", *letters], judged, "words")]
-    parts += [heading("Where they differ"), _differences(comparison, letters)]
+        parts.append(titled_table(title, ["", *letters], judged, "words"))
+    parts.append(_differences(comparison, letters))
     if any(comparison.softest):
-        named = [[letter, *softest_texts(each)] for letter, each in zip(letters, comparison.softest, strict=True)]
+        named = [[letter, *softest_texts(softest)] for letter, softest in zip(letters, comparison.softest, strict=True)]
         title = "Largest contributions in the softest directions"
-        parts += [heading(title), table(title, ["", "rotation", "translation"], named, "words")]
+        parts.append(titled_table(title, ["", "rotation", "translation"], named, "words"))
     return "".join([*parts, *map(figure_html, COMPARISON.drawings(comparison).values())])
 
 
@@ -171,25 +167,27 @@ def _gains(comparison: Comparison, letters: str) -> str:
     """Return bars of the compliance of A over that of each other design."""
     compliances = [row for row in comparison.rows if row.group == "compliance"]
     columns = []
-    for k, letter in enumerate(letters[1:], 1):
-        known = [(row.name.removeprefix("C_"), _gain(row, k)) for row in compliances]
-        shown = gains(f"{letter} against A", [(name, gain) for name, gain in known if gain is not None])
+    for place, letter in enumerate(letters[1:], 1):
+        candidates = [(row.name.removeprefix("C_"), _gain(row, place)) for row in compliances]
+        shown = gains(f"{letter} against A", [(name, gain) for name, gain in candidates if gain is not None])
         columns.append(f"<div><h4>{letter}</h4>{shown}</div>")
     return f'<div class="gains">{"".join(columns)}</div>'
 
 
-def _gain(row: DesignRow, k: int) -> float | None:
-    first, other = row.values[0], row.values[k]
+def _gain(row: DesignRow, place: int) -> float | None:
+    """Return the value of the first design over that of another one; None where either has none."""
+    first, other = row.values[0], row.values[place]
     if first is None or other is None or not other or not math.isfinite(first) or not math.isfinite(other):
         return None
     return first / other
 
 
-def _rows(title: str, comparison: Comparison, rows: Sequence[DesignRow]) -> list[str]:
+def _numbers_table(title: str, comparison: Comparison, rows: Sequence[DesignRow]) -> str:
+    """Return a table with the numbers of each design, the best of each row in bold, and their changes against A."""
     head = "".join(f'<th scope="col">{letter}</th>' for letter in letters_of(comparison))
     body = "".join(_row(row, comparison.machine.display) for row in rows)
     columns = f"<caption>{escape(title)}</caption><thead><tr><th></th>{head}</tr></thead>"
-    return [heading(title), f'<table class="figures">{columns}<tbody>{body}</tbody></table>']
+    return f'{heading(title)}<table class="figures">{columns}<tbody>{body}</tbody></table>'
 
 
 def _row(row: DesignRow, display: Display) -> str:
@@ -209,4 +207,7 @@ def _change(row: DesignRow, percent: float | None) -> str:
 
 def _differences(comparison: Comparison, letters: str) -> str:
     rows = [[path, *values] for path, values in differing_fields(comparison).items()]
-    return table("Where they differ", ["", *letters], rows) if rows else paragraph("The designs do not differ.")
+    title = "Where they differ"
+    if not rows:
+        return heading(title) + paragraph("The designs do not differ.")
+    return titled_table(title, ["", *letters], rows)

@@ -21,7 +21,8 @@ from kinetostat.studio.elements import toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
+from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table, titled_table
+from kinetostat.units import component_units, load_unit, motion_unit
 from kinetostat.views.analysis_tables import actuator_table, entry_unit, matrix_units
 from kinetostat.views.loaded_tables import (
     actuator_sentence,
@@ -135,7 +136,7 @@ def _principal(analysis: Analysis) -> str:
         for n, (stiffness, direction) in enumerate(zip(block.stiffnesses, block.directions, strict=True), 1)
     ]
     title = "Principal stiffnesses"
-    return heading(title) + table(title, ["", "stiffness", "direction"], rows)
+    return titled_table(title, ["", "stiffness", "direction"], rows)
 
 
 def _pose(analysis: Analysis) -> str:
@@ -159,7 +160,7 @@ def _pose(analysis: Analysis) -> str:
             ["least singular value of the joints of a leg", engineering(mobility.leg_least_singular_value)],
             ["least singular value of what holds the platform", engineering(mobility.platform_least_singular_value)],
         ]
-    return heading("Pose") + table("Pose", ["", ""], rows)
+    return titled_table("Pose", ["", ""], rows)
 
 
 def _centres(analysis: Analysis) -> str:
@@ -174,7 +175,7 @@ def _centres(analysis: Analysis) -> str:
         for name, point in centres.items()
     ]
     title = f"Centres, measured from the {analysis.machine.reference}"
-    return heading(title) + table(title, ["", "x, y, z"], rows)
+    return titled_table(title, ["", "x, y, z"], rows)
 
 
 class LoadsPanel(Panel):
@@ -213,7 +214,7 @@ def load_text(analysis: Analysis) -> str:
 
 def loaded_text(state: LoadedState) -> str:
     """The state of rest: its verdict, a bar for each leg, displacement, springs (many: their kinds), stiffness now."""
-    display, units = state.machine.display, ["rad" if name.startswith("r") else "m" for name in state.components]
+    display, units = state.machine.display, component_units(state.components)
     linear = [None] * len(units) if state.linear is None else state.linear.tolist()
     moved = [
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
@@ -241,7 +242,7 @@ def tension_bars(state: LoadedState) -> str:
     }
     rows, legs = [], {}
     for name, spring in shown:
-        load = "slack" if spring.slack else state.machine.display.show(spring.load, "N·m" if spring.turning else "N")
+        load = "slack" if spring.slack else state.machine.display.show(spring.load, load_unit(spring.turning))
         rows.append((name, spring.load / (largest[spring.turning] or 1.0), load))
         legs[name] = spring.leg
     return bars("load of each leg, positive where it pulls", rows, legs)
@@ -257,7 +258,7 @@ def _tangents(state: LoadedState) -> str:
 
 
 def _load_cells(load: float, motion: float, turning: bool, display: Display) -> list[str]:
-    return [display.show(load, "N·m" if turning else "N"), display.show_deflection(motion, "rad" if turning else "m")]
+    return [display.show(load, load_unit(turning)), display.show_deflection(motion, motion_unit(turning))]
 
 
 NONE = 'The file has no requirements; a table [requirements] with NAME = "free_stiffness_z > 50 N/um" adds one.'

@@ -28,8 +28,9 @@ from kinetostat.views.analysis_tables import (
     shares_table,
     stiffness_table,
 )
-from kinetostat.views.figures import contour_maps, curves, missing_line
+from kinetostat.views.figures import missing_line
 from kinetostat.views.grid import axis_values, display_of
+from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.report.content import (
     Block,
     Figure,
@@ -264,7 +265,7 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
     about = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
     if (maps["status"] != int(Status.OK)).all():
         return [Paragraph(about)]
-    draw = contour_maps if len(dims) == 2 else curves
+    draw = contour_maps if len(dims) == 2 else grid_curves
     return [
         Paragraph(about),
         figure_of(draw(maps, names, ""), "Compliance in each direction over the poses."),
