@@ -15,6 +15,7 @@ from cable_energy import BALANCED, Energy, platform_displacement
 from grown_legs import LENGTH
 from same_machines import in_other_units, quarter, reordered, turned, with_matrices
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Evaluation, evaluate, responses
 from kinetostat.engine.points import PointTable
@@ -392,7 +393,8 @@ def work_of_drives(case: Case) -> str | None:
     places = [position + rotation @ offset for position, rotation in placed]
     turn = placed[1][1] @ placed[0][1].T
     twist = [*(np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0)]
-    work = float(np.dot(load.wrench, [*twist, *(places[1] - places[0])]))
+    motion = dict(zip(COMPONENTS, [*twist, *(places[1] - places[0])], strict=True))
+    work = float(np.dot(load.wrench, [motion[name] for name in load.components]))
     drives = sum(carried[name] * m for name, m in moved.items())
     terms = sum(abs(carried[name] * m) for name, m in moved.items())
     size = max(abs(work), terms, 1e-300)

@@ -15,6 +15,7 @@ from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.machine.actuators import senses_of
 from kinetostat.machine.parameters import with_values
+from kinetostat.views.answers import plain_of
 from kinetostat.views.notebook import html_of
 from machines import column, load_without_limits
 from refusals import refused
@@ -97,7 +98,7 @@ def test_halving_the_cells_quarters_the_stated_error():
 def test_cells_without_a_state_of_rest_are_counted():
     table = correction_table(load_without_limits("delta", ["load.force=[0, 0, -30]"]), "x=0:5:3")
     assert table.unknown == 2
-    assert "2 of 2 cells" in table.message
+    assert "2 of 2 cells have a corner or a middle without a command (4 out of reach)." in table.message
     assert np.isfinite(table.corrections[0]).all()
     assert np.isnan(table.corrections[2]).all()
 
@@ -109,7 +110,7 @@ def test_cells_without_a_state_of_rest_are_counted():
         ("x=0:1 cm:3", 0.0, "greater than 0"),
         ("x=0:1 cm:1000000", None, "at most 200,000"),
         (["x=0:1 cm:3", "x=0:1 cm:3"], None, "varied twice"),
-        ("x=9:10:3", None, "reaches none of these poses"),
+        ("x=9:10:3", None, r"^Delta: 5 of 5 poses have no command \(5 out of reach\). Pose 1: The rod of leg 2 would have to span"),
     ],
 )
 def test_tables_that_cannot_be_made_are_refused(over, tolerance, pattern):
@@ -118,7 +119,7 @@ def test_tables_that_cannot_be_made_are_refused(over, tolerance, pattern):
 
 
 def test_a_table_of_a_machine_that_falls_is_refused():
-    with refused("comes to rest at no point of this table"):
+    with refused(r"2 of 2 poses have no command \(2 no rest\). Pose 1: The machine comes to no rest under its loads"):
         correction_table(column(2600), "roll=0 deg:0.01 deg:2")
 
 
@@ -155,3 +156,18 @@ def test_words_that_contradict_each_other_are_refused(words, pattern, capsys):
 def test_without_loads_there_is_nothing_to_correct(capsys):
     assert main(["command", "hexapod", "--over", "x=0:1 cm:3"]) == 0
     assert "No load moves the tool" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "poses", "words", "reason"),
+    [
+        ("delta", {"x": [0.0, 5.0]}, ["ok", "out_of_reach"], "1 of 2 poses has no command (1 out of reach). Pose 2: The"),
+        ("hexapod", {"yaw": [np.pi / 2]}, ["singular"], "The pose is singular (actuation singularity). With all"),
+        ("hexapod", {"x": [20.0, 0.0, 20.0]}, ["no_rest", "ok", "no_rest"], "(2 no rest). Pose 1: The machine comes to"),
+    ],
+)
+def test_poses_without_a_command_have_their_true_reason(name, poses, words, reason):
+    answer = command(load_without_limits(name, ["load.force=[0, 0, -100]"]), poses)
+    assert plain_of(answer)["status"] == words
+    assert reason in answer.message
+    assert answer.settled.tolist() == np.isfinite(answer.coordinates).all(axis=1).tolist()

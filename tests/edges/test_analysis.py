@@ -280,3 +280,19 @@ def test_a_pose_beyond_a_limit_says_where_the_machine_stands(capsys):
     assert len(answer["actuators"]) == 6
     assert answer["singularity_margin"] > 0.1
     assert answer["stiffness"] is None
+
+
+@pytest.mark.parametrize("axes", ["base", "platform"])
+def test_a_planar_machine_has_three_components_in_every_wrench_and_motion(axes):
+    machine = load("planar-3rpr", ["load.force=[10, 20, 0]", "load.moment=[0, 0, 3]", "tool.offset=[0.01, 0.02, 0]"])
+    analysis = analyze(machine, axes)
+    case = analysis.load
+    assert case.components == analysis.components == ("rz", "x", "y")
+    np.testing.assert_allclose(case.deflection, analysis.C @ case.wrench, rtol=1e-12)
+    if axes == "base":
+        assert case.wrench.tolist() == [3.0, 10.0, 20.0]
+    assert {len(reaction.wrench) for reaction in case.reactions} == {3}
+    ends = [reaction.wrench for reaction in case.reactions if reaction.joint.endswith("base joint")]
+    assert np.sum(ends, axis=0)[1:] == pytest.approx(case.wrench[1:], rel=1e-12)
+    told = plain_of(analysis)["load"]
+    assert (told["wrench"], told["deflection"]) == (case.wrench.tolist(), case.deflection.tolist())

@@ -155,7 +155,9 @@ def test_print_shows_the_numbers_of_the_json(capsys, name):
     if data["stiffness"] is not None:
         assert f"{display.number(data['stiffness_condition'])} of K" in text
     assert f"Moving mass: {display.show(numbers['mass'], 'kg')}" in text
-    moved = math.hypot(*data["load"]["deflection"][3:])
+    assert data["load"]["components"] == data["components"]
+    moves = zip(data["components"], data["load"]["deflection"], strict=True)
+    moved = math.hypot(*(size for component, size in moves if not component.startswith("r")))
     assert f"moves {display.show_deflection(moved, 'm')}" in text
     panel = cells(indices_text(analyze(load(name, changes[1::2]))))
     assert panel["singularity margin (0 to 1)"] == margin

@@ -3,11 +3,13 @@
 import json
 import pickle
 
+import numpy as np
 import pytest
 
-from kinetostat import build, load, save
+from kinetostat import analyze, build, evaluate, load, save
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
@@ -65,6 +67,26 @@ def test_the_workspace_of_a_loaded_machine_is_where_it_comes_to_rest(capsys, tmp
     assert (nodes["inside"], nodes["no rest under load"]) == (3, 12)
     assert answer(capsys, *words, "--set", "load.state=free")[1]["nodes"]["no rest under load"] == 0
     assert answer(capsys, *words, "--set", "load.state=free", "--loaded")[1]["nodes"] == nodes
+
+
+@pytest.mark.parametrize("count", [3, 3000])  # the solver for any machine, and programs
+@pytest.mark.parametrize("limits", ["", "[limits]\nactuator_force = 1e6\n"])
+def test_what_follows_from_wrenches_has_one_number_whatever_is_asked_beside_it(count, limits):
+    """At x = 0 tension alone holds upright cables: the machine rests there, and K, C and the margin have no number."""
+    machine = build(CABLES.replace("min_tension = 50\n", limits))
+    poses = {"x": np.linspace(0.0, 0.4, count)}
+    at_rest = evaluate(machine, poses, ["displacement_x", "actuator_force"])
+    assert not at_rest.status.any()
+    of_wrenches = ["singularity_margin", "stiffness_x", "compliance_y"]
+    beside = evaluate(machine, poses, ["displacement_x", *of_wrenches])
+    assert beside.status.values.tolist() == [Status.SINGULAR] + [Status.OK] * (count - 1)
+    np.testing.assert_allclose(beside["displacement_x"][1:], at_rest["displacement_x"][1:], rtol=1e-9, atol=1e-12)
+    for name in of_wrenches:
+        alone = evaluate(machine, poses, [name])
+        assert (alone.status == beside.status).all(), name
+        np.testing.assert_allclose(alone[name], beside[name], rtol=1e-9, err_msg=name)
+    known = analyze(machine.with_values(x=0.0))
+    assert (known.status, known.singularity_margin < 1e-12) == (Status.SINGULAR, True)
 
 
 def test_requirements_are_judged_and_decide_the_exit_code(capsys, tmp_path):

@@ -12,6 +12,7 @@ from elastic import leg_compliance
 from kinetostat.kinematics.closing import why_out_of_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.actuators import actuators_of
 from kinetostat.machine.loading import build, bundled
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.fields import optional
@@ -326,6 +327,13 @@ def test_a_driven_passive_leg_has_an_actuator_and_else_is_passive(name):
     free = respond(with_values(machine, {path: 0.0})).compliance.upper
     assert max(free) == INFINITE, "with a leg removed the platform is free"
     assert max(respond(machine).compliance.upper) < INFINITE
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_coordinate_and_the_load_of_a_drive_have_one_name(name):
+    configuration = load(name).configure()
+    driven = [spring for leg in configuration.legs for spring in leg.springs if spring.actuated]
+    assert [actuator.name for actuator in actuators_of(configuration)] == [spring.name for spring in driven]
 
 
 FAR = {

@@ -21,7 +21,13 @@ from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, needs_motion, rest_numbers
+from kinetostat.kinetostatics.quantities import (
+    QUANTITIES,
+    needs_masses,
+    needs_motion,
+    rest_numbers,
+    status_with_rest,
+)
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
@@ -211,7 +217,8 @@ def objectives_of(
     joints, columns = traced_joints(given, closed)
     response = respond(given.machine, joints)
     coordinates: tuple[Traced, ...] = ()
-    wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights], limited)
+    names = [name for weights in objectives for name, _ in weights]
+    wanted = rest_numbers(given.machine, names, limited)
     if wanted:
         equations = reduced.reduced_machine(given.machine, response, joints)
         coordinates = new_inputs(given.graph, equations.size)
@@ -230,6 +237,7 @@ def objectives_of(
                 loaded["factor"] = motions.factor(known[-1])
         if "frequency" in wanted and "frequency" not in loaded:
             loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, bool(paths))
+        status = status_with_rest(given.machine, names, response.status, status)
         response = replace(response, loaded=loaded, status=status)
     if mode_counts is not None and mode_counts.free:
         motions = springwise.motions_without_loads(given.machine, response, joints)
@@ -242,10 +250,9 @@ def objectives_of(
         vibration = slopes.vibrating(given.machine, response, joints, modes)
         coordinates = (*coordinates, *(unknowns := new_inputs(given.graph, vibration.columns)))
         response = replace(response, frequencies=vibrations.lowest_frequencies(vibration.squares(unknowns)))
-    elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
+    elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
         squares = vibrations.free_frequencies(given.machine, response, joints, bool(paths))
         response = replace(response, frequencies=squares)
-    names = [name for weights in objectives for name, _ in weights]
     response = response_in_motion(given.machine, response, joints, plan, names)
     code = response.status if judged else response.joint_status
     accepted = code < Status.OK + 0.5

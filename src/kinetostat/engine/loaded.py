@@ -32,7 +32,7 @@ from kinetostat.equilibrium.limit import snap_flags
 from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers
 from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
+from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers, status_with_rest
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
@@ -209,7 +209,8 @@ def _response_with_states(
     if at_rest := rest_numbers(machine, quantities):
         further = {name: compute for name, compute in FURTHER.items() if name in at_rest}
         loaded, at_rest_status = loaded_numbers(state, further)
-        status = np.where(np.isin(response.status, (Status.NO_REST,)), response.status, at_rest_status)
+        status = np.where(np.equal(response.status, Status.NO_REST), Status.NO_REST, at_rest_status)
+        status = status_with_rest(machine, quantities, response.status, status)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
     return response
 

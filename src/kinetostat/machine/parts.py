@@ -8,6 +8,7 @@ Points and axes are in the base frame.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
@@ -73,8 +74,11 @@ def built_in_bar(
 
 
 def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:
-    """Return the joint itself, passive, if the stiffness is zero by form, and otherwise an actuator with a name."""
-    return joint if is_zero(stiffness) else Spring(name, joint, stiffness, actuated=True)
+    """Return the joint itself, passive, if the stiffness is zero by form, and otherwise an actuator with a name.
+
+    The driven joint has the name of its actuator, so that its coordinate and its load stand under one name.
+    """
+    return joint if is_zero(stiffness) else Spring(name, replace(joint, name=name), stiffness, actuated=True)
 
 
 @dataclass(frozen=True)

@@ -244,7 +244,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     all_springs, length = springs(configuration), float(configuration.length)
     known = standing_fields(state)
     extremes = conditioning(response.legs, length, response.guide)
-    load = load_case(response, statics, turn)
+    load = load_case(response, statics, turn, kept)
     indices = indices_of(stiffness_rows, compliance_rows, length, kept)
     weakest = {name: softest(block, name, all_springs, statics) for name, block in (indices.free or {}).items()}
     return Analysis(

@@ -5,22 +5,24 @@ sentence for people. The equations are in `equilibrium.actuation`.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kinetostat.arrays import Array, Mask
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.batch import Progress, first_limit_passed, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.actuation import commanded_state
-from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, states_at
+from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, state_of, states_at
 from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, pose_of
 from kinetostat.kinematics.forward import leg_names
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.column import stacked_columns
@@ -52,6 +54,7 @@ class ActuatorTargets:
         left: distance of the tool point from its pose with the correction, m [n]; no actuator can lessen it.
         turned: angle by which the platform is still turned with the correction, rad [n].
         rates: motion of the tool point per unit of each coordinate [n x 3 x actuators].
+        status: `Status` codes [n]: OK with coordinates, otherwise why there are none.
     """
 
     actuators: tuple[Actuator, ...]
@@ -61,11 +64,12 @@ class ActuatorTargets:
     left: Array
     turned: Array
     rates: Array
+    status: Integers
 
     @property
     def settled(self) -> Mask:
         """Whether the machine comes to rest at each pose [n]."""
-        return np.asarray(np.isfinite(self.coordinates).all(axis=1))
+        return self.status == Status.OK
 
     @property
     def corrections(self) -> Array:
@@ -74,14 +78,9 @@ class ActuatorTargets:
 
     def split(self, count: int) -> tuple["ActuatorTargets", "ActuatorTargets"]:
         """The answer at the first `count` poses, and that at the others."""
-        return self._with_arrays(lambda values: values[:count]), self._with_arrays(lambda values: values[count:])
-
-    def where(self, settled: Mask) -> "ActuatorTargets":
-        """The answer with NaN at all other poses [n]."""
-        return self._with_arrays(lambda values: np.where(settled.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan))
-
-    def _with_arrays(self, change: Callable[[Array], Array]) -> "ActuatorTargets":
-        return ActuatorTargets(self.actuators, *(change(getattr(self, name)) for name in TARGET_ARRAYS))
+        parts = slice(count), slice(count, None)
+        first, others = (replace(self, **{n: getattr(self, n)[part] for n in TARGET_ARRAYS}) for part in parts)
+        return first, others
 
 
 TARGET_ARRAYS = [field.name for field in fields(ActuatorTargets)][1:]
@@ -100,7 +99,7 @@ def actuator_targets(
         progress: receives the number of poses that are solved, and that of all.
 
     Raises:
-        InputError: as for `MachineState.mechanism`; or no pose is reached, or the machine has no actuator.
+        InputError: as for `MachineState.mechanism`; or the machine has no place at any pose, or no actuator.
     """
     slabs = []
     for start in range(0, count, POSES_IN_SLAB):
@@ -110,14 +109,13 @@ def actuator_targets(
                 _targets_of_slab(machine, {path: column[rows] for path, column in columns.items()}, rows.stop - start)
             )
         progress(rows.stop, count)
-    names = next((slab.actuators for slab in slabs if slab is not None and slab.actuators), None)
-    if names is None:
-        raise InputError(
-            f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or "
-            "no actuator could be commanded; change the pose."
-        )
-    sizes = [min(POSES_IN_SLAB, count - start) for start in range(0, count, POSES_IN_SLAB)]
-    return _concatenation([slab or _empty_targets(names, size) for slab, size in zip(slabs, sizes, strict=True)])
+    actuators = next((slab.actuators for slab in slabs if slab.actuators), None)
+    if actuators is None:
+        status = np.concatenate([slab.status for slab in slabs])
+        if np.isin(status, WITHOUT_SEARCH_FOR_REST).all():
+            raise InputError(f"{machine.name}: {without_command(machine, columns, status)}")
+        raise InputError(f"{machine.name} has no actuator that can be commanded; mark one with actuated = true.")
+    return _concatenation([slab if slab.actuators else _empty_targets(actuators, slab.status) for slab in slabs])
 
 
 def _concatenation(slabs: list[ActuatorTargets]) -> ActuatorTargets:
@@ -126,38 +124,41 @@ def _concatenation(slabs: list[ActuatorTargets]) -> ActuatorTargets:
     )
 
 
-def _empty_targets(actuators: tuple[Actuator, ...], count: int) -> ActuatorTargets:
-    size = len(actuators)
+def _empty_targets(actuators: tuple[Actuator, ...], status: Integers) -> ActuatorTargets:
+    """The answer where no pose has a command."""
+    count, size = len(status), len(actuators)
     shapes = ((count, size), (count, size), (count,), (count,), (count,), (count, 3, size))
-    return ActuatorTargets(actuators, *(np.full(shape, np.nan) for shape in shapes))
+    return ActuatorTargets(actuators, *(np.full(shape, np.nan) for shape in shapes), status)
 
 
-def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int) -> ActuatorTargets | None:
-    """Solve one slab of poses; None where the machine can have no state of rest at any of them."""
+def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int) -> ActuatorTargets:
+    """Solve one slab of poses; without actuators where the machine can have no state of rest at any of them."""
     state = states_at(machine, columns, count)
-    status = np.broadcast_to(state.free.status, (count,))
+    status = np.broadcast_to(state.free.status, (count,)).astype(np.int64)
     rows = np.flatnonzero(~np.isin(status, WITHOUT_SEARCH_FOR_REST))
     if not len(rows):
-        return None
+        return _empty_targets((), status)
     placed = {path: column[rows] for path, column in columns.items()}
     reached = _targets_at(state.at(rows), machine, placed)
     if len(rows) == count:
         return reached
-    targets = _empty_targets(reached.actuators, count)
+    targets = _empty_targets(reached.actuators, status)
     for name in TARGET_ARRAYS:
         getattr(targets, name)[rows] = getattr(reached, name)
     return targets
 
 
 def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> ActuatorTargets:
-    """Solve poses all of which the machine reaches; NaN where the state of rest is not stable."""
+    """Solve poses at all of which the machine has a place; NaN where the state of rest is not stable."""
     mechanism, count = state.mechanism, state.count
     actuators, stands, senses = _actuators(machine, columns, state.free, state.joints, count)
     names = [actuator.name for actuator in actuators]
     chosen = [names.index(name) for name in mechanism.actuators]
     actuators, stands, senses = [actuators[i] for i in chosen], stands[:, chosen], senses[:, chosen]
+    status = np.broadcast_to(state.free.status, (count,))
+    status = np.where(status == Status.SINGULAR, Status.SINGULAR, Status.NO_REST).astype(np.int64)
     if not actuators:
-        return _empty_targets((), count)
+        return _empty_targets((), status)
     length = mechanism.length
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
     answer = commanded_state(mechanism)
@@ -167,10 +168,9 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
     turned = np.linalg.norm(answer.off[:, :3], axis=1)
     rates = answer.rates[:, 3:] * (length[:, None] / units)[:, None]
-    targets = ActuatorTargets(
-        tuple(actuators), stands + equations.state.amounts * units, stands, before, left, turned, rates
-    )
-    return targets.where(stable)
+    numbers = stands + equations.state.amounts * units, stands, before, left, turned, rates
+    known = [np.where(stable.reshape(-1, *[1] * (each.ndim - 1)), each, np.nan) for each in numbers]
+    return ActuatorTargets(tuple(actuators), *known, np.where(stable, Status.OK, status).astype(np.int64))
 
 
 def _actuators(
@@ -212,7 +212,7 @@ class Command(ImmutableAnswer):
         before: distance of the tool point from its pose without a correction, m [poses].
         left: distance of the tool point from its pose with the correction, m [poses]: no actuator can change it.
         turned: angle by which the platform is still turned with the correction, rad [poses].
-        settled: whether the machine comes to rest [poses].
+        status: `Status` codes [poses]: OK with coordinates, otherwise why there are none.
         message: the answer in a sentence.
     """
 
@@ -225,8 +225,13 @@ class Command(ImmutableAnswer):
     before: Array
     left: Array
     turned: Array
-    settled: Mask
+    status: Integers
     message: str
+
+    @property
+    def settled(self) -> Mask:
+        """Whether the machine comes to rest [poses]."""
+        return self.status == Status.OK
 
     @property
     def corrections(self) -> Array:
@@ -318,6 +323,7 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         poses: the poses; None for the pose of the machine alone.
         answer: the coordinates found at these poses.
     """
+    leaves = {} if poses is None else poses.leaves
     return Command(
         machine=machine,
         poses=poses,
@@ -328,21 +334,44 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         before=answer.before,
         left=answer.left,
         turned=answer.turned,
-        settled=answer.settled,
-        message=_message(machine, answer.settled, answer.before, answer.left)
-        + _limits_passed(machine, {} if poses is None else poses.leaves, answer.settled),
+        status=answer.status,
+        message=_message(machine, leaves, answer) + _limits_passed(machine, leaves, answer.settled),
     )
 
 
-def _message(machine: Machine, settled: Mask, before: Array, left: Array) -> str:
-    at_rest, show = int(settled.sum()), machine.display.show_deflection
-    if not at_rest:
-        return "The machine comes to rest at none of these poses; reduce the load, or preload what only pulls."
-    without = "" if settled.all() else f" {len(settled) - at_rest} of {len(settled)} poses have no state of rest."
+def _message(machine: Machine, columns: Mapping[str, Array], answer: ActuatorTargets) -> str:
+    settled, show = answer.settled, machine.display.show_deflection
+    without = "" if settled.all() else without_command(machine, columns, answer.status)
+    if not settled.any():
+        return without
     return (
-        f"Commanded so, the tool point is off by at most {show(float(np.nanmax(left)), 'm')}; without a correction by "
-        f"{show(float(np.nanmax(before)), 'm')}.{without}"
-    )
+        f"Commanded so, the tool point is off by at most {show(float(np.nanmax(answer.left)), 'm')}; without a "
+        f"correction by {show(float(np.nanmax(answer.before)), 'm')}. {without}"
+    ).rstrip()
+
+
+def without_command(machine: Machine, columns: Mapping[str, Array], status: Integers) -> str:
+    """Say how many poses have no command for which reasons, and the reason of the first one in full.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        columns: values of the parameters that vary, by leaf path, SI [n].
+        status: `Status` codes [n], not all of them OK.
+    """
+    lost = np.flatnonzero(status != Status.OK)
+    here = with_values(machine, {path: float(column[lost[0]]) for path, column in columns.items()})
+    first = Status(int(status[lost[0]]))
+    reason = first.sentence if first is Status.NO_REST else state_of(here).refusal
+    if len(status) == 1:
+        return reason
+    has = "has" if len(lost) == 1 else "have"
+    return f"{len(lost)} of {len(status)} poses {has} no command ({counted(status)}). Pose {lost[0] + 1}: {reason}"
+
+
+def counted(status: Integers) -> str:
+    """Count the statuses that are not OK, such as "2 out of reach, 1 no rest"."""
+    counts = Counter(Status(code).word.replace("_", " ") for code in status[status != Status.OK].tolist())
+    return ", ".join(f"{count} {word}" for word, count in counts.items())
 
 
 def _limits_passed(machine: Machine, columns: Mapping[str, Array], settled: Mask) -> str:

@@ -25,7 +25,15 @@ from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
-from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
+from kinetostat.studies.commanding import (
+    ActuatorTargets,
+    Command,
+    actuator_targets,
+    command_of,
+    counted,
+    refuse_tensions,
+    without_command,
+)
 from kinetostat.studies.poses import PoseColumns, chosen_axes, grid_of
 from kinetostat.tolerances import EXACT_LAW
 
@@ -164,7 +172,7 @@ class CorrectionTable(ImmutableAnswer):
         before: the largest error of the tool point without corrections, at points and middles of cells, m.
         left: the largest error that exact commands leave, m: what no actuator of the machine can change.
         error: the largest further error by interpolation, at the middles of cells, m; NaN if no cell is complete.
-        unknown: how many cells have a corner or middle without a state of rest.
+        unknown: how many cells have a corner or middle without a command.
         law: the shortest law of the corrections.
         law_error: its largest error at points and middles of cells, m.
         tolerance: greatest error of the law, m.
@@ -256,9 +264,7 @@ def _table_of(
     nodes, cells = answers
     axes, points = tuple(axis.values for axis in grid.axes), _points(grid)
     if not nodes.settled.any():
-        raise InputError(
-            f"{machine.name} comes to rest at no point of this table; reduce the load, or preload what only pulls."
-        )
+        raise InputError(f"{machine.name}: {without_command(machine, grid.columns(0, grid.size), nodes.status)}")
     errors = _errors(cells, _at_middles(nodes.corrections, grid.shape))
     before, left = (
         float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)]))) for name in ("before", "left")
@@ -273,7 +279,9 @@ def _table_of(
     largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
     unknown = int((~np.isfinite(errors)).sum())
     command = command_of(machine, PoseColumns(fields, points, {}), nodes)
-    message = _message(machine, before, left, largest, unknown, len(errors))
+    lost = counted(np.concatenate([nodes.status, cells.status]))
+    missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})." if unknown else ""
+    message = _message(machine, before, left, largest, missing)
     return CorrectionTable(
         command,
         fields,
@@ -311,7 +319,7 @@ def _errors(solved: ActuatorTargets, corrections: Array) -> Array:
     return np.asarray(np.linalg.norm(off, axis=1))
 
 
-def _message(machine: Machine, before: float, left: float, error: float, unknown: int, cells: int) -> str:
+def _message(machine: Machine, before: float, left: float, error: float, missing: str) -> str:
     show = machine.display.show_deflection
     if not before:
         return (
@@ -323,6 +331,4 @@ def _message(machine: Machine, before: float, left: float, error: float, unknown
             f"Interpolated linearly, the table leaves at most {show(error, 'm')} (at the middles of its cells)"
             + (f", beside the {show(left, 'm')} that no actuator can change." if left > 0.0 else ".")
         )
-    if unknown:
-        sentences.append(f"{unknown} of {cells} cells have a corner or a middle without a state of rest.")
-    return " ".join(sentences)
+    return " ".join([*sentences, missing]).rstrip()

@@ -4,17 +4,18 @@ The formulas are in `kinetostatics.loading`.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS, Wrench
-from kinetostat.algebra.vector import Rotation
+from kinetostat.algebra.symmetric import SIZE
+from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.assembly import Statics
-from kinetostat.kinetostatics.loading import JointReaction, deflection, held_compliance, joint_reactions, spring_loads
+from kinetostat.kinetostatics.loading import deflection, held_compliance, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import springs
@@ -42,12 +43,30 @@ class SpringLoad:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadCase(ImmutableAnswer):
-    """A wrench on the platform at the tool point and its effects, all in the axes of K and C.
+class Reaction(ImmutableAnswer):
+    """The wrench that a joint passes on from its platform side to its base side; its reaction is opposite to it.
 
     Attributes:
-        wrench: moment (N·m) and force (N) [6].
-        deflection: rotation (rad) and displacement (m) of the tool point [6]; a component is infinite if a free spring
+        leg, joint: names of the leg and of the joint.
+        point: point about which the moment is taken, base frame, m: on the joint's axis, or on the carriage of a slide.
+        wrench: moment (N·m) and force (N) that the platform side exerts on the base side at that point [n].
+    """
+
+    leg: str
+    joint: str
+    point: Vector
+    wrench: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCase(ImmutableAnswer):
+    """A wrench on the platform at the tool point and its effects, with the axes and the components of K and C.
+
+    Attributes:
+        components: names of the entries of all wrenches and of the deflection: rx ry rz x y z, or rz x y of a planar
+            machine; a moment has the name of the rotation about its axis, a force that of the displacement along it.
+        wrench: moment (N·m) and force (N) [n].
+        deflection: rotation (rad) and displacement (m) of the tool point [n]; a component is infinite if a free spring
             on which the load does work moves it.
         springs: loads of all springs.
         reactions: wrenches in all joints of the legs, also in actuated ones.
@@ -56,10 +75,11 @@ class LoadCase(ImmutableAnswer):
     springs held, and the load of a free spring is the one that would hold it.
     """
 
+    components: tuple[str, ...]
     wrench: Array
     deflection: Array
     springs: tuple[SpringLoad, ...]
-    reactions: tuple[JointReaction, ...]
+    reactions: tuple[Reaction, ...]
 
     @property
     def unheld(self) -> str:
@@ -69,7 +89,7 @@ class LoadCase(ImmutableAnswer):
             return ""
         show = ENGINEERING.show
         needed = ", ".join(f"{spring.name} {show(spring.load, 'N·m' if spring.turning else 'N')}" for spring in driven)
-        free = [name for name, motion in zip(COMPONENTS, self.deflection, strict=True) if math.isinf(motion)]
+        free = [name for name, motion in zip(self.components, self.deflection, strict=True) if math.isinf(motion)]
         exact = "; the deflection is exact in all other components" if any(map(math.isfinite, self.deflection)) else ""
         return (
             f"Nothing holds the load: it moves the platform without limit in {', '.join(free)}, because springs "
@@ -78,13 +98,16 @@ class LoadCase(ImmutableAnswer):
         )
 
 
-def load_case(response: Response, statics: Statics, turn: Rotation) -> LoadCase | None:
+def load_case(
+    response: Response, statics: Statics, turn: Rotation, kept: Sequence[int] = range(SIZE)
+) -> LoadCase | None:
     """Compute the effects of a machine's load; None if its file gives none.
 
     Args:
         response: the response of the machine, its load included; base axes.
         statics: the statics of the machine, in the axes of the results.
         turn: rotation from base axes to those of the results.
+        kept: places of the components that the machine has.
     """
     wrench = response.load
     if not any(wrench.components()):
@@ -94,11 +117,17 @@ def load_case(response: Response, statics: Statics, turn: Rotation) -> LoadCase 
     size = float(wrench.rotational.norm() + wrench.translational.norm() * length)
     loaded = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
-        np.array(load.components(), dtype=float),
-        np.array(_deflection(statics, load)),
+        tuple(COMPONENTS[i] for i in kept),
+        np.array(load.components(), dtype=float)[[*kept]],
+        np.array(_deflection(statics, load))[[*kept]],
         tuple(_spring_load(spring, float(amount)) for spring, amount in loaded),
         tuple(
-            replace(reaction, wrench=clean_screw(reaction.wrench.rotated(turn), length, size))
+            Reaction(
+                reaction.leg,
+                reaction.joint,
+                reaction.point,
+                np.array(clean_screw(reaction.wrench.rotated(turn), length, size).components(), dtype=float)[[*kept]],
+            )
             for reaction in joint_reactions(response, wrench)
         ),
     )

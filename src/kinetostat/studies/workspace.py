@@ -7,6 +7,7 @@ printed of it is in `views`.
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from kinetostat.engine.points import PER_CELL, Cells
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.answer import ImmutableAnswer
@@ -40,11 +42,12 @@ from kinetostat.studies.workspace_verdicts import (
 
 COLOURING_QUANTITY = "least_translational_stiffness"
 """Quantity by which a workspace is coloured where no condition names another."""
+SHOWN = ("singularity_margin", COLOURING_QUANTITY)
+"""Quantities of the free machine that a workspace has at its nodes, whatever judges these."""
 BORDER_VARIABLES = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
-"""Attribute with the sentence about loads that a workspace with limited actuators does not count."""
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
@@ -198,12 +201,10 @@ def workspace(
     state = state_of(machine)
     machine = state.machine
     judge = Judge(state, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
-    question = grid_question(
-        state, ranges, [*dict.fromkeys(["singularity_margin", COLOURING_QUANTITY, *judge.quantities])]
-    )
+    question = grid_question(state, ranges, judge.quantities)
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size
-    nodes = answer(question, lambda done, _: progress(done, total))
+    nodes = _nodes(question, lambda done, _: progress(done, total))
     verdict = judge.verdicts(
         nodes["status"].values, {name: nodes[name].values for name in judge.quantities}, partial(_poses, question)
     )
@@ -226,6 +227,17 @@ def workspace(
         limits=tuple(judge.limits),
         loads_left_out=nodes.attrs.get(LOADS_LEFT_OUT, ""),
     )
+
+
+def _nodes(question: GridQuestion, progress: Progress) -> xr.Dataset:
+    """The quantities that judge the nodes, with `SHOWN`: these are NaN at a node that is not inside.
+
+    Where nodes are judged at rest, `SHOWN` is asked for apart: a machine may rest where K is singular.
+    """
+    if not rest_numbers(question.machine, question.names):
+        return answer(replace(question, names=tuple(dict.fromkeys([*SHOWN, *question.names]))), progress)
+    nodes, shown = answer(question, progress), answer(replace(question, names=SHOWN))
+    return nodes.assign({name: shown[name].where(nodes["status"] == Status.OK) for name in SHOWN})
 
 
 def _check(question: GridQuestion) -> None:

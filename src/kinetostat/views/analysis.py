@@ -77,7 +77,7 @@ def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
     yield free.shares_table(analysis, full)
     yield free.principal_table(analysis)
     if analysis.load:
-        yield free.load_table(names, analysis.load, display)
+        yield free.load_table(analysis.load, display)
         yield free.actuator_table(analysis.load, display)
         yield free.reaction_table(analysis.load, analysis.axes, display)
     yield from free.remarks(analysis)

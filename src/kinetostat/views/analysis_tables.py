@@ -102,7 +102,8 @@ def _axis_name(way: Sequence[float]) -> str:
 def _load_sentence(analysis: Analysis, load: LoadCase) -> str:
     """Say how far the load moves the tool, and which actuator carries most."""
     display = analysis.machine.display
-    turned, moved = math.hypot(*load.deflection[:3]), math.hypot(*load.deflection[3:])
+    motions = [*zip(load.components, load.deflection.tolist(), strict=True)]
+    turned, moved = (math.hypot(*(m for c, m in motions if (c in ROTATION_NAMES) is turns)) for turns in (True, False))
     sentence = (
         f"Under the load the {analysis.machine.reference} moves {display.show_deflection(moved, 'm')} and turns "
         f"{display.show_deflection(turned, 'rad')}"
@@ -260,16 +261,15 @@ def _point_text(point: Array, display: Display) -> str:
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
 
-def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
+def load_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
     """The load and the deflection of the reference point."""
-    units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in names]
+    units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in load.components]
     motions = ", ".join(dict.fromkeys(display.deflection(motion).unit for _, motion in units))
     title = f"Load ({display.names([loaded for loaded, _ in units])}) and the deflection under it ({motions})"
-    table = numeric_table(title, "", names)
-    kept = [COMPONENTS.index(name) for name in names]
-    pairs = list(zip(kept, units, strict=True))
-    table.add_row("load", *(display.number(load.wrench[i], unit) for i, (unit, _) in pairs))
-    moved = (load.deflection[i] * display.deflection(unit).factor for i, (_, unit) in pairs)
+    table = numeric_table(title, "", load.components)
+    table.add_row("load", *(display.number(c, unit) for c, (unit, _) in zip(load.wrench, units, strict=True)))
+    pairs = zip(load.deflection, units, strict=True)
+    moved = (motion * display.deflection(unit).factor for motion, (_, unit) in pairs)
     table.add_row("deflection", *(number(motion, "free", display.digits) for motion in moved))
     return table
 
@@ -290,10 +290,12 @@ def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) ->
     """The wrench in each joint, in base or platform axes."""
     units = display.names(["N·m", "N"])
     title = f"Joint reactions: load that each joint passes on towards the base ({units}; {axes} axes)"
-    table = numeric_table(title, "joint", ["mx", "my", "mz", "fx", "fy", "fz"])
+    turns = [name in ROTATION_NAMES for name in load.components]
+    heads = [f"{'m' if turning else 'f'}{name[-1]}" for name, turning in zip(load.components, turns, strict=True)]
+    table = numeric_table(title, "joint", heads)
     for reaction in load.reactions:
-        pairs = zip(reaction.wrench.components(), ["N·m"] * 3 + ["N"] * 3, strict=True)
-        table.add_row(reaction.joint, *(display.number(float(c), unit) for c, unit in pairs))
+        pairs = zip(reaction.wrench, turns, strict=True)
+        table.add_row(reaction.joint, *(display.number(c, "N·m" if turning else "N") for c, turning in pairs))
     return table
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from kinetostat.display import DASH, number
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, data_name
 from kinetostat.spec.errors import InputError
@@ -46,7 +47,9 @@ def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
         yield table
         return
     pairs = zip(answer.actuators, answer.units, strict=True)
+    lost = not answer.settled.all()
     heads = [*(display.scale(unit).label(name) for name, unit in pairs), "error before", "error left"]
+    heads += ["status"] if lost else []
     table = numeric_table("Commands: where each actuator must stand", "pose", heads)
     for i, row in enumerate(answer.coordinates):
         known = bool(answer.settled[i])
@@ -55,7 +58,8 @@ def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
             for v, unit in zip(row, answer.units, strict=True)
         ]
         errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
-        table.add_row(str(i + 1), *cells, *errors)
+        status = [Status(int(answer.status[i])).word.replace("_", " ")] if lost else []
+        table.add_row(str(i + 1), *cells, *errors, *status)
     yield table
 
 
@@ -89,6 +93,7 @@ COMMAND = Description(
         Field("error_before", "before"),
         Field("error_left", "left"),
         Field("rotation_left", "turned"),
+        Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
     ),
     lines=lambda answer: [("Commands", answer.message)],
     tables=_command_tables,

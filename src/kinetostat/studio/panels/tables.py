@@ -37,7 +37,6 @@ from kinetostat.views.tables import headline, requirement_lines
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
-COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 
 
 class MatricesPanel(Panel):
@@ -201,7 +200,7 @@ def load_text(analysis: Analysis) -> str:
         return paragraph("The tool carries no load. Set a force or a moment in the panel Load.")
     tool = [
         [name, *_load_cells(wrench, motion, name.startswith("r"), display)]
-        for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
+        for name, wrench, motion in zip(load.components, load.wrench, load.deflection, strict=True)
     ]
     actuators = as_table(actuator_table(load, display), "")
     return (

@@ -224,7 +224,7 @@ def load_section(analysis: Analysis, pictures: MachinePictures) -> Section:
     point, display = analysis.machine.reference, analysis.machine.display
     if analysis.load is None:
         return Section("Load case", (Paragraph(NO_LOAD.format(point)),))
-    loaded = load_table(analysis.components, analysis.load, display)
+    loaded = load_table(analysis.load, display)
     tables = [
         (
             loaded,

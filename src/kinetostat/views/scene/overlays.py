@@ -165,7 +165,7 @@ def overlays_of(
     solids = compliance_overlays(machine, configuration, sizes, analysis.indices.principal_compliances)
     if analysis.load is None:
         return solids, None
-    load = Wrench(Vector(*analysis.load.wrench[:3]), Vector(*analysis.load.wrench[3:]))
+    load = response.load
     moved = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
     ghost, chosen = deflection_overlays(machine, configuration, sizes, moved, factor)
     return solids + ghost, chosen
