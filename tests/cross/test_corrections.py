@@ -110,7 +110,11 @@ def test_cells_without_a_state_of_rest_are_counted():
         ("x=0:1 cm:3", 0.0, "greater than 0"),
         ("x=0:1 cm:1000000", None, "at most 200,000"),
         (["x=0:1 cm:3", "x=0:1 cm:3"], None, "varied twice"),
-        ("x=9:10:3", None, r"^Delta: 5 of 5 poses have no command \(5 out of reach\). Pose 1: The rod of leg 2 would have to span"),
+        (
+            "x=9:10:3",
+            None,
+            r"^Delta: 5 of 5 poses have no command \(5 out of reach\). Pose 1: The rod of leg 2",
+        ),
     ],
 )
 def test_tables_that_cannot_be_made_are_refused(over, tolerance, pattern):
@@ -161,9 +165,19 @@ def test_without_loads_there_is_nothing_to_correct(capsys):
 @pytest.mark.parametrize(
     ("name", "poses", "words", "reason"),
     [
-        ("delta", {"x": [0.0, 5.0]}, ["ok", "out_of_reach"], "1 of 2 poses has no command (1 out of reach). Pose 2: The"),
+        (
+            "delta",
+            {"x": [0.0, 5.0]},
+            ["ok", "out_of_reach"],
+            "1 of 2 poses has no command (1 out of reach). Pose 2: The",
+        ),
         ("hexapod", {"yaw": [np.pi / 2]}, ["singular"], "The pose is singular (actuation singularity). With all"),
-        ("hexapod", {"x": [20.0, 0.0, 20.0]}, ["no_rest", "ok", "no_rest"], "(2 no rest). Pose 1: The machine comes to"),
+        (
+            "hexapod",
+            {"x": [20.0, 0.0, 20.0]},
+            ["no_rest", "ok", "no_rest"],
+            "(2 no rest). Pose 1: The machine",
+        ),
     ],
 )
 def test_poses_without_a_command_have_their_true_reason(name, poses, words, reason):

@@ -211,3 +211,32 @@ def test_a_quantity_that_has_no_number_at_any_pose_is_a_row_of_dashes(tmp_path, 
     rows = {line.split()[0]: line.split() for line in capsys.readouterr().out.splitlines() if line.strip()}
     assert rows["least_angular_acceleration"][2:] == ["–"] * 4
     assert rows["mass"][:3] == ["mass", "kg", "1"]
+
+
+BARE = "Numbers without a unit in the head of their column are taken as"
+IN_MM = f"{BARE} m, so that the file reaches 145 m; if they are mm, write x [mm], y [mm], z [mm] in its first line."
+IN_DEG = f"{BARE} rad, so that the file reaches 90 rad; if they are deg, write yaw [deg] in its first line."
+WEIGHT = ("--set", "tool.mass=5 kg", "--set", "load.gravity=[0, 0, -9.81]")
+
+
+@pytest.mark.parametrize(
+    ("machine", "words", "lines", "expected"),
+    [
+        ("hexapod", ("path",), ("x,y,z", "10,0,135", "0,0,145"), IN_MM),
+        ("hexapod", ("path",), ("yaw", "0", "90"), IN_DEG),
+        ("hexapod", ("path",), ("x [mm],y [mm],z [mm]", "10,0,135", "90,0,145"), ""),
+        ("hexapod", ("path",), ("x,y,z", "0.01,0,0.135", "2,0,0.145"), ""),  # far, and not mm
+        ("hexapod", ("command", *WEIGHT), ("x,y,z", "10,0,135", "0,0,145"), IN_MM),
+        ("delta", ("command", *WEIGHT), ("x,y,z", "10,0,135", "0,0,145"), IN_MM),
+        ("hexapod", ("drives", *WEIGHT), ("time,x,y,z", "0,10,0,135", "1,0,0,145"), IN_MM),
+        ("delta", ("drives", *WEIGHT), ("time,x,y,z", "0,10,0,135", "1,0,0,145"), IN_MM),
+    ],
+)
+def test_numbers_without_a_unit_that_look_like_mm_or_deg_are_named(tmp_path, capsys, machine, words, lines, expected):
+    """Only where poses have no answer, or pass a limit: a file in metres is never doubted."""
+    path, (command, *settings) = tmp_path / "poses.csv", words
+    path.write_text("\n".join(lines))
+    main([command, machine, str(path), *settings])
+    shown = " ".join("".join(capsys.readouterr()).split())
+    assert expected in shown
+    assert expected or BARE not in shown

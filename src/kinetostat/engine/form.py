@@ -21,13 +21,7 @@ from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import (
-    QUANTITIES,
-    needs_masses,
-    needs_motion,
-    rest_numbers,
-    status_with_rest,
-)
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, needs_motion, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
@@ -224,7 +218,7 @@ def objectives_of(
         coordinates = new_inputs(given.graph, equations.size)
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
-        loaded, status = equations.numbers(there, wanted, response)
+        loaded, status = equations.numbers(there, wanted, response, names)
         if mode_counts is not None and mode_counts.at_rest:
             motions = springwise.SpringMotions(equations.cut, there)
             known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
@@ -237,7 +231,6 @@ def objectives_of(
                 loaded["factor"] = motions.factor(known[-1])
         if "frequency" in wanted and "frequency" not in loaded:
             loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, bool(paths))
-        status = status_with_rest(given.machine, names, response.status, status)
         response = replace(response, loaded=loaded, status=status)
     if mode_counts is not None and mode_counts.free:
         motions = springwise.motions_without_loads(given.machine, response, joints)

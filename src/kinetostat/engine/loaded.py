@@ -29,10 +29,10 @@ from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.limit import snap_flags
-from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers
+from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers, status_with_rest
 from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers, status_with_rest
+from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine

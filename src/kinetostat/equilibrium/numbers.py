@@ -3,7 +3,7 @@
 Source: theory section 12.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, sta
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS
+from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, OF_THE_PLACE, QUANTITIES
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
@@ -84,6 +84,25 @@ def status_with_load_limits(
     sizes = [(spring, abs(load)) for spring, load in loads]
     in_limits = within(load_checks(machine, response.configuration, sizes))
     return where(in_limits, status, where(abs(status - float(Status.OK)) < 0.5, int(Status.JOINT_LIMIT), status))
+
+
+def status_with_rest(machine: Machine, names: Iterable[str], free: Scalar, at_rest: Scalar) -> Scalar:
+    """Return the status of a pose for quantities of which some are about the machine at rest.
+
+    What follows from the wrenches of the free machine, such as K, C and the singularity margin, has a number only where
+    these wrenches hold the platform. A machine may come to rest where they do not; a question about both has no answer
+    there (theory section 12).
+
+    Args:
+        machine: whose state says to which machine the loads of actuators belong.
+        names: of the quantities.
+        free: `Status` code of the pose without loads.
+        at_rest: `Status` code of the state of rest.
+    """
+    elsewhere = {*OF_THE_PLACE, *(LOADS_OF_ACTUATORS if machine.loaded else ())}
+    if all(QUANTITIES[name].loaded or name in elsewhere for name in names):
+        return at_rest
+    return where(abs(free - float(Status.SINGULAR)) < 0.5, int(Status.SINGULAR), at_rest)
 
 
 def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:

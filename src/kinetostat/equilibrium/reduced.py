@@ -21,7 +21,7 @@ from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
 from kinetostat.equilibrium.cut import Cut, cut
 from kinetostat.equilibrium.legwise import LegwiseTangent
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits
+from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits, status_with_rest
 from kinetostat.equilibrium.pulls import RodPull, loads_of_rods, pull_of, sum_of_dyads, wrench_of_rods
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.frozen import dataclass
@@ -137,13 +137,16 @@ class Reduced:
             return LegwiseTangent(self.cut, coordinates)
         return Tangent(self.cut, place_of(self.cut, coordinates))
 
-    def numbers(self, coordinates: Row, wanted: Collection[str], response: Response) -> tuple[dict[str, Any], Scalar]:
+    def numbers(
+        self, coordinates: Row, wanted: Collection[str], response: Response, names: Collection[str]
+    ) -> tuple[dict[str, Any], Scalar]:
         """The numbers of the loaded state, see `numbers.loaded_numbers`.
 
         Args:
             coordinates: the coordinates of the state, up to a last step.
             wanted: which of the numbers are needed.
             response: the response of the pose without loads.
+            names: of all quantities of the question, those of the free machine among them.
 
         Returns:
             The numbers by name, with the coordinates after this step and the square of its size as "after"; and the
@@ -179,7 +182,8 @@ class Reduced:
             result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
             at_rest = status_with_load_limits(self.machine, response, loads, at_rest)
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
-        return result, where(response.place_status > Status.OK + 0.5, response.place_status, code)
+        status = where(response.place_status > Status.OK + 0.5, response.place_status, code)
+        return result, status_with_rest(self.machine, names, response.status, status)
 
 
 def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, Scalar]:

@@ -13,7 +13,6 @@ from kinetostat.algebra.scalar import Scalar, reciprocal, where
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
     TRANSLATIONS,
@@ -396,25 +395,6 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
     bounded = limited and limits_loads(machine.tables["limits"])
     carries = bounded or any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
     return wanted | {"actuators"} if machine.loaded and carries else wanted
-
-
-def status_with_rest(machine: Machine, names: Iterable[str], free: Scalar, at_rest: Scalar) -> Scalar:
-    """Return the status of a pose for quantities of which some are about the machine at rest.
-
-    What follows from the wrenches of the free machine, such as K, C and the singularity margin, has a number only where
-    these wrenches hold the platform. A machine may come to rest where they do not; a question about both has no answer
-    there (theory section 12).
-
-    Args:
-        machine: whose state says to which machine the loads of actuators belong.
-        names: of the quantities.
-        free: `Status` code of the pose without loads.
-        at_rest: `Status` code of the state of rest.
-    """
-    elsewhere = {*OF_THE_PLACE, *(LOADS_OF_ACTUATORS if machine.loaded else ())}
-    if all(QUANTITIES[name].loaded or name in elsewhere for name in names):
-        return at_rest
-    return where(abs(free - float(Status.SINGULAR)) < 0.5, int(Status.SINGULAR), at_rest)
 
 
 def needs_masses(names: Iterable[str]) -> bool:

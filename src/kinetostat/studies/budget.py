@@ -359,7 +359,8 @@ def _answer(
         first = Status(int(status[0]))
         where = "the pose" if len(status) == 1 else "all poses"
         raise InputError(
-            f"{work.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence}"
+            f"{work.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence} "
+            f"{columns.unit_doubt if columns else ''}".rstrip()
         )
     bearing = np.concatenate(work.pressed)
     at_any = [part.path for number, part in enumerate(work.parts) if bearing[:, number].any()]

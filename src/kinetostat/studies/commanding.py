@@ -268,7 +268,11 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
         _refuse_drawn(machine, record)
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = ({}, 1) if columns is None else (columns.leaves, columns.count)
-    answer = command_of(machine, columns, actuator_targets(machine, leaves, count))
+    try:
+        targets = actuator_targets(machine, leaves, count)
+    except InputError as error:
+        raise InputError(f"{error} {columns.unit_doubt if columns else ''}".rstrip()) from None
+    answer = command_of(machine, columns, targets)
     if record is None:
         return answer
     home = home_coordinates(machine)
@@ -276,7 +280,7 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
         answer,
         coordinates=record.controller_counts(answer.actuators, answer.coordinates, home),
         unloaded=record.controller_counts(answer.actuators, answer.unloaded, home),
-        message=f"{answer.message} Zeros and gains of the fit are counted in.",
+        message=f"{answer.message} Zeros and gains of the fit are tally in.",
     )
 
 
@@ -324,6 +328,8 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         answer: the coordinates found at these poses.
     """
     leaves = {} if poses is None else poses.leaves
+    limits = _limits_passed(machine, leaves, answer.settled)
+    doubt = poses.unit_doubt if poses and (limits or not answer.settled.all()) else ""
     return Command(
         machine=machine,
         poses=poses,
@@ -335,7 +341,7 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         left=answer.left,
         turned=answer.turned,
         status=answer.status,
-        message=_message(machine, leaves, answer) + _limits_passed(machine, leaves, answer.settled),
+        message=f"{_message(machine, leaves, answer)}{limits} {doubt}".rstrip(),
     )
 
 
@@ -365,10 +371,10 @@ def without_command(machine: Machine, columns: Mapping[str, Array], status: Inte
     if len(status) == 1:
         return reason
     has = "has" if len(lost) == 1 else "have"
-    return f"{len(lost)} of {len(status)} poses {has} no command ({counted(status)}). Pose {lost[0] + 1}: {reason}"
+    return f"{len(lost)} of {len(status)} poses {has} no command ({tally(status)}). Pose {lost[0] + 1}: {reason}"
 
 
-def counted(status: Integers) -> str:
+def tally(status: Integers) -> str:
     """Count the statuses that are not OK, such as "2 out of reach, 1 no rest"."""
     counts = Counter(Status(code).word.replace("_", " ") for code in status[status != Status.OK].tolist())
     return ", ".join(f"{count} {word}" for word, count in counts.items())

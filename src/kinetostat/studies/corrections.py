@@ -30,8 +30,8 @@ from kinetostat.studies.commanding import (
     Command,
     actuator_targets,
     command_of,
-    counted,
     refuse_tensions,
+    tally,
     without_command,
 )
 from kinetostat.studies.poses import PoseColumns, chosen_axes, grid_of
@@ -123,10 +123,10 @@ def _without_round_off(law: Law) -> Law:
     """The law without terms that only round-off has; all functions are 1 at most."""
     sizes = np.abs(law.coefficients)
     coefficients = np.where(sizes > EXACT_LAW * sizes.max(axis=0), law.coefficients, 0.0)
-    counted = np.asarray(coefficients.any(axis=1))
-    counted[0] |= not counted.any()
-    terms = tuple(term for term, kept in zip(law.terms, counted, strict=True) if kept)
-    return replace(law, terms=terms, coefficients=coefficients[counted])
+    tally = np.asarray(coefficients.any(axis=1))
+    tally[0] |= not tally.any()
+    terms = tuple(term for term, kept in zip(law.terms, tally, strict=True) if kept)
+    return replace(law, terms=terms, coefficients=coefficients[tally])
 
 
 def _candidates(paths: Sequence[str], counts: Sequence[int], known: int) -> Iterator[tuple[Term, ...]]:
@@ -279,9 +279,9 @@ def _table_of(
     largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
     unknown = int((~np.isfinite(errors)).sum())
     command = command_of(machine, PoseColumns(fields, points, {}), nodes)
-    lost = counted(np.concatenate([nodes.status, cells.status]))
-    missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})." if unknown else ""
-    message = _message(machine, before, left, largest, missing)
+    lost = tally(np.concatenate([nodes.status, cells.status]))
+    missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})."
+    message = _message(machine, before, left, largest, missing if unknown else "")
     return CorrectionTable(
         command,
         fields,

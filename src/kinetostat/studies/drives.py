@@ -236,7 +236,8 @@ def drive_loads(state: MachineState, form: RigidForm, motion: Motion) -> DriveLo
     if lost.size:
         status = Status(int(codes[lost[0]]))
         where = f"at {motion.times[lost[0]]:.4g} s the pose is {status.word.replace('_', ' ')}"
-        return DriveLoads(state.machine, status, f"The motion cannot be followed: {where}. {status.sentence}", motion)
+        message = f"The motion cannot be followed: {where}. {status.sentence} {motion.unit_doubt}".rstrip()
+        return DriveLoads(state.machine, status, message, motion)
     forces = forces_on_path(form, motion.path, joints=True)
     motors = _motors_of(state)
     curves = _curves(state, motors, motion, forces)
@@ -417,7 +418,7 @@ def _limits_passed(motion: Motion, codes: Codes) -> str:
     if not passed.size:
         return ""
     where = "the pose passes" if motion.timeless else f"from {motion.times[passed[0]]:.4g} s on some poses pass"
-    return f" But {where} a limit of the file, see `kinetostat analyze` there."
+    return f" But {where} a limit of the file, see `kinetostat analyze` there. {motion.unit_doubt}".rstrip()
 
 
 def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> str:

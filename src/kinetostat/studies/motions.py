@@ -29,7 +29,7 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
 from kinetostat.studies.moves import along_profile, curve_between, moment_at, profile
-from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns
+from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns, unit_doubt
 
 TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
 QUANTITIES = {
@@ -60,6 +60,7 @@ class Motion:
         path: coordinates of the pose with their rates and accelerations.
         periodic: whether it closes and goes on for ever.
         timeless: whether its points are no time apart, but speeds and accelerations in many directions at one pose.
+        unit_doubt: as of `PoseColumns`, where the motion comes from a file.
     """
 
     kind: str
@@ -67,6 +68,7 @@ class Motion:
     path: MovedPath
     periodic: bool = False
     timeless: bool = False
+    unit_doubt: str = ""
 
     @property
     def duration(self) -> float:
@@ -180,7 +182,8 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         coordinates, loads = _coordinates_and_loads(machine, list(given.values()), where)
         if TIME in amounts:
             _refuse(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
-            return _through_poses(coordinates, loads, amounts[TIME], points)
+            motion = _through_poses(coordinates, loads, amounts[TIME], points)
+            return replace(motion, unit_doubt=unit_doubt(machine, columns))
         if FEED not in amounts:
             raise InputError(
                 "it has neither times nor a feed rate; add a column such as time [s] or feed [mm/s] beside the pose."
@@ -188,7 +191,8 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         if ACCELERATION not in amounts:
             raise InputError("it has a feed rate but no acceleration; add a column such as acceleration [m/s**2].")
         shapes = _shapes(special.get(SHAPE), len(numbers))
-        return _moves(machine, coordinates, loads, amounts, shapes, points)
+        motion = _moves(machine, coordinates, loads, amounts, shapes, points)
+        return replace(motion, unit_doubt=unit_doubt(machine, columns))
     except InputError as error:
         raise InputError(f'"{path}": {error}') from None
 

@@ -5,9 +5,11 @@ pandas, polars and xarray are read by what they can do, so that none of these li
 """
 
 import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.points import Axis, Grid
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -51,11 +54,14 @@ class PoseColumns:
         fields: the given fields, in order.
         values: values of each of the fields [poses].
         labels: further columns that belong to the poses, as a time; by name.
+        unit_doubt: a sentence where numbers of a file that have no unit seem to be mm or deg, which answers give where
+            the poses have none; empty if nothing is doubtful.
     """
 
     fields: tuple[Parameter, ...]
     values: tuple[Array, ...]
     labels: Mapping[str, Any]
+    unit_doubt: str = ""
 
     @property
     def leaves(self) -> dict[str, Array]:
@@ -298,9 +304,32 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
     columns, numbers = columns_of(path)
     columns = [column for column in columns if column.name not in ANSWERS]
     try:
-        return read_columns(machine, columns, lambda name, i: f"line {numbers[i]}, column {name}")
+        poses = read_columns(machine, columns, lambda name, i: f"line {numbers[i]}, column {name}")
     except InputError as error:
         raise InputError(f'"{path}": {error}') from None
+    return replace(poses, unit_doubt=unit_doubt(machine, columns))
+
+
+MOST_MACHINE_LENGTHS = 50.0
+"""Characteristic lengths of a machine beyond which no coordinate of its pose is: a mm is a thousandth of a m."""
+
+
+def unit_doubt(machine: Machine, columns: Sequence[GivenColumn]) -> str:
+    """Return a sentence on columns of a file without a unit whose numbers seem to be mm or deg; empty without any."""
+    coordinates = {p.shown: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
+    sentences = []
+    for kind, meant, unit in (("length", "mm", "m"), ("angle", "deg", "rad")):
+        bare = [c for c in columns if not c.unit and coordinates.get(c.name.removeprefix(POSE)) == kind]
+        numbers = [size for column in bare if (size := _numbers(column, COMPONENT)) is not None]
+        most = max((float(np.abs(size).max()) for size in numbers), default=0.0)
+        length = float(MachineState(machine).configuration.length) if kind == "length" and most > 1.0 else math.inf
+        if most > (2.0 * math.pi if kind == "angle" else MOST_MACHINE_LENGTHS * length):
+            heads = ", ".join(f"{column.name} [{meant}]" for column in bare)
+            sentences.append(
+                f"Numbers without a unit in the head of their column are taken as {unit}, so that the file reaches "
+                f"{most:g} {unit}; if they are {meant}, write {heads} in its first line."
+            )
+    return " ".join(sentences)
 
 
 def columns_of(

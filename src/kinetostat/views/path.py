@@ -41,6 +41,8 @@ def _lines(answer: PoseAnswers) -> Lines:
         first, several = numbers[0] + 1, len(numbers) > 1
         which = f"{len(numbers):,} poses, the first is {first}" if several else f"pose {first}"
         yield "No result", f"{status.word.replace('_', ' ')}: {which}. {status.sentence}"
+    if failures and answer.poses.unit_doubt:
+        yield "Units", answer.poses.unit_doubt
 
 
 def _tables(answer: PoseAnswers, _full: bool) -> Iterator[FittedTable]:
