@@ -4,6 +4,13 @@ No sizes, counts or limits of display live here, only numbers that decide when t
 same, when something counts as zero, and when an iteration has converged. Each says why it has its value.
 """
 
+# Divisions
+
+LEAST_DIVISOR = 1e-300
+"""Number that stands for zero where a size is divided by, or compared with the largest of its kind: all sizes of which
+some are zero then need no case of their own, and no size of a machine, in any unit, is nearly as small. It is a hundred
+million times the least number of floating point with all digits, so that quotients of it are finite or 0."""
+
 # Limits of machines
 
 LIMIT_SLACK = 1e-9

@@ -11,10 +11,9 @@ from kinetostat.algebra.screw import rotation_about
 from kinetostat.algebra.vector import Vector
 from kinetostat.engine.kernel import program_fill
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.leg_screws import comparable, reciprocal_wrenches
+from kinetostat.machine.leg_screws import comparable, reciprocal_wrenches, two_centres
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.machine.two_centres import two_centres
 from kinetostat.machine.written.family import at_home
 
 LENGTH = 0.7
@@ -40,7 +39,7 @@ def test_margin_and_line_are_those_of_the_twists(seed, ball_last, square):
         normal = ball[0].cross(ball[2])
         ball[1] = normal * (1.0 / normal.norm())
     axes = [pair, ball] if ball_last else [ball, pair]
-    centres = two_centres(*points, *axes)
+    centres = two_centres(points, axes)
     twists = twists_about(points, axes, reference)
     matrix = np.array([comparable(twist, 1.0 / LENGTH) for twist in twists])
     expected = AXES_IN_ALL / (np.linalg.norm(matrix) * np.linalg.norm(np.linalg.pinv(matrix)))
@@ -54,7 +53,7 @@ def test_margin_and_line_are_those_of_the_twists(seed, ball_last, square):
 def test_axes_that_lock_up_have_no_margin():
     x, y, z = (Vector(*row) for row in np.eye(3).tolist())
     base, top = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 1.0)
-    locked = two_centres(base, top, [x, z], [x, y, z]), two_centres(base, top, [x, y], [x, y, x])
+    locked = [two_centres([base, top], axes) for axes in ([[x, z], [x, y, z]], [[x, y], [x, y, x]])]
     with np.errstate(all="ignore"):
         arrays = [replace(centres, distance=np.array([1.0])) for centres in locked[:1]]
         margins = [centres.singularity_margin(Vector(0.1, 0.2, 1.3), LENGTH) for centres in (*arrays, locked[1])]

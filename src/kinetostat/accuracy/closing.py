@@ -21,7 +21,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import Steps, largest, newton, with_rows
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
-from kinetostat.tolerances import NEARLY_DEPENDENT, SEEN_BY_LEG
+from kinetostat.tolerances import LEAST_DIVISOR, NEARLY_DEPENDENT, SEEN_BY_LEG
 
 LEAST_SEEN_RATIO = 1e-7
 """Least ratio of a singular value of joint screws to the largest one, with lengths in units of the machine's."""
@@ -73,7 +73,7 @@ def independent_columns(screws: Array) -> tuple[int, ...]:
             rest = rest - basis @ (np.swapaxes(basis, 1, 2) @ rest)
         left, size = (np.linalg.norm(part, axis=1, keepdims=True) for part in (rest, column))
         if (left > SEEN_BY_LEG * size).any():
-            basis = np.concatenate([basis, rest / np.maximum(left, 1e-300)], axis=2)
+            basis = np.concatenate([basis, rest / np.maximum(left, LEAST_DIVISOR)], axis=2)
             chosen.append(place)
     return tuple(chosen)
 
@@ -270,7 +270,7 @@ def _solution(matrices: Array, right: Array) -> Array:
     """Solutions of linear equations; NaN where these are singular or not finite."""
     result = np.full(np.broadcast_shapes(matrices.shape[:1], right.shape[:1]) + right.shape[1:], np.nan)
     sound: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
-    sound[sound] = np.abs(np.linalg.det(matrices[sound])) > 1e-300
+    sound[sound] = np.abs(np.linalg.det(matrices[sound])) > LEAST_DIVISOR
     result[sound] = np.linalg.solve(matrices[sound], right[sound])
     return result
 

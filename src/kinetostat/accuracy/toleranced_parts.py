@@ -25,7 +25,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS, Deviation, Tolerance
-from kinetostat.tolerances import NO_REACTION
+from kinetostat.tolerances import LEAST_DIVISOR, NO_REACTION
 
 ERROR_GROUPS = {
     "joints": "geometry",
@@ -322,7 +322,7 @@ def random_inputs(
         changes = others and part.free
         if bears.any() or changes:  # a joint that is pressed to one end of its play: the play itself is a variable
             reaction = work[:, places]
-            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), 1e-300)[:, None] * bears[:, None]
+            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), LEAST_DIVISOR)[:, None] * bears[:, None]
             half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], along)
             value = np.zeros(size)
             value[places] = 0.5 * part.limit * along[0]

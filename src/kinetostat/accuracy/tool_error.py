@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
-from kinetostat.tolerances import NO_FREEDOM
+from kinetostat.tolerances import LEAST_DIVISOR, NO_FREEDOM
 
 PARASITIC = "parasitic "
 """Prefix of the measures of what no actuator corrects."""
@@ -117,7 +117,7 @@ def _correction_rest(drives: Array, components: Sequence[str], length: float) ->
     scale = np.array([length] * 3 + [1.0] * 3)
     moved = drives * scale[:, None]
     basis, sizes, _ = np.linalg.svd(moved, full_matrices=False)
-    counted = sizes > NO_FREEDOM * sizes.max(axis=1, initial=1e-300)[:, None]
+    counted = sizes > NO_FREEDOM * sizes.max(axis=1, initial=LEAST_DIVISOR)[:, None]
     basis = basis * counted[:, None]
     left = np.eye(6) - basis @ np.swapaxes(basis, 1, 2)
     # Without round-off, so that what is moved by no actuator is all left, and what is moved by them is not.
@@ -190,11 +190,11 @@ def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
         far = np.sign(ways @ rows[:, :, alone]) @ np.swapaxes(rows[:, :, alone], 1, 2)
         for block in joined:
             reach = ways @ rows[:, :, block]
-            reach = reach / np.maximum(np.linalg.norm(reach, axis=2, keepdims=True), 1e-300)
+            reach = reach / np.maximum(np.linalg.norm(reach, axis=2, keepdims=True), LEAST_DIVISOR)
             far = far + reach @ np.swapaxes(rows[:, :, block], 1, 2)
         far = far + np.sign(np.einsum("nsk,nk->ns", ways, shift))[:, :, None] * shift[:, None]
         lengths = np.linalg.norm(far, axis=2)
-        ways = far / np.maximum(lengths, 1e-300)[:, :, None]
+        ways = far / np.maximum(lengths, LEAST_DIVISOR)[:, :, None]
         longest = lengths.max(axis=1)
         if (longest <= most * (1.0 + 1e-12)).all():
             break

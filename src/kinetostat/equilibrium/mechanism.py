@@ -1,4 +1,4 @@
-"""A machine as a mechanism that can move far: coordinates of its joints and springs, its masses, and its loads.
+"""A machine as a mechanism that can move far: coordinates of its joints and springs, its masses, drives and loads.
 
 The free state is the machine at its pose with relaxed springs; all coordinates are zero there. Each leg is a row of
 screw motions from base to platform (a product of exponentials). Nothing is solved here.
@@ -7,7 +7,7 @@ Lengths are in units of the machine's length, and forces in units of a typical s
 numbers can be compared. Arrays have the poses first [n]. The origin is the tool point of the free state; axes are those
 of the base.
 
-Source: theory (35).
+Source: theory (35) and (57).
 """
 
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import ElasticLeg, GivenMotions, Units, elastic_leg
-from kinetostat.equilibrium.drives import with_drives
 from kinetostat.equilibrium.masses import Masses, Weight
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
+from kinetostat.machine.drives import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Configuration, Machine, Member
@@ -305,3 +305,58 @@ def _typical_stiffness(stiffness: Array) -> Array:
     usable = np.isfinite(stiffness) & (stiffness > 0.0)
     logs = np.log(np.where(usable, stiffness, 1.0)).sum(axis=1)
     return np.asarray(np.exp(logs / np.maximum(usable.sum(axis=1), 1)))
+
+
+def with_drives(leg: ElasticLeg, units: Units, machine: Machine) -> ElasticLeg:
+    """Add the inertia of rotors and the friction of joints to the coordinates of a leg, theory (57).
+
+    A rotor turns against the spring of its actuator, which stands for drive and transmission: while the machine
+    vibrates, the deflection of that spring is the rotor's motion. A linear actuator with the lead l turns its rotor by
+    2 pi / l per metre, a rotary one by its ratio; inertia and friction of the rotor count with the square of that.
+
+    Args:
+        leg: the leg without drives.
+        units: the units in which it is counted.
+        machine: the machine, with tables [drives] and [damping].
+
+    Raises:
+        InputError: rotors have an inertia or friction, but nothing says how far they turn.
+    """
+    damping = machine.tables["damping"]
+    drives = {
+        coordinate: numbers_of_drive(machine, "drives", spring)
+        for coordinate, spring in enumerate(leg.springs)
+        if spring is not None and spring.actuated
+    }
+    given = [number for drive in drives.values() for number in (drive.rotor_inertia, drive.rotor_damping)]
+    given += [damping.hinges, damping.slides]
+    if all(is_zero(number) for number in given):
+        return leg
+    rotors, dampers = np.array(leg.rotors), np.array(leg.dampers)
+    if units.count is None:
+        rotors, dampers = rotors.astype(object), dampers.astype(object)
+    for coordinate, spring in enumerate(leg.springs):
+        if spring is None:
+            dampers[:, coordinate] = _friction(leg, coordinate, units, damping)
+        elif spring.actuated:
+            drive = drives[coordinate]
+            turns = rotor_turns(spring, drive)
+            square = turns * turns
+            for amounts, number in ((rotors, drive.rotor_inertia), (dampers, drive.rotor_damping)):
+                if not is_zero(number):
+                    amounts[:, coordinate] = units.inertia(square * number, spring.joint.point is not None)
+    return replace(leg, rotors=rotors, dampers=dampers)
+
+
+def _friction(leg: ElasticLeg, coordinate: int, units: Units, damping: Any) -> Array:
+    """Friction of a passive coordinate; the bars of a parallelogram turn about both of their ends."""
+    result = units.nothing
+    for motion, follows in enumerate(leg.chain.coordinate):
+        if follows != coordinate:
+            continue
+        turning = leg.chain.twists[:, motion, :3]
+        if all(is_zero(part) for part in turning.flat):
+            result = result + units.inertia(damping.slides, turns=False)
+        else:
+            result = result + units.inertia(damping.hinges, turns=True) * (turning * turning).sum(axis=1)
+    return result

@@ -17,7 +17,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
 from kinetostat.numerics.iteration import Steps, largest, newton
-from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_GAP_SETTLED, NEWTON_SETTLED
+from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_DIVISOR, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
 """Number of steps that are tried on one way, accepted or not."""
@@ -139,7 +139,7 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
     left, rates = problems.gaps(unknowns, target)
     tangent = least_norm(rates, left)
     first = largest(tangent)
-    moved, longer = unknowns.copy(), furthest / np.maximum(first, 1e-30)
+    moved, longer = unknowns.copy(), furthest / np.maximum(first, LEAST_DIVISOR)
     accepted = longer >= 1.0
     tried = np.flatnonzero(accepted)
     if tried.size:
@@ -150,7 +150,7 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
         accepted[tried] = close & (size <= MOST_TANGENT_ERROR)
         moved[tried] = start + correction
         # The error of the tangent grows as the square of the step, the contraction as the step itself.
-        allowed = np.sqrt(MOST_TANGENT_ERROR / np.maximum(size, 1e-30))
+        allowed = np.sqrt(MOST_TANGENT_ERROR / np.maximum(size, LEAST_DIVISOR))
         steady = np.maximum(STEP_CONTRACTION * first[tried] / np.maximum(size, ROUND_OFF_OF_STEP), 0.25)
         longer[tried] = np.minimum(np.minimum(allowed, longer[tried]), steady)
     return moved, np.where(np.isfinite(longer), longer, 0.0), accepted
@@ -179,7 +179,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         if not items.size:
             break
         step = np.einsum("ncd,nd->nc", inverse, slope)
-        step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), 1e-30)))[:, None]
+        step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), LEAST_DIVISOR)))[:, None]
         moved = best[items] + step
         left, rates, distance_there = problems.take(items).gaps_and_distance(moved, some(goal, items))
         slope_there = np.einsum("nrc,nr->nc", rates, left)

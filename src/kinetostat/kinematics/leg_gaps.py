@@ -21,7 +21,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
-from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
+from kinetostat.tolerances import LEAST_DIVISOR, LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
 
 Coordinates = dict[str, Scalar]
 """Coordinates of the platform: x, y, z (m) and roll, pitch, yaw (rad), one for each problem, or a float for all."""
@@ -381,4 +381,4 @@ def least_norm(rates: Array, left: Array) -> Array:
 def with_damping(square: Array) -> Array:
     """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
     trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
-    return np.asarray(square + LEAST_NORM_DAMPING * (trace + 1e-300) * np.eye(square.shape[1]))
+    return np.asarray(square + LEAST_NORM_DAMPING * (trace + LEAST_DIVISOR) * np.eye(square.shape[1]))

@@ -11,7 +11,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems, some, with_damping
 from kinetostat.numerics.iteration import Steps, largest, newton
-from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, NEAREST_POSTURE, NEWTON_SETTLED
+from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, LEAST_DIVISOR, NEAREST_POSTURE, NEWTON_SETTLED
 
 MOST_STEPS, MOST_CORRECTIONS = 40, 8
 """Towards the nearest posture; and of Newton's method, which closes the legs again after each of them."""
@@ -102,7 +102,7 @@ def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Arra
         bends, turn = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
         along = np.einsum("nij,ni->nj", turn, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
         step = -np.einsum("nij,nj,nic->nc", turn, along, motions)
-        steps[rows] = step * np.minimum(1.0, LONGEST_STEP / np.maximum(largest(step), 1e-30))[:, None]
+        steps[rows] = step * np.minimum(1.0, LONGEST_STEP / np.maximum(largest(step), LEAST_DIVISOR))[:, None]
         far[rows] = largest(slopes)
     return steps, far
 

@@ -160,7 +160,11 @@ def _round_off(
 ) -> Scalar:
     """The largest diagonal entry of C for rotations that round-off in the loads of springs can make, rad/(N·m).
 
-    Where rigid parts take a load, what is left of it in a soft spring beside them is round-off, and C must be 0.
+    Where rigid parts take a load, what is left of it in a soft spring beside them is round-off, and C must be 0. What a
+    spring adds to C is its compliance times the square of its load, and a share `UNFELT` of what the wrenches of the
+    legs could load it by is round-off, in the amounts that a unit moment needs. The squares of these amounts add
+    up to |W+|^2, which follows from the margin m = 6 / (|W| |W+|): of n unit wrenches, |W|^2 is n, so that |W+|^2 is
+    36 / (n m^2), divided by the square of the length for a moment.
 
     Args:
         loads: of springs or modes, their compliances, and the squares of what a unit of a leg's wrenches loads them by.
@@ -168,9 +172,9 @@ def _round_off(
         singularity_margin: of them: it tells how much of each a unit load may need.
         length: characteristic length, m.
     """
-    apart = singularity_margin * length
-    amounts = float(SIZE * SIZE) / float(max(wrenches, 1)) * reciprocal(apart * apart)
-    return UNFELT * UNFELT * amounts * total([where(s < INFINITE, s, 0.0) * square for s, square in loads])
+    scaled_margin = singularity_margin * length
+    squared_amounts = float(SIZE * SIZE) / float(max(wrenches, 1)) * reciprocal(scaled_margin * scaled_margin)
+    return UNFELT * UNFELT * squared_amounts * total([where(s < INFINITE, s, 0.0) * square for s, square in loads])
 
 
 def _in_series(leg: LegScrews) -> bool:

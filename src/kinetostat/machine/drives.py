@@ -4,11 +4,13 @@ A file may have a table [drives.NAME] or [servo.NAME] for a leg or a drive, with
 machine with such tables gets a family of its own, whose files have them. Loads and motions of drives are not here.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.common_tables import COMMON
 from kinetostat.machine.leg import Leg, PartName, Spring
@@ -133,3 +135,27 @@ def values_of_drives(machine: Machine, path: str) -> list[Any]:
     table, _, field = path.partition(".")
     single = [name for name, fields in machine.family.own_drives if field in fields and name.startswith(f"{table}.")]
     return [getattr(machine.tables[name], field) for name in (table, *single)]
+
+
+def rotor_turns(spring: Spring, drives: Any) -> Scalar:
+    """Radians by which the rotor of an actuator turns per metre or radian of the actuator; 0.0 if nothing says it.
+
+    Args:
+        spring: the actuator's spring.
+        drives: the table [drives] as this drive has it, see `numbers_of_drive`.
+
+    Raises:
+        InputError: rotors have an inertia or friction, but nothing says how far they turn.
+    """
+    slides = spring.joint.point is None
+    given = drives.lead if slides else drives.ratio
+    if is_zero(given):
+        if all(is_zero(number) for number in (drives.rotor_inertia, drives.rotor_damping, drives.rotor_friction)):
+            return 0.0
+        field, example, kind = ("lead", '"10 mm"', "linear") if slides else ("ratio", "50", "rotary")
+        raise InputError(
+            f"drives.{field} is 0, but drives.rotor_inertia, drives.rotor_damping or drives.rotor_friction is given "
+            f"and the actuators are {kind}: nothing says how far a rotor turns; write {field} = {example} in the "
+            "table [drives]."
+        )
+    return reciprocal(given) * (2.0 * math.pi) if slides else given

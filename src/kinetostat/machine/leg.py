@@ -15,8 +15,7 @@ from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
 from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.frozen import dataclass
-from kinetostat.machine.leg_screws import LegScrews, reciprocal_wrenches, work_on_free
-from kinetostat.machine.two_centres import BALL, PAIR, TwoCentres, two_centres
+from kinetostat.machine.leg_screws import LegScrews, TwoCentres, reciprocal_wrenches, two_centres, work_on_free
 from kinetostat.tolerances import SAME_CENTRE
 
 RIGID = float("inf")
@@ -379,11 +378,9 @@ class Leg:
         """Its passive axes, if they turn about two points, two about one and three about the other."""
         passive = self.passive
         rows = [[passive[i] for i in row if i not in self.idle] for row in self.centred]
-        if len(passive) - len(self.idle) != PAIR + BALL or sorted(map(len, rows)) != [PAIR, BALL]:
+        if not all(rows) or sum(map(len, rows)) != len(passive) - len(self.idle):
             return None
-        start, end = (point for row in rows for point in row[0].path)
-        first, second = ([joint.axis for joint in row] for row in rows)
-        return two_centres(start, end, first, second)
+        return two_centres([row[0].pivot for row in rows], [[joint.axis for joint in row] for row in rows])
 
 
 def _loads(spring: Spring, twist: Twist, wrenches: Sequence[Wrench], lines: Sequence[Line]) -> tuple[Scalar, ...]:

@@ -19,12 +19,11 @@ from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.solve import Row, right_inverse
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.chains import ElasticLeg
-from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.masses import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
-from kinetostat.machine.drives import numbers_of_drive
+from kinetostat.machine.drives import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine

@@ -17,6 +17,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
+from kinetostat.tolerances import LEAST_DIVISOR
 
 SHRINKING = 0.1
 """Ratio of a step to the one before it below which steps shrink fast, as those of Newton's method near a solution."""
@@ -159,13 +160,13 @@ def newton(
         finite = np.isfinite(length)
         arrived = length < settled
         if round_off is not None:
-            ratio = length / np.maximum(last[rows], 1e-300)
+            ratio = length / np.maximum(last[rows], LEAST_DIVISOR)
             enough = np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
             arrived = enough & (number > 1)
         outcome[rows[arrived]], outcome[rows[~finite]] = Ending.CONVERGED, Ending.DIVERGED
         last[rows], steps[rows], greatest[rows] = length, number, np.maximum(greatest[rows], length)
         if (length > longest).any():
-            step = step * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
+            step = step * np.minimum(1.0, longest / np.maximum(length, LEAST_DIVISOR))[:, None]
         trial = move(trial, step)
         value = _with_part(value, rows, trial, arrived)
         going = np.flatnonzero(finite & ~arrived)
@@ -251,6 +252,6 @@ def damped_steps(left: Array, rates: Array, damping: Array) -> Array:
     """
     back = np.swapaxes(rates, 1, 2)
     square = back @ rates
-    mean = np.trace(square, axis1=1, axis2=2) / square.shape[1] + 1e-300
+    mean = np.trace(square, axis1=1, axis2=2) / square.shape[1] + LEAST_DIVISOR
     square = square + (damping * mean)[:, None, None] * np.eye(square.shape[1])
     return np.asarray(np.linalg.solve(square, back @ left[:, :, None])[:, :, 0])

@@ -16,7 +16,6 @@ from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.engine.points import PointTable
-from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
@@ -24,7 +23,7 @@ from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
 from kinetostat.machine.column import stacked_columns
-from kinetostat.machine.drives import numbers_of_drive
+from kinetostat.machine.drives import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS

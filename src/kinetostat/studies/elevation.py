@@ -13,7 +13,7 @@ Source: theory (46) and (51), and theory section 12.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -46,9 +46,15 @@ from kinetostat.tolerances import NO_REACTION, ROUND_OFF_OF_ENTRY
 UPRIGHT = math.pi / 2.0
 """Elevation at which gravity acts as the file says."""
 USUAL_RANGE = "0 deg:90 deg:7"
+"""Elevations of a telescope, from the horizon to the zenith."""
 LEAST_POINTS, MOST_POINTS = 3, 1000
 """Elevations: three give a curve a + b cos + c sin."""
 FREQUENCY = "loaded_frequency_1"
+"""Name of the first natural frequency about the state at rest."""
+DIGITS_OF_ELEVATION = 9
+"""Decimals, rad, in which elevations at which parts of a leg reverse are compared: the same ones are one reversal."""
+ANSWERS_BEFORE_REQUIREMENTS = 4
+"""Questions that are answered at all elevations together: states at rest, frequencies, corrections and budget."""
 CLEARANCE, ZERO = ".clearance.", ".zero"
 """Parts of the paths of errors that are free motions of a joint, and of those that are lengths of a drive."""
 
@@ -172,7 +178,7 @@ def elevation(
     upright = replace(changed(given, {**turned, GRAVITY_ANGLE: 0.0}), loaded=True)
     elevations = _elevations(over)
     count, angles = len(elevations), UPRIGHT - elevations
-    steps = 4 + (count if upright.requirements else 0)
+    steps = ANSWERS_BEFORE_REQUIREMENTS + (count if upright.requirements else 0)
     states = states_at(upright, {GRAVITY_ANGLE: angles}, count)
     numbers, statuses = loaded_numbers(states)
     progress(1, steps)
@@ -181,16 +187,11 @@ def elevation(
     span = f"{GRAVITY_ANGLE}={float(angles[0])!r}:{float(angles[-1])!r}:{count}"
     corrections = correction_table(upright, span, tolerance)
     progress(3, steps)
-    tolerated = budget(upright, ranges=[span]) if upright.tolerances else None
-    progress(4, steps)
-    moved = numbers["displacement"][:, list(upright.family.components)]
-    turns = np.array([name.startswith("r") for name in upright.family.component_names])
-    for rows in (turns, ~turns):
-        most = np.nanmax(np.abs(moved[:, rows]), initial=0.0)
-        moved[:, rows] = np.where(np.abs(moved[:, rows]) < ROUND_OFF_OF_ENTRY * most, 0.0, moved[:, rows])
+    error_budget = budget(upright, ranges=[span]) if upright.tolerances else None
+    progress(ANSWERS_BEFORE_REQUIREMENTS, steps)
     driven = states.mechanism.driven
     loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
-    settled = np.isfinite(loads).all(axis=1)
+    at_rest = np.isfinite(loads).all(axis=1)
     return Elevation(
         state=state_of(upright),
         status=Status(int(statuses[np.argmax(statuses != Status.OK)])),
@@ -198,17 +199,30 @@ def elevation(
         elevations=elevations,
         statuses=statuses,
         components=upright.family.component_names,
-        displacement=np.where(settled[:, None], moved, np.nan),
-        frequency=np.where(settled, frequency, np.nan),
+        displacement=np.where(at_rest[:, None], _displacement(upright, numbers["displacement"]), np.nan),
+        frequency=np.where(at_rest, frequency, np.nan),
         actuators=tuple(states.mechanism.actuators),
         turning=tuple(spring.joint.point is not None for spring in driven),
         loads=loads,
         limit_use=_limit_use(states, loads),
         reversals=_reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
-        budget=tolerated,
+        budget=error_budget,
         corrections=corrections,
-        requirements=_requirements(upright, angles, elevations, lambda done: progress(4 + done, steps)),
+        requirements=_requirements(
+            upright, angles, elevations, lambda done: progress(ANSWERS_BEFORE_REQUIREMENTS + done, steps)
+        ),
     )
+
+
+def _displacement(machine: Machine, whole: Array) -> Array:
+    """The components of twists [n x 6] that the machine has, without what is round-off over all elevations."""
+    components = whole[:, list(machine.family.components)]
+    rotations = np.array([name.startswith("r") for name in machine.family.component_names])
+    for columns in (rotations, ~rotations):
+        sizes = np.abs(components[:, columns])
+        round_off = sizes < ROUND_OFF_OF_ENTRY * np.nanmax(sizes, initial=0.0)
+        components[:, columns] = np.where(round_off, 0.0, components[:, columns])
+    return components
 
 
 def _check_gravity(machine: Machine) -> None:
@@ -250,29 +264,54 @@ def _limit_use(states: MachineState, loads: Array) -> Array:
 
 
 def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reversal, ...]:
-    """Find where the loads of drives and joints pass zero while gravity turns."""
-    rates, count = model.rates(), len(angles)
+    """Find where the loads of drives and joints pass zero while gravity turns.
+
+    Between two angles at which a part is pressed, to opposite sides, its load passes zero. What is left of the load
+    along the direction in which it changes is then a + b cos + c sin, which `_zero` solves.
+
+    Args:
+        model: the errors of the machine, whose free motions are those of its joints and drives, at n angles.
+        angles: of gravity, rad [n].
+        machine: with its tolerances and backlash.
+    """
+    rates = model.rates()
     if not np.isfinite(rates).all():
         return ()
     reactions = np.einsum("nie,ni->ne", rates, model.drawn.load)
+    # The most work that any motion of a length can do: a reaction far below it is round-off.
     most = np.abs(model.drawn.load[:, 3:]).sum() + np.abs(model.drawn.load[:, :3]).sum() / model.length
-    waves = np.stack([np.ones(count), np.cos(angles), np.sin(angles)], axis=1)
+    waves = np.stack([np.ones(len(angles)), np.cos(angles), np.sin(angles)], axis=1)
     gaps = _gaps(model, machine)
-    passed: dict[tuple[str, float], list[tuple[str, Array | None]]] = {}
+    parts_by_place: dict[tuple[str, float], list[_ReversedPart]] = {}
     for (leg, part), places in _free_motions(model).items():
-        curve = np.linalg.lstsq(waves, reactions[:, places], rcond=None)[0]
-        pressed = np.flatnonzero(np.linalg.norm(reactions[:, places], axis=1) > NO_REACTION * most)
+        reaction = reactions[:, places]
+        curves = np.linalg.lstsq(waves, reaction, rcond=None)[0]
+        pressed = np.flatnonzero(np.linalg.norm(reaction, axis=1) > NO_REACTION * most)
         for before, after in pairwise(pressed.tolist()):
-            ends = reactions[before, places], reactions[after, places]
-            if ends[0] @ ends[1] >= 0.0:
+            if reaction[before] @ reaction[after] >= 0.0:
                 continue
-            way = (ends[0] - ends[1]) / np.linalg.norm(ends[0] - ends[1])
-            angle = _zero(curve @ way, angles[before], angles[after])
+            change = reaction[before] - reaction[after]
+            direction = change / np.linalg.norm(change)
+            angle = _zero(curves @ direction, angles[before], angles[after])
             gap = gaps.get((leg, part))
-            moved = None if gap is None else rates[0][:, places] @ (way * gap)
-            passed.setdefault((leg, round(UPRIGHT - angle, 9)), []).append((part, moved))
-    answers = [_reversal(leg, height, parts) for (leg, height), parts in passed.items()]
-    return tuple(sorted(answers, key=lambda each: each.elevation))
+            twist = None if gap is None else rates[0][:, places] @ (direction * gap)
+            height = round(UPRIGHT - angle, DIGITS_OF_ELEVATION)
+            parts_by_place.setdefault((leg, height), []).append(_ReversedPart(part, twist))
+    reversals = [_reversal(leg, height, parts) for (leg, height), parts in parts_by_place.items()]
+    return tuple(sorted(reversals, key=lambda reversal: reversal.elevation))
+
+
+@dataclass(frozen=True)
+class _ReversedPart:
+    """A joint or drive whose load reverses.
+
+    Attributes:
+        name: of the joint or drive.
+        twist: motion of the platform while it crosses its clearance, rad and m [6]; None where it has none.
+    """
+
+    name: str
+    twist: Array | None
 
 
 def _free_motions(model: ErrorModel) -> dict[tuple[str, str], list[int]]:
@@ -317,13 +356,14 @@ def _zero(curve: Array, start: float, end: float) -> float:
     return min(max(min(nearest, key=lambda root: abs(root - between)), between - half), between + half)
 
 
-def _reversal(leg: str, height: float, parts: Sequence[tuple[str, Array | None]]) -> Reversal:
-    motions = [moved for _, moved in parts if moved is not None]
-    twist = np.sum(motions, axis=0) if motions else None
-    jump, turn = (None, None) if twist is None else (
-        float(np.linalg.norm(twist[3:])), float(np.linalg.norm(twist[:3]))
-    )  # fmt: skip
-    return Reversal(height, leg, tuple(name for name, _ in parts), jump, turn)
+def _reversal(leg: str, height: float, parts: Sequence[_ReversedPart]) -> Reversal:
+    """The reversal of all parts of a leg that reverse at an elevation, rad: their motions of the tool add up."""
+    names = tuple(part.name for part in parts)
+    twists = [part.twist for part in parts if part.twist is not None]
+    if not twists:
+        return Reversal(height, leg, names, None, None)
+    twist = np.sum(twists, axis=0)
+    return Reversal(height, leg, names, float(np.linalg.norm(twist[3:])), float(np.linalg.norm(twist[:3])))
 
 
 def _requirements(
@@ -332,13 +372,16 @@ def _requirements(
     """The requirements at every elevation: of each condition the verdict at its worst one, which its place names."""
     if not upright.requirements:
         return ()
-    worst: Mapping[int, tuple[float, Verdict]] = {}
+    by_condition: dict[int, list[Verdict]] = {}
     for number, (angle, height) in enumerate(zip(angles.tolist(), elevations.tolist(), strict=True), 1):
-        for place, verdict in enumerate(requirements(with_values(upright, {GRAVITY_ANGLE: angle}))):
-            where = f"elevation {upright.display.show(height, 'rad')}"
-            there = f"{verdict.place}, {where}" if verdict.place else where
-            rank = -math.inf if verdict.margin is None and not verdict.met else verdict.margin or 0.0
-            if place not in worst or rank < worst[place][0]:
-                worst = {**worst, place: (rank, replace(verdict, place=there))}
+        where = f"elevation {upright.display.show(height, 'rad')}"
+        for condition, verdict in enumerate(requirements(with_values(upright, {GRAVITY_ANGLE: angle}))):
+            place = f"{verdict.place}, {where}" if verdict.place else where
+            by_condition.setdefault(condition, []).append(replace(verdict, place=place))
         done(number)
-    return tuple(verdict for _, verdict in (worst[place] for place in sorted(worst)))
+    return tuple(min(verdicts, key=_margin_of_met) for _, verdicts in sorted(by_condition.items()))
+
+
+def _margin_of_met(verdict: Verdict) -> float:
+    """The margin of a verdict; without one, minus infinity where the requirement is not met, and 0 where it is."""
+    return -math.inf if verdict.margin is None and not verdict.met else verdict.margin or 0.0

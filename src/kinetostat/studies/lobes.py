@@ -27,10 +27,10 @@ from kinetostat.spec.fields import Quantity, positive
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.tool_receptance import read_tool
-from kinetostat.studies.vibration import Vibration, modes
+from kinetostat.studies.vibration import Vibration, frequency_ends, modes
 from kinetostat.units import UnitError
-from kinetostat.vibration.coupling import FreeTool
 from kinetostat.vibration.cutting import Borders, Engagement, borders, milling, turning
+from kinetostat.vibration.receptance import FreeTool
 
 SPEEDS = 1200
 """Speeds of the curve."""
@@ -39,8 +39,13 @@ SLOWEST_SHARE = 0.08
 FASTEST = 1.6
 """Fastest speed of the curve, in turns in which an edge passes once per period of the chatter, if none is given."""
 MOST_POSES = 2000
+"""Poses of a range: each takes some milliseconds, as a machine of its own."""
 STRAIGHT = 1e-6
 """Sine of the angle by which the feed may miss being at right angles to the spindle."""
+MOST_TEETH, MOST_RADIAL = 100, 10.0
+"""Edges of a cutter, and radial force over the tangential one: more is a slip of the pen."""
+ROUND_OFF_OF_DEGREES = 1e-12
+"""Share by which 180 degrees may come out as more than pi when a text is converted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,29 +134,46 @@ def lobes(
             angles to the spindle, or there are more than 2000 poses.
     """
     state = state_of(machine)
-    engagement = _cutter_of(state.machine, teeth, entry, leaving, feed, spindle, radial, cutting_pressure)
-    ends = [None if end is None else positive(end, "frequency", name)
-            for end, name in ((lowest, "lowest"), (highest, "highest"))]  # fmt: skip
-    if ends[0] is not None and ends[1] is not None and ends[0] >= ends[1]:
-        raise InputError("lowest is not below highest; exchange them.")
+    engagement = _engagement_of(state.machine, teeth, entry, leaving, feed, spindle, radial, cutting_pressure)
+    ends = frequency_ends(lowest, highest)
     if not over:
-        return _answer(state, [(modes(state, tool_receptance=tool_receptance), ())], engagement, ends)
-    pairs = chosen_axes(state.machine, over)
-    grid = grid_of(pairs)
+        return _lobes_of(state, [_VibrationAtPose(modes(state, tool_receptance=tool_receptance))], engagement, ends)
+    tool = read_tool(tool_receptance) if tool_receptance is not None else None
+    return _lobes_of(state, _vibrations_over(state.machine, over, tool, progress), engagement, ends)
+
+
+@dataclass(frozen=True)
+class _VibrationAtPose:
+    """The vibrations at a pose, and its coordinates by leaf path, SI; none for the pose of the machine itself."""
+
+    vibration: Vibration
+    pose: tuple[tuple[str, float], ...] = ()
+
+    def borders(self, engagement: Engagement) -> Borders | None:
+        """The borders of stability at the pose; None where nothing vibrates."""
+        if self.vibration.solution is None or not self.vibration.solution.ringing:
+            return None
+        frequencies = self.vibration.search_frequencies
+        displacements = self.vibration.receptance(frequencies.tolist())[:, 3:, 3:]
+        return borders(displacements, frequencies, engagement)
+
+
+def _vibrations_over(
+    machine: Machine, over: str | Sequence[str], tool: FreeTool | None, progress: Progress
+) -> list[_VibrationAtPose]:
+    """The vibrations at all poses of some ranges, each with the same tool coupled."""
+    grid = grid_of(chosen_axes(machine, over))
     if grid.size > MOST_POSES:
         raise InputError(f"over has {grid.size:,} poses; at most {MOST_POSES:,} are computed: lower the counts.")
-    columns = grid.columns(0, grid.size)
-    tool = read_tool(tool_receptance) if tool_receptance is not None else None
-    vibrations: list[tuple[Vibration, tuple[tuple[str, float], ...]]] = []
+    columns, vibrations = grid.columns(0, grid.size), []
     for place in range(grid.size):
         pose = tuple((path, float(column[place])) for path, column in columns.items())
-        there = modes(with_values(state.machine, dict(pose)))
-        vibrations.append((replace(there, tool=tool), pose))
+        vibrations.append(_VibrationAtPose(replace(modes(with_values(machine, dict(pose))), tool=tool), pose))
         progress(place + 1, grid.size)
-    return _answer(state, vibrations, engagement, ends)
+    return vibrations
 
 
-def _cutter_of(
+def _engagement_of(
     machine: Machine,
     teeth: int | None,
     entry: float | str | None,
@@ -161,6 +183,7 @@ def _cutter_of(
     radial: float,
     cutting_pressure: float | str | None,
 ) -> Engagement:
+    """The engagement of turning or milling by the arguments of `lobes`, each of which is checked."""
     cutting = machine.tables["cutting"]
     given = cutting.pressure or None if cutting_pressure is None else cutting_pressure
     if given is None:
@@ -176,22 +199,28 @@ def _cutter_of(
                 "for a milling cutter."
             )
         return turning(pressure, np.array(unit_direction(cutting.direction, "cutting.direction")))
-    if not 1 <= teeth <= 100:
-        raise InputError(f"teeth is {teeth}; a cutter has 1 to 100.")
-    if not 0.0 <= radial <= 10.0:
-        raise InputError(f"radial is {radial:g}; a share of the tangential force from 0 to 10 is allowed.")
-    start = 0.0 if entry is None else _angle(entry, "entry")
-    end = math.pi if leaving is None else _angle(leaving, "leaving")
-    if not 0.0 <= start < end <= math.pi * (1.0 + 1e-12):
-        raise InputError(
-            f"entry and leaving are {math.degrees(start):g} and {math.degrees(end):g} deg; an edge enters at 0 deg or "
-            "later and leaves after that, at 180 deg at the latest."
-        )
+    if not 1 <= teeth <= MOST_TEETH:
+        raise InputError(f"teeth is {teeth}; a cutter has 1 to {MOST_TEETH}.")
+    if not 0.0 <= radial <= MOST_RADIAL:
+        raise InputError(f"radial is {radial:g}; a share of the tangential force from 0 to {MOST_RADIAL:g} is allowed.")
+    start, end = _entry_and_leaving(entry, leaving)
     along = np.array(unit_direction(feed or (1.0, 0.0, 0.0), "feed"))
     axis = np.array(unit_direction(spindle or (0.0, 0.0, 1.0), "spindle"))
     if abs(along @ axis) > STRAIGHT:
         raise InputError("The feed is not at right angles to the spindle; change feed or spindle.")
     return milling(pressure, radial, teeth, start, end, along, axis)
+
+
+def _entry_and_leaving(entry: float | str | None, leaving: float | str | None) -> tuple[float, float]:
+    """The angles, rad, at which an edge enters and leaves the cut; those of a slot where they are not given."""
+    start = 0.0 if entry is None else _angle(entry, "entry")
+    end = math.pi if leaving is None else _angle(leaving, "leaving")
+    if not 0.0 <= start < end <= math.pi * (1.0 + ROUND_OFF_OF_DEGREES):
+        raise InputError(
+            f"entry and leaving are {math.degrees(start):g} and {math.degrees(end):g} deg; an edge enters at 0 deg or "
+            "later and leaves after that, at 180 deg at the latest."
+        )
+    return start, end
 
 
 def _angle(value: float | str, name: str) -> float:
@@ -201,31 +230,25 @@ def _angle(value: float | str, name: str) -> float:
         raise InputError(f"{name} is {shorten(value)}: {error}.") from None
 
 
-def _answer(
+def _lobes_of(
     state: MachineState,
-    vibrations: Sequence[tuple[Vibration, tuple[tuple[str, float], ...]]],
+    vibrations: Sequence[_VibrationAtPose],
     engagement: Engagement,
-    ends: Sequence[float | None],
+    ends: tuple[float | None, float | None],
 ) -> Lobes:
-    rows = [(_borders_of(each, engagement), pose, each) for each, pose in vibrations]
-    known = [(border, pose, each) for border, pose, each in rows if border is not None]
-    nothing = np.zeros(0)
-    if not known:
-        first = vibrations[0][0]
+    """The widths that are stable at all poses with vibrations: at each speed the least of theirs."""
+    known = [(row.borders(engagement), row) for row in vibrations]
+    pairs = [(border, row) for border, row in known if border is not None]
+    if not pairs:
+        first, nothing = vibrations[0].vibration, np.zeros(0)
         message = first.message if len(vibrations) == 1 else "At none of these poses does the machine have vibrations."
         return Lobes(state, first.status, message, engagement.teeth, engagement.pressure, nothing, nothing, poses=0)
-    border, pose, _ = min(known, key=lambda row: row[0].least[0])
-    least, frequency = border.least
-    chatter = frequency if math.isfinite(frequency) else float(border.frequencies[-1])
-    fastest = ends[1] or FASTEST * chatter / engagement.teeth
-    speeds = np.linspace(ends[0] or SLOWEST_SHARE * fastest, fastest, SPEEDS)
-    if speeds[0] >= speeds[-1]:
-        raise InputError(
-            f"lowest is above the range that is shown, up to {60.0 * fastest:.4g} 1/min; give highest too."
-        )
-    widths = np.min([each.widths_at(speeds) for each, _, _ in known], axis=0)
-    place = int(np.argmax(widths))
-    best = (float(speeds[place]), float(widths[place])) if widths[place] > least else None
+    worst_border, worst = min(pairs, key=lambda pair: pair[0].least[0])
+    least, frequency = worst_border.least
+    chatter = frequency if math.isfinite(frequency) else float(worst_border.frequencies[-1])
+    speeds = _speeds(chatter, engagement.teeth, ends)
+    widths = np.min([border.widths_at(speeds) for border, _ in pairs], axis=0)
+    widest = int(np.argmax(widths))
     return Lobes(
         state=state,
         status=Status.OK,
@@ -236,16 +259,26 @@ def _answer(
         widths=widths,
         least=least,
         frequency=frequency,
-        best=best,
-        assumed=any(each.assumed for _, _, each in known),
-        poses=len(known),
-        worst=pose,
-        tool=known[0][2].tool,
+        best=(float(speeds[widest]), float(widths[widest])) if widths[widest] > least else None,
+        assumed=any(row.vibration.assumed for _, row in pairs),
+        poses=len(pairs),
+        worst=worst.pose,
+        tool=pairs[0][1].vibration.tool,
     )
 
 
-def _borders_of(vibration: Vibration, engagement: Engagement) -> Borders | None:
-    if vibration.solution is None or not vibration.solution.ringing:
-        return None
-    tried = vibration.search_frequencies
-    return borders(vibration.receptance(tried.tolist())[:, 3:, 3:], tried, engagement)
+def _speeds(chatter: float, teeth: int, ends: tuple[float | None, float | None]) -> Array:
+    """The speeds of the curve, turns per second: over the given range, or one that has its last lobes.
+
+    Args:
+        chatter: frequency of the chatter, Hz.
+        teeth: edges that pass in a turn.
+        ends: slowest and fastest speed, as they are given.
+    """
+    fastest = ends[1] or FASTEST * chatter / teeth
+    speeds = np.linspace(ends[0] or SLOWEST_SHARE * fastest, fastest, SPEEDS)
+    if speeds[0] >= speeds[-1]:
+        raise InputError(
+            f"lowest is above the range that is shown, up to {60.0 * fastest:.4g} 1/min; give highest too."
+        )
+    return speeds

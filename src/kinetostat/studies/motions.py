@@ -28,7 +28,7 @@ from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
-from kinetostat.studies.moves import along_profile, curve_between, moment_at, profile
+from kinetostat.studies.moves import along_profile, moves_between, profile
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns, unit_doubt
 
 TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
@@ -44,6 +44,12 @@ SMOOTH = 5
 """Degree of the spline through poses at times: with it, accelerations have no corner."""
 _LOAD = re.compile(r"load\.(.+\.)?(force|moment)\.\d")
 """Paths of components of forces and moments on the platform, those of named loads among them."""
+SAME_POSE = 1e-12
+"""Difference of a coordinate of the first and the last pose, SI, up to which the motion is a closed one."""
+WHOLE_PERIODS = 1e-9
+"""Difference from a whole number of periods of the slowest sine up to which a sine has come back to its start."""
+AROUND = 32
+"""Directions of the speed, beside those in which a drive is fastest."""
 AROUND_SINES = 256
 """Points in a period of the fastest sine, at least."""
 MOST_PERIODS = 200
@@ -82,10 +88,6 @@ class Motion:
         return {named_entry(path): {"units": units[path], "values": self.path.loads[path]} for path in units}
 
 
-AROUND = 32
-"""Directions of the speed, beside those in which a drive is fastest."""
-
-
 def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motion:
     """A speed and an acceleration of the platform point in the directions that are worst for each drive.
 
@@ -120,6 +122,7 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
 
 
 def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, gains: Array) -> MovedPath:
+    """Rates and accelerations of some coordinates [n x moving], all at one pose."""
     count = len(rates)
     parts = [
         {name: part[:, moving.index(name)] if name in moving else np.zeros(count) for name in here}
@@ -129,6 +132,7 @@ def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, gai
 
 
 def _both_ways(rows: Array) -> list[Array]:
+    """Unit vectors along rows that are not zero, and against them."""
     sizes = np.linalg.norm(rows, axis=1, keepdims=True)
     units = rows[sizes[:, 0] > 0.0] / sizes[sizes[:, 0] > 0.0]
     return [units, -units]
@@ -275,7 +279,7 @@ def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array],
         after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
         raise InputError(f"times must grow from line to line, but {after}; put the poses in their order.")
     unwound = {name: np.array(rows) for name, rows in coordinates.items()}
-    closed = len(times) > SMOOTH + 1 and all(abs(rows[0] - rows[-1]) < 1e-12 for rows in unwound.values())
+    closed = len(times) > SMOOTH + 1 and all(abs(rows[0] - rows[-1]) < SAME_POSE for rows in unwound.values())
     degree = min(SMOOTH, len(times) - 1)
     stacked = np.stack(list(unwound.values()), axis=1)
     if closed:
@@ -322,46 +326,81 @@ def _moves(
     """Moves one after the other, each from rest to rest, theory (97) and (98); loads jump where a pose is twice."""
     names = list(coordinates)
     table = np.stack([coordinates[name] for name in names], axis=1)
-    places = [number for number, name in enumerate(names) if name in ("x", "y", "z")]
-    ends = [row for row, shape in enumerate(shapes) if shape != "through"]
-    if len(ends) < 2:
-        raise InputError("it has only one pose; give the pose where the motion begins and those to which it moves.")
-    lengths = float(machine.configure().length) if machine.family.chains is None else float(machine.chains().length)
-    moved = [(start, end) for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
-    curves = [curve_between(table, start, end, places, lengths, shapes[end] == "arc") for start, end in moved]
-    if not curves:
-        raise InputError("all of its poses are alike, so that nothing moves; change a coordinate from line to line.")
-    each = max(2, points // max(1, 4 * len(curves)))
-    times, rows, clock = [], [[], [], []], 0.0  # type: ignore[var-annotated]
-    carried: dict[str, list[Array]] = {name: [] for name in loads}
-    for curve, (start, row) in zip(curves, moved, strict=True):
-        jerk = float(amounts[JERK][row]) if JERK in amounts else np.inf
-        steps = profile(curve.length, float(amounts[FEED][row]), float(amounts[ACCELERATION][row]), jerk)
-        time, run = along_profile(steps, each)
-        place, slope, bend = curve.at(run[0])
-        parts = place, slope * run[1][:, None], bend * run[1][:, None] ** 2 + slope * run[2][:, None]
-        for part, more in zip(rows, parts, strict=True):
-            part.append(more)
-        knots = [start, *range(start + 1, row), row]  # with the point through which an arc leads
-        if loads and len(knots) > 2 and curve.middle is None:
-            raise InputError(
-                "the point through which an arc leads is in line with its ends, so that no moment belongs to the "
-                "forces there; write that arc as a line."
-            )
-        moments = [0.0, *(moment_at(steps, curve.middle) for _ in knots[1:-1] if curve.middle), float(time[-1])]
+    positions = [number for number, name in enumerate(names) if name in POINT]
+    length = float(machine.configure().length) if machine.family.chains is None else float(machine.chains().length)
+    moves = moves_between(table, shapes, positions, length)
+    points_of_phase = max(2, points // max(1, 4 * len(moves)))
+    times, rows, clock = [], [], 0.0
+    loads_of_moves: dict[str, list[Array]] = {name: [] for name in loads}
+    for move in moves:
+        jerk = float(amounts[JERK][move.end]) if JERK in amounts else np.inf
+        feed, acceleration = (float(amounts[name][move.end]) for name in (FEED, ACCELERATION))
+        phases = profile(move.curve.length, feed, acceleration, jerk)
+        time, covered = along_profile(phases, points_of_phase)
+        rows.append(move.curve.in_time(*covered))
         for name, column in loads.items():
-            carried[name].append(np.interp(time, moments, column[knots]))
+            loads_of_moves[name].append(np.interp(time, move.moments(phases), column[move.start : move.end + 1]))
         times.append(clock + time)
         clock += float(time[-1])
-    joined = [np.concatenate(part) for part in rows], {name: np.concatenate(parts) for name, parts in carried.items()}
-    kind = (
-        f"{_number_of(len(curves), 'move')} of {'seven phases' if JERK in amounts else 'three phases'}, {clock:.4g} s"
-    )
-    return Motion(kind, np.concatenate(times), _path(names, *joined))
+    joined_rows = [np.concatenate(parts) for parts in zip(*rows, strict=True)]
+    joined_loads = {name: np.concatenate(parts) for name, parts in loads_of_moves.items()}
+    phases_in_words = "seven phases" if JERK in amounts else "three phases"
+    kind = f"{_number_of(len(moves), 'move')} of {phases_in_words}, {clock:.4g} s"
+    return Motion(kind, np.concatenate(times), _path(names, joined_rows, joined_loads))
+
+
+@dataclass(frozen=True)
+class _Sine:
+    """A line of a file of sines: how a coordinate of the pose, or a component of a load, swings about its value.
+
+    Attributes:
+        path: of what swings.
+        amplitude: SI.
+        rate: 2 pi times the frequency, rad/s.
+        phase: at the time 0, rad.
+    """
+
+    path: str
+    amplitude: float
+    rate: float
+    phase: float
+
+    def at(self, times: Array) -> tuple[Array, Array, Array]:
+        """Displacement, rate and acceleration at times, s [n]."""
+        angle = self.rate * times + self.phase
+        displacement = self.amplitude * np.sin(angle)
+        return displacement, self.amplitude * self.rate * np.cos(angle), -self.amplitude * self.rate**2 * np.sin(angle)
 
 
 def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
     """Sines about the pose of the machine and about its loads: of shakers and flight simulators, theory (96)."""
+    sines = _sines_of_lines(machine, given)
+    fastest, slowest = max(sine.rate for sine in sines), min(sine.rate for sine in sines)
+    if fastest > MOST_PERIODS * slowest:
+        raise InputError(
+            f"the fastest sine swings more than {MOST_PERIODS} times in a period of the slowest; part them."
+        )
+    count = max(points, int(np.ceil(AROUND_SINES * fastest / slowest)))
+    times = np.linspace(0.0, 2.0 * np.pi / slowest, count + 1)
+    swinging = {sine.path for sine in sines}
+    starts = {path: float(v) for path, v in values(machine).items() if path.startswith(POSE) or path in swinging}
+    columns = {path: (np.full(times.shape, v), *np.zeros((2, *times.shape))) for path, v in starts.items()}
+    for sine in sines:
+        changes = zip(columns[sine.path], sine.at(times), strict=True)
+        columns[sine.path] = tuple(column + change for column, change in changes)
+    coordinates, rates, gains = (
+        {path.removeprefix(POSE): parts[order] for path, parts in columns.items() if path.startswith(POSE)}
+        for order in range(3)
+    )
+    loads = {path: parts[0] for path, parts in columns.items() if not path.startswith(POSE)}
+    periods = [sine.rate / slowest for sine in sines]
+    closes = all(abs(number - round(number)) < WHOLE_PERIODS for number in periods)
+    kind = f"{_number_of(len(sines), 'sine')}, {times[-1]:.4g} s"
+    return Motion(kind, times, MovedPath(coordinates, rates, gains, loads), closes)
+
+
+def _sines_of_lines(machine: Machine, given: Mapping[str, GivenColumn]) -> list[_Sine]:
+    """The sines of the lines of a file, whose amplitudes have the units of what swings."""
     for name in given:
         if name not in (FIELD, "amplitude", "frequency", "phase"):
             raise InputError(
@@ -371,44 +410,17 @@ def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> M
     for name in ("amplitude", "frequency"):
         if name not in given:
             raise InputError(f"a motion of sines has no column {name}; add one, e.g. amplitude, frequency [Hz].")
-    here = {
-        path: float(value) for path, value in values(machine).items() if path.startswith(POSE) or _LOAD.fullmatch(path)
-    }
-    rows = []
-    for number, word in enumerate(given[FIELD].entries):
-        word = str(word).strip()
+    sines = []
+    for number, entry in enumerate(given[FIELD].entries):
+        word = str(entry).strip()
         path = _swinging(machine, word)
-        one_row = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in given.items()}
-        field = GivenColumn(word, one_row["amplitude"].entries, given["amplitude"].unit)
+        of_line = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in given.items()}
+        field = GivenColumn(word, of_line["amplitude"].entries, given["amplitude"].unit)
         amplitude = read_columns(machine, [field], lambda name, _: f"amplitude of {name}").values[0][0]
-        frequency = column_values(one_row["frequency"], Quantity("frequency", "", positive=True), _place)[0]
-        phase = column_values(one_row["phase"], Quantity("angle", ""), _place)[0] if "phase" in given else 0.0
-        rows.append((path, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
-    fastest, slowest = max(row[2] for row in rows), min(row[2] for row in rows)
-    if fastest > MOST_PERIODS * slowest:
-        raise InputError(
-            f"the fastest sine swings more than {MOST_PERIODS} times in a period of the slowest; part them."
-        )
-    count = max(points, int(np.ceil(AROUND_SINES * fastest / slowest)))
-    times = np.linspace(0.0, 2.0 * np.pi / slowest, count + 1)
-    swinging = {path for path, *_ in rows}
-    moved = {
-        path: np.full(times.shape, value) for path, value in here.items() if path.startswith(POSE) or path in swinging
-    }
-    rates, gains = ({path: np.zeros(times.shape) for path in moved} for _ in range(2))
-    for path, amplitude, turning, phase in rows:
-        angle = turning * times + phase
-        moved[path] = moved[path] + amplitude * np.sin(angle)
-        rates[path] = rates[path] + amplitude * turning * np.cos(angle)
-        gains[path] = gains[path] - amplitude * turning**2 * np.sin(angle)
-    closes = all(abs(row[2] / slowest - round(row[2] / slowest)) < 1e-9 for row in rows)
-    coordinates, coordinate_rates, accelerations = (
-        {path.removeprefix(POSE): part[path] for path in part if path.startswith(POSE)}
-        for part in (moved, rates, gains)
-    )
-    loads = {path: column for path, column in moved.items() if not path.startswith(POSE)}
-    moved_path = MovedPath(coordinates, coordinate_rates, accelerations, loads)
-    return Motion(f"{_number_of(len(rows), 'sine')}, {times[-1]:.4g} s", times, moved_path, closes)
+        frequency = column_values(of_line["frequency"], Quantity("frequency", "", positive=True), _place)[0]
+        phase = column_values(of_line["phase"], Quantity("angle", ""), _place)[0] if "phase" in given else 0.0
+        sines.append(_Sine(path, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
+    return sines
 
 
 def _swinging(machine: Machine, word: str) -> str:

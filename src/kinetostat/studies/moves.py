@@ -6,6 +6,7 @@ Source: theory (97) and (98).
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -13,9 +14,15 @@ from scipy.optimize import brentq
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.spec.errors import InputError
+
+Phases = list[tuple[float, float, float]]
+"""Phases of a move: duration, s, and the acceleration at the begin and at the end of each, m/s²."""
 
 STRAIGHT = 1e-9
 """Sine of the angle between two chords of an arc below which it is a straight line."""
+ROUND_OFF_OF_TIME = 1e-15
+"""Error of the time at which a point is passed, s: the round-off of a move of some seconds."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,63 @@ class Curve:
                 -at * rate**2,
             )
         return place, slope, bend
+
+    def in_time(self, lengths: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array, Array]:
+        """Coordinates with their rates and accelerations [n x coordinates], by the length, m, and its rates [n]."""
+        place, slope, bend = self.at(lengths)
+        return place, slope * speeds[:, None], bend * speeds[:, None] ** 2 + slope * accelerations[:, None]
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move from rest to rest.
+
+    Attributes:
+        start, end: rows of its first and its last pose in the table; an arc leads through the row between them.
+        curve: the line or the arc.
+    """
+
+    start: int
+    end: int
+    curve: Curve
+
+    def moments(self, phases: Phases) -> list[float]:
+        """The times, s, at which it is at the poses of its rows, from its start.
+
+        Raises:
+            InputError: the point between its ends is in line with these, so that nobody can say when it is passed.
+        """
+        duration = sum(time for time, _, _ in phases if time > 0.0)
+        if self.end - self.start == 1:
+            return [0.0, duration]
+        if self.curve.middle is None:
+            raise InputError(
+                "the point through which an arc leads is in line with its ends, so that no moment belongs to the "
+                "forces there; write that arc as a line."
+            )
+        return [0.0, moment_at(phases, self.curve.middle), duration]
+
+
+def moves_between(table: Array, shapes: Sequence[str], places: Sequence[int], size: float) -> list[Move]:
+    """The moves from pose to pose of a table, without those that lead nowhere.
+
+    Args:
+        table: coordinates of the poses [n x coordinates].
+        shapes: of each row: "line" or "arc" leads to it, "through" is a point of the next arc.
+        places, size: see `curve_between`.
+
+    Raises:
+        InputError: there is only one pose, or nothing moves.
+    """
+    ends = [row for row, shape in enumerate(shapes) if shape != "through"]
+    if len(ends) < 2:
+        raise InputError("it has only one pose; give the pose where the motion begins and those to which it moves.")
+    pairs = [(start, end) for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
+    if not pairs:
+        raise InputError("all of its poses are alike, so that nothing moves; change a coordinate from line to line.")
+    return [
+        Move(start, end, curve_between(table, start, end, places, size, shapes[end] == "arc")) for start, end in pairs
+    ]
 
 
 def curve_between(table: Array, start: int, end: int, places: Sequence[int], size: float, round_: bool) -> Curve:
@@ -101,8 +165,11 @@ def _arc(start: Array, middle: Array, end: Array) -> tuple[tuple[Array, Array, A
     return (centre, first, second, float(turns[1])), float(turns[0])
 
 
-def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> list[tuple[float, float, float]]:
-    """The phases of a move from rest to rest: duration (s), and acceleration at both ends of each, theory (98).
+def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> Phases:
+    """The phases of a move from rest to rest, theory (98).
+
+    The speed is the greatest that can be reached and left again on this length, at most the feed rate. The acceleration
+    grows and falls with the jerk, and holds between, if it comes to its limit.
 
     Args:
         length: length of the path, m.
@@ -117,17 +184,15 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
         lag = acceleration**2 / jerk
         speed = 0.5 * (np.sqrt(lag**2 + 4.0 * acceleration * length) - lag)
     speed = min(feed, float(speed))
-    grows = acceleration / jerk if speed * jerk > acceleration**2 else float(np.sqrt(speed / jerk))
-    most = jerk * grows
-    holds = max(speed / most - grows, 0.0)
-    cruise = max(length / speed - (2.0 * grows + holds), 0.0)
-    rise = [(grows, 0.0, most), (holds, most, most), (grows, most, 0.0)]
+    growing = acceleration / jerk if speed * jerk > acceleration**2 else float(np.sqrt(speed / jerk))
+    peak = jerk * growing
+    holding = max(speed / peak - growing, 0.0)
+    cruise = max(length / speed - (2.0 * growing + holding), 0.0)
+    rise = [(growing, 0.0, peak), (holding, peak, peak), (growing, peak, 0.0)]
     return [*rise, (cruise, 0.0, 0.0), *((time, -a, -b) for time, a, b in rise)]
 
 
-def along_profile(
-    phases: Sequence[tuple[float, float, float]], points: int
-) -> tuple[Array, tuple[Array, Array, Array]]:
+def along_profile(phases: Phases, points: int) -> tuple[Array, tuple[Array, Array, Array]]:
     """Times (s) in all phases, so many in each with both of its ends, and length, speed and acceleration then."""
     times, lengths, speeds, gains = [], [], [], []
     clock = at = speed = 0.0
@@ -144,7 +209,7 @@ def along_profile(
     return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(gains))
 
 
-def moment_at(phases: Sequence[tuple[float, float, float]], length: float) -> float:
+def moment_at(phases: Phases, length: float) -> float:
     """The time at which a move has come so far, s.
 
     Args:
@@ -155,9 +220,9 @@ def moment_at(phases: Sequence[tuple[float, float, float]], length: float) -> fl
     for duration, first, last in phases:
         if duration <= 0.0:
             continue
-        way = Polynomial([at - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
-        if way(duration) >= 0.0:
-            return clock + float(brentq(way, 0.0, duration, xtol=1e-15))
-        at, speed = float(way(duration)) + length, float(way.deriv()(duration))
+        remaining = Polynomial([at - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
+        if remaining(duration) >= 0.0:
+            return clock + float(brentq(remaining, 0.0, duration, xtol=ROUND_OFF_OF_TIME))
+        at, speed = float(remaining(duration)) + length, float(remaining.deriv()(duration))
         clock += duration
     return clock

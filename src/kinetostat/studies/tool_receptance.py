@@ -15,7 +15,7 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.studies.poses import GivenColumn, column_values, columns_of
-from kinetostat.vibration.coupling import FreeTool
+from kinetostat.vibration.receptance import FreeTool
 
 _HEAD = re.compile(r"(tip|flange)\.(r?[xyz])\s*/\s*(tip|flange)\.(r?[xyz])\s+(real|imaginary)")
 FREQUENCY = "frequency"

@@ -35,7 +35,7 @@ from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.studies.attribution import Softest, softest
 from kinetostat.studies.rounding import clean_matrix, clean_screw, clean_statics
-from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
+from kinetostat.tolerances import LEAST_DIVISOR, ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
 CURVE_SHARES = tuple(i / 12 for i in range(16))
@@ -297,7 +297,7 @@ def _largest_wrench(equations: Balance) -> float:
     Above 0, so that a machine on which nothing acts has the residual 0.
     """
     sizes = (equations.load, *equations.state.wrenches, equations.mechanism.growth)
-    return float(max(np.abs(size).max(initial=1e-300) for size in sizes))
+    return float(max(np.abs(size).max(initial=LEAST_DIVISOR) for size in sizes))
 
 
 def _spring_states(equations: Balance) -> list[SpringState]:

@@ -6,17 +6,12 @@ The equations are in `vibration`; the command is `modes`.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from kinetostat.algebra.screw import Twist, Wrench
-from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array, Complex
-from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.links import loaded_links
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -34,25 +29,24 @@ from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
 from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.tolerances import EQUAL_FREQUENCIES
-from kinetostat.vibration.coupling import FreeTool, couple
 from kinetostat.vibration.cutting import tried_frequencies
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
 from kinetostat.vibration.receptance import (
     ASSUMED_RATIO,
     Damper,
+    FreeTool,
     Softest,
     along,
+    couple,
     damper,
     least_real_part,
     receptance,
     softest_of,
 )
 from kinetostat.vibration.servo import ClosedLoops, servo_loops, with_standing_motors
-from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
+from kinetostat.vibration.shares import effective_masses, kinetic_shares, small_motions, strain_shares
 
-SMALL = 1e-6
-"""Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 MOST_SHOWN = 12
 """Modes that are shown; higher ones add to the response all the same."""
 NOTHING_RINGS = "There are no natural frequencies: all that could move is rigid."
@@ -69,6 +63,8 @@ NEAR = 200
 """Frequencies about each mode."""
 WIDE = 6.0
 """Distance of these frequencies from the mode, in multiples of its frequency and damping ratio."""
+LEAST_DRAWN_RATIO = 1e-4
+"""Damping ratio below which frequencies about a mode lie as those of this one: no picture shows a sharper peak."""
 HIGHEST = 1e20
 """Of frequencies, Hz: its square is still a number."""
 BELOW, ABOVE = 0.2, 1.6
@@ -262,40 +258,55 @@ def modes(
             an inertia or a stiffness of the transmission.
     """
     state, tool = state_of(machine), read_tool(tool_receptance) if tool_receptance is not None else None
-    cutting = state.machine.tables["cutting"]
+    direction, pressure = _direction_and_pressure(state.machine, along, cutting_pressure)
+    low, high = frequency_ends(lowest, highest)
+    answer = _modes_with_closed_loops(state) if closed_loops else _modes_of(state)
+    return replace(answer, direction=direction, cutting_pressure=pressure, lowest=low, highest=high, tool=tool)
+
+
+def _direction_and_pressure(
+    machine: Machine, along: Sequence[float], cutting_pressure: float | str | None
+) -> tuple[tuple[float, ...], float | None]:
+    """The direction across the cut, and the cutting pressure: as they are given, else those of [cutting]."""
+    cutting = machine.tables["cutting"]
     if along:
         unit_direction(along, "along")
     direction = tuple(along) or (tuple(cutting.direction) if any(cutting.direction) else ())
-    pressure, low, high = (
-        None if value is None else positive(value, kind, name)
-        for value, kind, name in (
-            (cutting_pressure, "cutting pressure", "cutting_pressure"),
-            (lowest, "frequency", "lowest"),
-            (highest, "frequency", "highest"),
-        )
+    if cutting_pressure is None:
+        return direction, cutting.pressure or None
+    pressure = positive(cutting_pressure, "cutting pressure", "cutting_pressure")
+    if not direction:
+        raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
+    return direction, pressure
+
+
+def frequency_ends(lowest: float | str | None, highest: float | str | None) -> tuple[float | None, float | None]:
+    """Read the ends of a range of frequencies, Hz or with a unit; None stays where an end is not given.
+
+    Raises:
+        InputError: an end is not a frequency above 0, or the lowest is not below the highest.
+    """
+    low, high = (
+        None if end is None else positive(end, "frequency", name)
+        for end, name in ((lowest, "lowest"), (highest, "highest"))
     )
     if low is not None and high is not None and low >= high:
         raise InputError(f"lowest is {low:g} Hz, not below highest, {high:g} Hz; exchange them.")
-    if pressure is not None and not direction:
-        raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
-    loops = servo_loops(state) if closed_loops else {}
-    answer = _modes_in(state_of(with_standing_motors(state.machine)) if closed_loops else state)
-    closed, solution = None, answer.solution
-    if closed_loops and solution is not None and answer.damping is not None and solution.ringing:
-        closed = ClosedLoops(solution, answer.damping, tuple(loops[drive.name] for drive in solution.drives))
-    return replace(
-        answer,
-        state=state,
-        loops=closed,
-        direction=direction,
-        cutting_pressure=pressure or cutting.pressure or None,
-        lowest=low,
-        highest=high,
-        tool=tool,
-    )
+    return low, high
 
 
-def _modes_in(state: MachineState) -> Vibration:
+def _modes_with_closed_loops(state: MachineState) -> Vibration:
+    """The modes of the machine with motors that stand still, and its servo loops closed over these."""
+    loops = servo_loops(state)
+    answer = replace(_modes_of(state_of(with_standing_motors(state.machine))), state=state)
+    solution = answer.solution
+    if solution is None or answer.damping is None or not solution.ringing:
+        return answer
+    loops_of_drives = tuple(loops[drive.name] for drive in solution.drives)
+    return replace(answer, loops=ClosedLoops(solution, answer.damping, loops_of_drives))
+
+
+def _modes_of(state: MachineState) -> Vibration:
     machine, names, status = state.machine, state.machine.family.component_names, state.status
     refuse_unknown_mass(machine, "modes", state.configuration)
     held_by_loads = machine.loaded and status is Status.SINGULAR and int(state.free.place_status) == Status.OK
@@ -316,8 +327,8 @@ def _modes_in(state: MachineState) -> Vibration:
 def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibration:
     machine, response = state.machine, state.free
     table = machine.tables["damping"]
-    friction = equations.mechanism.legs and any(leg.dampers.any() for leg in equations.mechanism.legs)
-    assumed = not (friction or table.ratio or table.per_mass or table.per_stiffness)
+    has_friction = any(leg.dampers.any() for leg in equations.mechanism.legs)
+    assumed = not (has_friction or table.ratio or table.per_mass or table.per_stiffness)
     ratio = ASSUMED_RATIO if assumed else table.ratio
     damping = damper(equations, solution, ratio, table.per_mass, table.per_stiffness)
     masses = moving_masses(machine, response.configuration)
@@ -389,7 +400,7 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
                 strain=strain,
                 kinds=dict(parts_and_kinds(springs, strain)[1]),
                 kinetic={name: float(shares[k]) for name, shares in kinetics.items()},
-                shape=_shape(response, equations, solution, k),
+                shape=small_motions(response, equations, solution, k),
             )
         )
     return result
@@ -398,33 +409,6 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
 def _names(machine: Machine) -> dict[int, str]:
     """Names of the components that a machine has, by their place in rx ry rz x y z."""
     return dict(zip(machine.family.components, machine.family.component_names, strict=True))
-
-
-def _shape(response: Response, equations: Balance, solution: Modes, number: int) -> Deflection:
-    """The small motions of tool and links in a mode."""
-    starts, shape, state = starts_of(equations), solution.shapes[:, number], equations.state
-    amount = SMALL / max(float(np.abs(shape).max()), 1e-300)
-    moved = tuple(
-        coordinates + amount * shape[None, first:last]
-        for coordinates, (first, last) in zip(state.coordinates, pairwise(starts), strict=True)
-    )
-    there = replace(equations, state=replace(state, coordinates=moved))
-    legs, origin = response.configuration.legs, response.reference
-    both = [loaded_links(balanced, legs, origin) for balanced in (equations, there)]
-    joule = float(equations.mechanism.force[0] * equations.mechanism.length[0])
-    tool = (solution.tool[:, number] * amount * math.sqrt(joule)).tolist()
-    return Deflection(
-        Wrench(ZERO, ZERO),
-        Twist(Vector(*tool[:3]), Vector(*tool[3:])),
-        tuple(
-            replace(
-                link,
-                start_motion=link.start_motion - before.start_motion,
-                end_motion=link.end_motion - before.end_motion,
-            )
-            for before, link in zip(*both, strict=True)
-        ),
-    )
 
 
 def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -> Array:
@@ -444,7 +428,7 @@ def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -
         ends = (max(ends[0], float(answer.tool.frequencies[0])), min(ends[1], float(answer.tool.frequencies[-1])))
         if ends[0] >= ends[1]:
             raise InputError("the range of the response and the frequencies of the tool have nothing in common.")
-    about = [m.frequency * (1.0 + max(m.ratio, 1e-4) * np.linspace(-WIDE, WIDE, near)) for m in shown]
+    about = [m.frequency * (1.0 + max(m.ratio, LEAST_DRAWN_RATIO) * np.linspace(-WIDE, WIDE, near)) for m in shown]
     of_tool = [] if answer.tool is None else [answer.tool.search_frequencies]
     every = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
     return np.unique(every[(every >= ends[0]) & (every <= ends[1])])

@@ -12,12 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
-from kinetostat.equilibrium.drives import rotor_turns
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.drive_limits import driven_springs
 from kinetostat.machine.actuators import name_of
-from kinetostat.machine.drives import numbers_of_drive, with_every_drive
+from kinetostat.machine.drives import numbers_of_drive, rotor_turns, with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.modes import Modes

@@ -1,25 +1,35 @@
-"""The share that each spring and each part has in a mode: in its strain energy, its kinetic energy and its momentum.
+"""The parts of a machine in a mode: their shares of strain energy, kinetic energy and momentum, and their motions.
 
 The strain energy of each mode is one half in units of the mechanism, and so is its kinetic energy: shares add up to 1.
 
 Source: theory (58), and what follows it. Units are those of `equilibrium.mechanism`.
 """
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.links import loaded_links
 from kinetostat.equilibrium.masses import Masses
+from kinetostat.kinetostatics.loading import Deflection
+from kinetostat.kinetostatics.response import Response
+from kinetostat.tolerances import LEAST_DIVISOR
 from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
 from kinetostat.vibration.modes import Modes
 
 TURNING_LOADS = "weight and wrenches as they turn"
 """Name of the share of the strain energy that no spring has."""
+SMALL_MOTION = 1e-6
+"""Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 
 
 def strain_shares(equations: Balance, shapes: Array) -> dict[str, Array]:
@@ -81,3 +91,39 @@ def _moving_parts(
     ends = pairwise(starts_of(equations))
     for leg, coordinates, (first, last) in zip(mechanism.legs, state.coordinates, ends, strict=True):
         yield leg.masses, leg_rates(leg, leg.chain.place(coordinates, given)), shapes[first:last], leg
+
+
+def small_motions(response: Response, equations: Balance, solution: Modes, number: int) -> Deflection:
+    """The motions of the tool and of the ends of all links in a mode, for drawings.
+
+    They are differences of the exact motions of the links after a displacement so small that it is one to first order.
+
+    Args:
+        response: the response of the machine, whose legs are drawn.
+        equations: the state about which it vibrates.
+        solution: all modes.
+        number: the number of the mode, from 0.
+    """
+    starts, shape, state = starts_of(equations), solution.shapes[:, number], equations.state
+    amount = SMALL_MOTION / max(float(np.abs(shape).max()), LEAST_DIVISOR)
+    displaced = tuple(
+        coordinates + amount * shape[None, first:last]
+        for coordinates, (first, last) in zip(state.coordinates, pairwise(starts), strict=True)
+    )
+    beside = replace(equations, state=replace(state, coordinates=displaced))
+    legs, origin = response.configuration.legs, response.reference
+    links_before, links_after = (loaded_links(balanced, legs, origin) for balanced in (equations, beside))
+    joule = float(equations.mechanism.force[0] * equations.mechanism.length[0])
+    tool = (solution.tool[:, number] * amount * math.sqrt(joule)).tolist()
+    return Deflection(
+        Wrench(ZERO, ZERO),
+        Twist(Vector(*tool[:3]), Vector(*tool[3:])),
+        tuple(
+            replace(
+                link,
+                start_motion=link.start_motion - before.start_motion,
+                end_motion=link.end_motion - before.end_motion,
+            )
+            for before, link in zip(links_before, links_after, strict=True)
+        ),
+    )

@@ -25,6 +25,7 @@ from kinetostat.studies.budget import (
     budget,
     possible_errors,
 )
+from kinetostat.tolerances import LEAST_DIVISOR
 from kinetostat.units import KINDS
 from kinetostat.views.budget_data import budget_dataset, contributions_csv, poses_csv, varied_fields
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
@@ -195,7 +196,7 @@ def _allocation_table(answer: Budget) -> FittedTable:
     texts = {line.about: line.text for line in answer.tolerances}
     for place in np.argsort(allocation.factors, kind="stable"):
         line, factor = allocation.lines[place], float(allocation.factors[place])
-        cost = 100.0 * float(allocation.costs[place]) / factor / max(allocation.cost, 1e-300)
+        cost = 100.0 * float(allocation.costs[place]) / factor / max(allocation.cost, LEAST_DIVISOR)
         new = _new_tolerance(answer, line, factor)
         table.add_row(line, texts[line], new, _advice(factor), number(factor, digits=3), f"{cost:.1f}")
     return table

@@ -10,7 +10,7 @@ from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
-from kinetostat.vibration.coupling import FreeTool
+from kinetostat.vibration.receptance import FreeTool
 from kinetostat.views.analysis_tables import first_names
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table

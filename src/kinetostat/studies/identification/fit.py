@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED
+from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED, LEAST_DIVISOR
 
 Tell = Callable[[int, int, str], None]
 
@@ -129,7 +129,7 @@ class Fit:
     @property
     def correlations(self) -> Array:
         """Correlations of the unknowns [unknowns x unknowns]."""
-        sizes = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        sizes = np.sqrt(np.maximum(np.diag(self.covariance), LEAST_DIVISOR))
         return np.asarray(self.covariance / np.outer(sizes, sizes))
 
     @property
@@ -221,9 +221,9 @@ def _own_spread(residuals: Array, rates: Array, values: Array, wishes: Wishes) -
     squares, total = (ways.T @ whole) ** 2, float(whole @ whole)
     rest, others = max(total - float(squares.sum()), 0.0), len(whole) - len(sizes)
     most = np.sqrt(total / len(whole)) + wishes.resolution
-    least, most = max(wishes.resolution, 1e-9 * most), max(most, 1e-300)
+    least, most = max(wishes.resolution, 1e-9 * most), max(most, LEAST_DIVISOR)
     for _ in range(2):
-        tried = np.geomspace(max(least, 1e-300), max(most, least, 1e-300), TRIED_SPREADS)
+        tried = np.geomspace(max(least, LEAST_DIVISOR), max(most, least, LEAST_DIVISOR), TRIED_SPREADS)
         variances = tried**2
         each = variances[:, None] + sizes**2
         unlikely = (np.log(each) + squares / each).sum(axis=1) + others * np.log(variances) + rest / variances

@@ -29,6 +29,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
 from kinetostat.studies.identification.record import read_fit
 from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
+from kinetostat.tolerances import LEAST_DIVISOR
 
 GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
 """Groups of errors that leave the compliance of a machine at its pose as it is: they only move it."""
@@ -245,7 +246,9 @@ class MeasuredComparison:
         )
         if not self.agrees:
             return f"{text}: the model is wrong there, or the uncertainties are too small."
-        worst = max(row.bounds[1] / max(abs(row.entry.value), abs(row.predicted), 1e-300) for row in self._diagonal)
+        worst = max(
+            row.bounds[1] / max(abs(row.entry.value), abs(row.predicted), LEAST_DIVISOR) for row in self._diagonal
+        )
         return f"{text}: no error of the model is seen. One of up to {100.0 * worst:.2g} % would not be seen."
 
     @property
