@@ -71,12 +71,14 @@ class CondensedLeg:
         placed: where it is.
         terms: its contribution to the equations there, or in the free state.
         elastic, passive: which of its coordinates are those of springs, and which are those of joints.
-        closes, across: P [passive x ways], and W^T [wrenches x ways].
-        follows, felt: P J_s [passive x springs], and W^T J_s [wrenches x springs].
+        passive_by_twist: P [passive x ways].
+        passive_by_springs: P J_s [passive x springs].
+        wrenches: W^T [wrenches x ways].
+        spring_loads: W^T J_s, the load of each spring per unit of a wrench [wrenches x springs].
         lines: rows of A: W^T, and what turning wrenches add to it [wrenches x ways].
         roots: rows of a root of C [wrenches x at most as many].
         turning: S [ways x ways].
-        taken: what it takes of the load without a step [ways].
+        load_taken: the load that it takes without a step [ways].
         gap: h [wrenches].
         sure: whether its passive motions are independent, and whether its springs hold it by a margin.
     """
@@ -84,7 +86,7 @@ class CondensedLeg:
     def __init__(
         self, leg: ElasticLeg, mechanism: Mechanism, row: Row, wrench: Row, platform: Motions, chord: bool
     ) -> None:
-        """Condense a leg.
+        """Condense a leg: close it, take its passive motions out of its equations, and then its springs.
 
         Args:
             leg, mechanism: the leg, and the machine that it belongs to.
@@ -101,51 +103,84 @@ class CondensedLeg:
             acting, geometric = 0.0 * acting, 0.0 * geometric
         self._driven = terms.driven[0][:, :count].astype(object)
         self.elastic, self.passive = ([k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1))
-        rates, size = self._ways.T @ terms.rates[0].astype(object), len(self._ways.T)
-        springs, left = len(self.elastic), here.left[0].astype(object)
-        self.sure: Scalar = True
-        self.closes, self.across = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
-        if self.passive:
-            solution, rest, margin = right_inverse(rates[:, self.passive].T.tolist())
-            self.closes, self.across = array_of(solution, size, len(self.passive)).T, array_of(rest, len(rest), size)
-            self.sure = margin > SURELY_MORE
-        self._gap = self._ways.T @ _gap(platform, here.end)
+        self._opening = self._ways.T @ _gap(platform, here.end)
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
         self._bracket = turning_of(acting, self._ways)
+        self._close(self._ways.T @ terms.rates[0].astype(object))
+        springs, remaining = self._without_passive_motions(geometric, here.left[0].astype(object))
+        self._condense_springs(springs, remaining, of_scalars(wrench)[0])
+
+    def _close(self, rates: Array) -> None:
+        """Solve the closing conditions for the passive motions.
+
+        Args:
+            rates: J, the twist of the leg's end per unit of each coordinate [ways x coordinates].
+        """
+        size = len(rates)
+        self.sure: Scalar = True
+        self.passive_by_twist, self.wrenches = np.zeros((0, size), dtype=object), np.eye(size).astype(object)
+        if self.passive:
+            solution, rest, margin = right_inverse(rates[:, self.passive].T.tolist())
+            self.passive_by_twist = array_of(solution, size, len(self.passive)).T
+            self.wrenches = array_of(rest, len(rest), size)
+            self.sure = margin > SURELY_MORE
+        self.passive_by_springs = product(self.passive_by_twist, rates[:, self.elastic])
+        self.spring_loads = product(self.wrenches, rates[:, self.elastic])
+
+    def _without_passive_motions(self, geometric: Array, left: Array) -> tuple[Array, Array]:
+        """Take passive motions, which follow the platform and the springs, out of the equations of the springs.
+
+        Args:
+            geometric: stiffness of all coordinates by wrenches that turn [coordinates x coordinates].
+            left: the forces that are not in balance yet, of all coordinates [coordinates].
+
+        Returns:
+            The stiffness of the springs, their own and that of turning wrenches [springs x springs], and the forces of
+            springs that are not in balance [springs].
+        """
         self._inner = geometric[np.ix_(self.passive, self.passive)]
         self._mixed = geometric[np.ix_(self.passive, self.elastic)]
-        self.follows = product(self.closes, rates[:, self.elastic])
-        pushed = product(self._inner, self.follows)
-        part = product(self.follows.T, self._mixed - 0.5 * pushed)
+        pushed = product(self._inner, self.passive_by_springs)
+        part = product(self.passive_by_springs.T, self._mixed - 0.5 * pushed)
         stiff = geometric[np.ix_(self.elastic, self.elastic)] - part - part.T
         for place, number in enumerate(self.elastic):
-            stiff[place, place] = stiff[place, place] + terms.carrying[0, number]
+            stiff[place, place] = stiff[place, place] + self.terms.carrying[0, number]
+        self._coupling = self._mixed - pushed
+        self._left = left[self.elastic] - product(self.passive_by_springs.T, left[self.passive])
+        self._left_of_passive = left[self.passive]
+        return stiff, self._left
+
+    def _condense_springs(self, stiff: Array, left: Array, wrench: Array) -> None:
+        """Eliminate the springs: what remains are the wrenches of the leg with their compliance.
+
+        With E = L D L^T for the stiffness of the springs, products with its inverse are those of rows that L has been
+        taken from.
+
+        Args:
+            stiff, left: E [springs x springs], and the forces that are not in balance [springs].
+            wrench: the wrench that the platform exerts on the leg [ways].
+        """
+        count = len(self.elastic)
         self._factors = elimination(stiff.tolist())
         self.sure = self.sure & definite(self._factors, stiff.tolist())
-        self._coupling = self._mixed - pushed
-        self._left, self._held = (
-            left[self.elastic] - product(self.follows.T, left[self.passive]),
-            left[self.passive],
-        )
-        self.felt = product(self.across, rates[:, self.elastic])
-        # With E = L D L^T of the springs, products with its inverse are those of rows that L has been taken from.
-        felt, coupled, remaining = (
-            array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), springs)
-            for rows in (self.felt, self._coupling, self._left[None])
+        loads, coupled, remaining = (
+            array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), count)
+            for rows in (self.spring_loads, self._coupling, left[None])
         )
         shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
-        solved, driven = felt * shrink, coupled * shrink
-        self.lines = self.across + product(product(solved, coupled.T), self.closes)
-        self.gap = self.lines @ self._gap + product(solved, remaining[0])
-        if len(felt) < springs:
-            soft = symmetric_product(felt, solved.T).tolist()
-            self.roots = array_of(semidefinite_root(soft), len(felt), len(felt))
+        solved, driven = loads * shrink, coupled * shrink
+        self.lines = self.wrenches + product(product(solved, coupled.T), self.passive_by_twist)
+        self.gap = self.lines @ self._opening + product(solved, remaining[0])
+        if len(loads) < count:
+            soft = symmetric_product(loads, solved.T).tolist()
+            self.roots = array_of(semidefinite_root(soft), len(loads), len(loads))
         else:
-            self.roots = felt * np.array([*(sqrt(abs(part)) for part in shrink), None], dtype=object)[:-1]
+            self.roots = loads * np.array([*(sqrt(abs(part)) for part in shrink), None], dtype=object)[:-1]
         stiffening = self._inner - symmetric_product(driven, coupled.T)
-        self.turning = symmetric_product(self.closes.T, product(stiffening, self.closes)) + self._bracket
-        pressed = product(self.closes.T, self._held - product(driven, remaining[0]))
-        self.taken = of_scalars(wrench)[0] + pressed + self.turning @ self._gap
+        by_twist = self.passive_by_twist
+        self.turning = symmetric_product(by_twist.T, product(stiffening, by_twist)) + self._bracket
+        pressed = product(by_twist.T, self._left_of_passive - product(driven, remaining[0]))
+        self.load_taken = wrench + pressed + self.turning @ self._opening
 
     def step(self, twist: Array, change: Array) -> tuple[Row, Row]:
         """The steps of its coordinates and of its wrench.
@@ -154,15 +189,15 @@ class CondensedLeg:
             twist: step of the platform [ways].
             change: changes of the wrenches that it can exert [wrenches].
         """
-        moved = twist + self._gap
-        following = product(self.closes, moved)
-        pushed = product(self.felt.T, change) - product(self._coupling.T, following) - self._left
+        end_step = twist + self._opening
+        following = product(self.passive_by_twist, end_step)
+        pushed = product(self.spring_loads.T, change) - product(self._coupling.T, following) - self._left
         springs = of_scalars(self._factors.solve(pushed.tolist()))[0]
-        passive = following - product(self.follows, springs)
+        passive = following - product(self.passive_by_springs, springs)
         result = np.zeros(len(springs) + len(passive), dtype=object)
         result[self.elastic], result[self.passive] = springs, passive
-        pressed = self._held + product(self._inner, passive) + product(self._mixed, springs)
-        wrench = product(self.across.T, change) + product(self.closes.T, pressed) + self._bracket @ moved
+        pressed = self._left_of_passive + product(self._inner, passive) + product(self._mixed, springs)
+        wrench = product(self.wrenches.T, change) + product(self.passive_by_twist.T, pressed) + self._bracket @ end_step
         return result.tolist(), wrench.tolist()
 
     def holding(self, change: Row) -> Array:
@@ -223,29 +258,46 @@ def solve_condensed(lines: Array, roots: Array, turning: Array, load: Array, gap
         gaps: h.
     """
     size = lines.shape[1]
-    balanced, internal, margin = right_inverse(lines.T.tolist())
-    mixes = np.array([*zip(*balanced, strict=True), *internal], dtype=object)
-    felt, count = product(mixes, roots), roots.shape[1]
-    squares = [total([part * part for part in column]) for column in roots.T.tolist()]
-    squares = [1.0 if is_zero(square) else where(square > ZERO_PIVOT, square, 1.0) for square in squares]
-    whole = np.concatenate([felt, mixes], axis=1)
-    modes = conjugate(whole[size:].tolist(), [1.0] * count, squares)
-    answers, hidden = whole[:size], np.full(len(lines), 0.0, dtype=object)
-    for row, inverse in zip(modes.columns, modes.inverses, strict=True):
-        mode = np.array(row, dtype=object)
-        shares = product(answers[:, :count], mode[:count]) * inverse
-        answers = answers - shares[:, None] * mode
-        hidden = hidden + mode[count:] * (mode[count:] @ gaps * inverse)
-    shares = answers[:, count:]
-    soft = symmetric_product(answers[:, :count], answers[:, :count].T)
+    answers, internal_changes, sure = _shared_by_least_energy(lines, roots, gaps)
+    deflections, shares = answers[:, : roots.shape[1]], answers[:, roots.shape[1] :]
+    soft = symmetric_product(deflections, deflections.T)
     root, closing = np.array(semidefinite_root(soft.tolist()), dtype=object), -(shares @ gaps)
     rates = np.eye(size) + root.T @ turning @ root
     factors = elimination(rates.tolist(), symmetric=False)
     twist = closing + root @ of_scalars(factors.solve((root.T @ (load - turning @ closing)).tolist()))[0]
-    changes = shares.T @ (load - turning @ twist) + hidden
+    changes = shares.T @ (load - turning @ twist) + internal_changes
     middle = 0.5 * (rates + rates.T)
     stays = definite(elimination(middle.tolist()), middle.tolist())
-    return Condensed(root, twist, changes, middle, factors, (margin > SURELY_MORE) & (modes.doubt < 0.5) & stays)
+    return Condensed(root, twist, changes, middle, factors, sure & stays)
+
+
+def _shared_by_least_energy(lines: Array, roots: Array, gaps: Array) -> tuple[Array, Array, Scalar]:
+    """Share loads among the wrenches of all legs by least energy (force method), and close their gaps.
+
+    Amounts of wrenches that balance a load are those of least norm, and any mix of internal ones, which balance each
+    other. Internal ones are made conjugate, so that each is left out of the others by itself.
+
+    Args:
+        lines, roots, gaps: as of `solve_condensed`.
+
+    Returns:
+        For each unit load [ways], what all springs carry and then the amounts of all wrenches [ways x (springs +
+        wrenches)]; the amounts by which internal ones change to close gaps [wrenches]; and whether no rank is in doubt.
+    """
+    size, count = lines.shape[1], roots.shape[1]
+    balanced, internal, margin = right_inverse(lines.T.tolist())
+    mixes = np.array([*zip(*balanced, strict=True), *internal], dtype=object)
+    whole = np.concatenate([product(mixes, roots), mixes], axis=1)
+    squares = [total([part * part for part in column]) for column in roots.T.tolist()]
+    squares = [1.0 if is_zero(square) else where(square > ZERO_PIVOT, square, 1.0) for square in squares]
+    modes = conjugate(whole[size:].tolist(), [1.0] * count, squares)
+    answers, internal_changes = whole[:size], np.full(len(lines), 0.0, dtype=object)
+    for row, inverse in zip(modes.columns, modes.inverses, strict=True):
+        mode = np.array(row, dtype=object)
+        shares = product(answers[:, :count], mode[:count]) * inverse
+        answers = answers - shares[:, None] * mode
+        internal_changes = internal_changes + mode[count:] * (mode[count:] @ gaps * inverse)
+    return answers, internal_changes, (margin > SURELY_MORE) & (modes.doubt < 0.5)
 
 
 class LegwiseTangent:
@@ -271,18 +323,16 @@ class LegwiseTangent:
         mechanism, carrier = machine.mechanism, machine.carrier
         self._ways = ways = mechanism.ways.astype(object)
         size, start = ways.shape[1], carrier.size
-        moved = of_scalars(coordinates[:start])
+        not_driven = np.zeros((1, len(mechanism.driven)))
         placed = carrier.chain.place(
-            moved, np.concatenate([np.zeros((1, len(mechanism.driven))), mechanism.growth], axis=1)
+            of_scalars(coordinates[:start]), np.concatenate([not_driven, mechanism.growth], axis=1)
         )
         self.platform = placed.end
         free = all(is_zero(coordinate) for coordinate in coordinates)
         self.pulls = [pull_of(rod, None if free else self.platform) for rod in machine.rods]
         self.slack: Scalar = 0.0
         self.rank = len(machine.rods) + sum(len(leg.springs) - leg.springs.count(None) for leg in machine.legs)
-        turned = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
-        (load, change), (hold, fall) = platform_load(mechanism, self.platform), wrench_of_rods(self.pulls, turned)
-        force, self.turning = ways.T @ (load + hold)[0], ways.T @ (fall - change)[0] @ ways
+        force, self.turning = self._platform_and_rods()
         turning = 0.0 * self.turning if chord else self.turning
         self.legs: list[CondensedLeg] = []
         for leg in machine.legs:
@@ -290,16 +340,24 @@ class LegwiseTangent:
             start += leg.size + size
             wrench = coordinates[start - size : start]
             self.legs.append(CondensedLeg(leg, mechanism, row, wrench, self.platform, chord))
-            force, turning = force - self.legs[-1].taken, turning + self.legs[-1].turning
+            force, turning = force - self.legs[-1].load_taken, turning + self.legs[-1].turning
         lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self.pulls]
         along = array_of(lines, len(lines), 6) @ ways
-        self.lines = np.concatenate([along, *(leg.across for leg in self.legs)])
+        self.lines = np.concatenate([along, *(leg.wrenches for leg in self.legs)])
         rows = [along, *(leg.lines for leg in self.legs)]
         gaps = np.concatenate([np.full(len(lines), 0.0, dtype=object), *(leg.gap for leg in self.legs)])
         roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods] + [leg.roots for leg in self.legs]
         self._solved = solve_condensed(np.concatenate(rows), block_diagonal(roots), turning, force, gaps)
         self.twist: Row = (ways @ self._solved.twist).tolist()
         self.step, self.motion, self._changes = self._steps(ways.T @ placed.screws[0].T)
+
+    def _platform_and_rods(self) -> tuple[Array, Array]:
+        """The load on the platform that rods do not hold [ways], and the stiffness by its turning [ways x ways]."""
+        ways = self._ways
+        densities = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
+        load, load_change = platform_load(self.mechanism, self.platform)
+        held, held_change = wrench_of_rods(self.pulls, densities)
+        return ways.T @ (load + held)[0], ways.T @ (held_change - load_change)[0] @ ways
 
     def _steps(self, rates: Array) -> tuple[Row, Row, list[Row]]:
         """Steps of all coordinates and wrenches; those that are motions; and those of each leg's wrench."""

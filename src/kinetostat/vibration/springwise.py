@@ -150,7 +150,7 @@ class SpringMotions:
             for leg in tangent.legs
         ]
         openings = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
-        openings += [leg.felt * scale for leg, scale in zip(tangent.legs, self._deflections, strict=True)]
+        openings += [leg.spring_loads * scale for leg, scale in zip(tangent.legs, self._deflections, strict=True)]
         opening = block_diagonal(openings)  # by which y opens the cuts along the lines
         self.size = opening.shape[1]
         ways = machine.mechanism.ways.astype(object)
@@ -231,10 +231,10 @@ class SpringMotions:
     def _leg_motion(leg: CondensedLeg, scale: Array) -> tuple[Array, Array]:
         """Rates of a leg's coordinates by the twist of the platform, and by the unknowns of the leg's springs."""
         size = len(leg.elastic) + len(leg.passive)
-        by_twist = np.full((size, leg.across.shape[1]), 0.0, dtype=object)
+        by_twist = np.full((size, leg.wrenches.shape[1]), 0.0, dtype=object)
         by_springs = np.full((size, len(leg.elastic)), 0.0, dtype=object)
-        by_twist[leg.passive] = leg.closes
-        by_springs[leg.passive] = -(leg.follows * scale)
+        by_twist[leg.passive] = leg.passive_by_twist
+        by_springs[leg.passive] = -(leg.passive_by_springs * scale)
         for place, number in enumerate(leg.elastic):
             by_springs[number, place] = scale[place]
         return by_twist, by_springs
