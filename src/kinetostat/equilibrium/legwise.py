@@ -356,8 +356,8 @@ class LegwiseTangent:
         ways = self._ways
         densities = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
         load, load_change = platform_load(self.mechanism, self.platform)
-        held, held_change = wrench_of_rods(self.pulls, densities)
-        return ways.T @ (load + held)[0], ways.T @ (held_change - load_change)[0] @ ways
+        rods_load, rods_change = wrench_of_rods(self.pulls, densities)
+        return ways.T @ (load + rods_load)[0], ways.T @ (rods_change - load_change)[0] @ ways
 
     def _steps(self, rates: Array) -> tuple[Row, Row, list[Row]]:
         """Steps of all coordinates and wrenches; those that are motions; and those of each leg's wrench."""

@@ -16,7 +16,7 @@ from kinetostat.kinematics.leg_gaps import Coordinates, Problems, least_norm, so
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
-from kinetostat.numerics.iteration import Steps, largest, newton
+from kinetostat.numerics.iteration import largest, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_DIVISOR, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
@@ -27,6 +27,9 @@ LONGEST_STRIDE = 1.5
 """Change of an unknown in one step, rad or in units of the machine's length, up to which it is tried."""
 CAREFUL_STRIDE = 0.1
 """Such a change where a way has led to another assembly mode."""
+GROWTH, SHRINKAGE = (0.5, 4.0), (0.1, 0.5)
+"""Factors between which the next step may lie, after a step that was accepted and after one that was not. It is a
+little shorter than the last one's errors allow, 0.9 and 0.7 of that, because the next one's will differ."""
 MOST_TANGENT_ERROR = 0.1
 """Error of the tangent, in the same units, up to which a step is accepted: less than branches usually lie apart."""
 STEP_CONTRACTION = 0.55
@@ -40,6 +43,8 @@ MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
 STIFFENING = 1e-2
 """Added to the curvature at first, for unknowns that change nothing there."""
+LEAST_CURVATURE_COSINE = 1e-12
+"""Cosine between a step and the change of slope along it, below which that change is round-off and says nothing."""
 LONGEST_DESCENT = 0.3
 """Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
 ASIDE = 1e-2
@@ -98,14 +103,9 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
     ended = np.flatnonzero(arrived)
     if ended.size:
         part, target = problems.take(ended), some(goal, ended)
-
-        def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:
-            left, rates = part.take(rows).gaps(values, some(target, rows))
-            return largest(left), lambda going: least_norm(rates[going], left[going])
-
+        equations, steps = part.closing_equations(target), MOST_STEPS_AT_GOAL
         # A gap that no longer becomes less has reached round-off, or cannot be closed.
-        steps, start = MOST_STEPS_AT_GOAL, unknowns[ended]
-        end = newton(equations, start, len(ended), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
+        end = newton(equations, unknowns[ended], len(ended), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
         unknowns[ended], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, target)
         solved[ended], crossed[ended] = closed & same, closed & ~same
     return unknowns, solved, crossed
@@ -124,9 +124,9 @@ def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
         shares = np.ones(count)
         shares[items] = next_share
         part, target = problems.take(items), some(way(shares), items)
-        moved, error, accepted = _step(part, unknowns[items], target, furthest)
+        moved, could_grow, accepted = _step(part, unknowns[items], target, furthest)
         unknowns[items[accepted]], done[items[accepted]] = moved[accepted], next_share[accepted]
-        stride[items] *= np.where(accepted, np.clip(0.9 * error, 0.5, 4.0), np.clip(0.7 * error, 0.1, 0.5))
+        stride[items] *= np.where(accepted, np.clip(0.9 * could_grow, *GROWTH), np.clip(0.7 * could_grow, *SHRINKAGE))
     return unknowns, done == 1.0
 
 
@@ -203,7 +203,7 @@ def _updated_inverse(inverse: Array, step: Array, change: Array) -> Array:
         change: how much less steep it is at the end of the step [n x unknowns].
     """
     work = np.einsum("nc,nc->n", step, change)
-    sound = work > 1e-12 * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
+    sound = work > LEAST_CURVATURE_COSINE * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
     weight = np.where(sound, 1.0 / np.where(sound, work, 1.0), 0.0)[:, None, None]
     across = np.eye(step.shape[1]) - weight * step[:, :, None] * change[:, None, :]
     return np.asarray(across @ inverse @ np.swapaxes(across, 1, 2) + weight * step[:, :, None] * step[:, None, :])

@@ -21,6 +21,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
+from kinetostat.numerics.iteration import Steps, largest
 from kinetostat.tolerances import LEAST_DIVISOR, LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
 
 Coordinates = dict[str, Scalar]
@@ -122,6 +123,31 @@ class AlikeLegs:
     build: Build
     legs: Integers
     columns: Integers
+
+
+def least_norm(rates: Array, left: Array) -> Array:
+    """Least-squares solutions of rates x = left, all but least in norm, problem by problem; NaN where not finite.
+
+    Args:
+        rates: [problems x rows x unknowns].
+        left: [problems x rows].
+    """
+    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
+    if not sound.all():
+        steps = np.full((len(rates), rates.shape[2]), np.nan)
+        if sound.any():
+            steps[sound] = least_norm(rates[sound], left[sound])
+        return steps
+    across = np.swapaxes(rates, 1, 2)
+    if rates.shape[2] >= rates.shape[1]:
+        return np.asarray((across @ np.linalg.solve(with_damping(rates @ across), left[:, :, None]))[:, :, 0])
+    return np.asarray(np.linalg.solve(with_damping(across @ rates), across @ left[:, :, None])[:, :, 0])
+
+
+def with_damping(square: Array) -> Array:
+    """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
+    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
+    return np.asarray(square + LEAST_NORM_DAMPING * (trace + LEAST_DIVISOR) * np.eye(square.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -226,6 +252,23 @@ class Problems:
             apart = plain(squared_distance(ends, wanted, column(np.repeat(lengths, legs))))
             distance = distance + np.asarray(apart).reshape(-1, legs).sum(axis=1)
         return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
+
+    def closing_equations(
+        self, goal: Coordinates, solve: Callable[[Array, Array], Array] = least_norm
+    ) -> Callable[[Array, Integers], tuple[Array, Steps]]:
+        """The equations that close the legs, as `newton` takes them.
+
+        Args:
+            goal: coordinates of the platform in each problem.
+            solve: function from rates [k x rows x unknowns] and gaps [k x rows] to the steps that close these to first
+                order [k x unknowns].
+        """
+
+        def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
+            left, rates = self.take(rows).gaps(unknowns, some(goal, rows))
+            return largest(left), lambda going: solve(rates[going], left[going])
+
+        return equations
 
     def _ends(self, part: AlikeLegs, unknowns: Array, lengths: Array) -> tuple[Displacement, Array]:
         """Places to which legs take the platform, and its twist per unit of their coordinates [legs x 6 x joints]."""
@@ -357,28 +400,3 @@ def with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, co
     codes = codes.copy()
     codes[solved[loose]] = int(Status.SINGULAR)
     return codes
-
-
-def least_norm(rates: Array, left: Array) -> Array:
-    """Least-squares solutions of rates x = left, all but least in norm, problem by problem; NaN where not finite.
-
-    Args:
-        rates: [problems x rows x unknowns].
-        left: [problems x rows].
-    """
-    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
-    if not sound.all():
-        steps = np.full((len(rates), rates.shape[2]), np.nan)
-        if sound.any():
-            steps[sound] = least_norm(rates[sound], left[sound])
-        return steps
-    across = np.swapaxes(rates, 1, 2)
-    if rates.shape[2] >= rates.shape[1]:
-        return np.asarray((across @ np.linalg.solve(with_damping(rates @ across), left[:, :, None]))[:, :, 0])
-    return np.asarray(np.linalg.solve(with_damping(across @ rates), across @ left[:, :, None])[:, :, 0])
-
-
-def with_damping(square: Array) -> Array:
-    """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
-    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
-    return np.asarray(square + LEAST_NORM_DAMPING * (trace + LEAST_DIVISOR) * np.eye(square.shape[1]))

@@ -17,6 +17,8 @@ MOST_STEPS, MOST_CORRECTIONS = 30, 8
 """Number of steps towards the nearest pose, and of Newton's corrections that close the legs again after each step."""
 DAMPINGS: Array = 5.0 ** np.arange(-3.0, 6.0)
 """Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
+FIRST_DAMPING = 1e-3
+"""Damping of the first step, in units of the curvature of the squared distance itself: hardly any."""
 CLOSING_CONTRACTION = 0.25
 """Share of a gap that a correction may leave; a step from which it leaves more was too long."""
 CURVATURE_STEP = 1e-6
@@ -40,14 +42,26 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
     (problems,) = problems_of(chains, 1, names)
     home = {name: float(value) for name, value in problems.at_home().items()}
     units = np.array([1.0 if name in ANGLES else problems.lengths[0] for name in names])
-    apart = np.array([float(chains.pose.get(name, home[name])) - home[name] for name in names]) / units
-    turning = np.array([name in ANGLES for name in names])
-    apart = np.where(turning, np.arctan2(np.sin(apart), np.cos(apart)), apart)
+    wish = np.array([float(chains.pose.get(name, home[name])) - home[name] for name in names]) / units
+    are_angles = np.array([name in ANGLES for name in names])
+    wish = np.where(are_angles, np.arctan2(np.sin(wish), np.cos(wish)), wish)
     given = np.flatnonzero([name in chains.pose for name in names])
     first = problems.size - len(names)
-    best = _Search(problems, home, first + given, apart[given]).nearest()
+    best = _Search(problems, home, first + given, wish[given]).nearest()
     nearest = home | {name: home[name] + change for name, change in zip(names, best[first:] * units, strict=True)}
     return {name: 0.0 if abs(value) < NO_COORDINATE else float(value) for name, value in nearest.items()}
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Unknowns that nearly close the legs [unknowns], the gaps that are left [rows] and their rates [rows x unknowns].
+
+    Of several places, each of these has one more axis in front.
+    """
+
+    unknowns: Array
+    gaps: Array
+    rates: Array
 
 
 @dataclass(frozen=True)
@@ -70,52 +84,64 @@ class _Search:
         """Return the unknowns at the nearest pose, found from the home pose by damped Newton steps.
 
         Each step minimises the squared distance along the motions that the closed legs allow. It is tried with several
-        dampings, which are added to the absolute values of the curvatures, so that a step damped enough leads nearer.
-        The search ends when the next step would gain less than people see in the numbers.
+        dampings, of which the one that leads nearest is kept. The search ends when the next step would gain less than
+        people see in the numbers.
         """
-        best, damping = np.zeros(self.problems.size), 1e-3
-        gap, rates = (each[0] for each in self.problems.gaps(best[None], self.home))
+        start = np.zeros(self.problems.size)
+        best, damping = _Place(start, *(each[0] for each in self.problems.gaps(start[None], self.home))), FIRST_DAMPING
         for _ in range(MOST_STEPS):
-            to_goal = np.zeros(len(best))
-            to_goal[self.rows] = self.goal - best[self.rows]
-            distance, ways = np.linalg.norm(to_goal), _ways(rates)
-            loads = np.linalg.lstsq(rates.T, to_goal, rcond=DEPENDENT)[0]
-            curvatures, turn = np.linalg.eigh(self._curvature(best, rates, ways, loads))
-            along, stiff = ways @ turn, np.maximum(np.abs(curvatures), DEPENDENT)
-            slope = along.T @ to_goal
             dampings = damping * DAMPINGS
-            steps = slope / (stiff + dampings[:, None]) @ along.T
-            settled = slope @ (slope / stiff) <= NEAREST_GAIN * distance * distance
-            ends, gaps, rates_there = self._closed_ends(best, steps[:1] if settled else steps)
-            squares = self._half_squares(ends, gaps, loads)
-            least = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
-            if squares[least] < self._half_squares(best[None], gap[None], loads)[0]:
-                best, gap, rates, damping = ends[least], gaps[least], rates_there[least], float(dampings[least])
+            steps, loads, settled = self._steps(best, dampings)
+            ends = self._closed_ends(best.unknowns, steps[:1] if settled else steps)
+            squares = self._half_squares(ends, loads)
+            nearest = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
+            if squares[nearest] < self._half_squares(best, loads):
+                best = _Place(ends.unknowns[nearest], ends.gaps[nearest], ends.rates[nearest])
+                damping = float(dampings[nearest])
             else:
                 damping = float(dampings[-1])
             if settled:
                 break
-        return self._closed_ends(best, 0.0 * best[None])[0][0]
+        return self._closed_ends(best.unknowns, 0.0 * best.unknowns[None]).unknowns[0]
 
-    def _curvature(self, best: Array, rates: Array, ways: Array, loads: Array) -> Array:
-        """The curvature of half the squared distance along the ways, with that of the closed legs [ways x ways].
+    def _steps(self, here: _Place, dampings: Array) -> tuple[Array, Array, bool]:
+        """Newton's steps towards the goal along the motions that closed legs allow, one for each damping.
+
+        Dampings are added to the absolute values of the curvatures, so that a step damped enough leads nearer.
+
+        Returns:
+            The steps [dampings x unknowns]; Lagrange's multipliers, which say how strongly each gap keeps the unknowns
+            from the goal [rows]; and whether an undamped step would gain nothing that people see.
+        """
+        to_goal = np.zeros(len(here.unknowns))
+        to_goal[self.rows] = self.goal - here.unknowns[self.rows]
+        distance, allowed = np.linalg.norm(to_goal), _allowed_motions(here.rates)
+        loads = np.linalg.lstsq(here.rates.T, to_goal, rcond=DEPENDENT)[0]
+        curvatures, axes = np.linalg.eigh(self._curvature(here, allowed, loads))
+        principal, stiff = allowed @ axes, np.maximum(np.abs(curvatures), DEPENDENT)
+        slope = principal.T @ to_goal
+        steps = slope / (stiff + dampings[:, None]) @ principal.T
+        return steps, loads, bool(slope @ (slope / stiff) <= NEAREST_GAIN * distance * distance)
+
+    def _curvature(self, here: _Place, allowed: Array, loads: Array) -> Array:
+        """The curvature of half the squared distance, with that of the closed legs [motions x motions].
 
         Args:
-            best: unknowns that nearly close the legs [unknowns].
-            rates: the rates of the gaps there [rows x unknowns].
-            ways: directions in which the legs stay closed to first order [unknowns x ways].
-            loads: Lagrange's multipliers: how strongly each gap keeps the unknowns from the goal [rows].
+            here: where the legs nearly close.
+            allowed: motions by which the legs stay closed to first order [unknowns x motions].
+            loads: Lagrange's multipliers, see `_steps` [rows].
         """
-        problems = self.problems.take(np.zeros(ways.shape[1], dtype=int))
-        rates_beside = problems.gaps(best + CURVATURE_STEP * ways.T, self.home)[1]
-        of_legs = np.einsum("r,nrc->nc", loads, rates_beside - rates) @ ways / CURVATURE_STEP
-        return np.asarray(ways[self.rows].T @ ways[self.rows] + 0.5 * (of_legs + of_legs.T))
+        problems = self.problems.take(np.zeros(allowed.shape[1], dtype=int))
+        rates_beside = problems.gaps(here.unknowns + CURVATURE_STEP * allowed.T, self.home)[1]
+        of_legs = np.einsum("r,nrc->nc", loads, rates_beside - here.rates) @ allowed / CURVATURE_STEP
+        return np.asarray(allowed[self.rows].T @ allowed[self.rows] + 0.5 * (of_legs + of_legs.T))
 
-    def _half_squares(self, ends: Array, gaps: Array, loads: Array) -> Array:
-        """Half the squared distances from the goal as they will be once the gaps that are left are closed [n]."""
-        return np.asarray(0.5 * ((self.goal - ends[:, self.rows]) ** 2).sum(axis=1) - gaps @ loads)
+    def _half_squares(self, places: _Place, loads: Array) -> Array:
+        """Half the squared distances from the goal as they will be once the gaps that are left are closed [places]."""
+        squares = (self.goal - places.unknowns[..., self.rows]) ** 2
+        return np.asarray(0.5 * squares.sum(axis=-1) - places.gaps @ loads)
 
-    def _closed_ends(self, start: Array, steps: Array) -> tuple[Array, Array, Array]:
+    def _closed_ends(self, start: Array, steps: Array) -> _Place:
         """Close the legs again after steps, wherever that takes the platform.
 
         Args:
@@ -123,8 +149,7 @@ class _Search:
             steps: the steps from there [n x unknowns].
 
         Returns:
-            Unknowns that nearly close the legs, NaN where that fails [n x unknowns]; the gaps that are left there
-            [n x rows], and their rates [n x rows x unknowns].
+            Where the legs nearly close [n x ...]; unknowns are NaN where that fails.
         """
         count = len(steps)
         problems = self.problems.take(np.zeros(count, dtype=int))
@@ -138,15 +163,15 @@ class _Search:
         end = newton(
             equations, start + steps, count, most_steps=MOST_CORRECTIONS, closed=enough, contraction=CLOSING_CONTRACTION
         )
-        return np.where(end.converged[:, None], end.value, np.nan), left, rates
+        return _Place(np.where(end.converged[:, None], end.value, np.nan), left, rates)
 
 
-def _ways(rates: Array) -> Array:
-    """Directions in which the legs stay closed, to first order [unknowns x directions].
+def _allowed_motions(rates: Array) -> Array:
+    """Motions by which the legs stay closed, to first order [unknowns x motions].
 
     Args:
         rates: the rates of the gaps [rows x unknowns].
     """
-    _, sizes, directions = np.linalg.svd(rates)
+    _, sizes, motions = np.linalg.svd(rates)
     rank = int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())
-    return np.asarray(directions[rank:].T)
+    return np.asarray(motions[rank:].T)

@@ -8,9 +8,9 @@ Source: theory section 6.
 
 import numpy as np
 
-from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems, some, with_damping
-from kinetostat.numerics.iteration import Steps, largest, newton
+from kinetostat.numerics.iteration import largest, newton
 from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, LEAST_DIVISOR, NEAREST_POSTURE, NEWTON_SETTLED
 
 MOST_STEPS, MOST_CORRECTIONS = 40, 8
@@ -20,6 +20,8 @@ LONGEST_STEP = 0.3
 starts."""
 SURE_STEP = 1e-5
 """Size of a step, in the same units, from which the next one is its square."""
+SHORTENING = 0.25
+"""Factor by which a step becomes shorter that has not led nearer."""
 SHORTEST_STEP = 1e-6
 """Share of a step below which no shorter one is tried."""
 BESIDE = 1e-6
@@ -45,21 +47,21 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
     rates = problems.gaps(best, goal)[1]
     rows = np.flatnonzero(~_surely_held(rates))
     rows = rows[_idle_freedoms(rates[rows]) > 0]
-    share, before = np.ones(len(rows)), np.full(len(rows), np.inf)
+    share, slope_before = np.ones(len(rows)), np.full(len(rows), np.inf)
     for _ in range(MOST_STEPS):
         if not rows.size:
             break
-        part, there = problems.take(rows), some(goal, rows)
-        step, far = _steps(part, best[rows], there)
-        end, closed = _closing_step(part, best[rows] + share[:, None] * step, there)
+        moving, their_goal = problems.take(rows), some(goal, rows)
+        step, slope = _steps(moving, best[rows], their_goal)
+        end, closed = _closing_step(moving, best[rows] + share[:, None] * step, their_goal)
         # Sums of squares tell steps apart down to half of the digits; shorter ones are Newton's last and taken whole.
         short = largest(step) <= SURE_STEP
         nearer = closed & (short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
         best[rows[nearer]] = end[nearer]
-        share = np.where(nearer, 1.0, 0.25 * share)
-        settled = short & ((far <= NEAREST_POSTURE) | (far > 0.5 * before))
+        share = np.where(nearer, 1.0, SHORTENING * share)
+        settled = short & ((slope <= NEAREST_POSTURE) | (slope > 0.5 * slope_before))
         going = ~settled & (share >= SHORTEST_STEP)
-        rows, share, before = rows[going], share[going], far[going]
+        rows, share, slope_before = rows[going], share[going], slope[going]
     return best
 
 
@@ -85,7 +87,7 @@ def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Arra
     rates = problems.gaps(unknowns, goal)[1]
     left, sizes, right = np.linalg.svd(rates)
     idle = _idle_freedoms(rates)
-    steps, far = np.zeros_like(unknowns), np.zeros(len(unknowns))
+    steps, largest_slopes = np.zeros_like(unknowns), np.zeros(len(unknowns))
     for count in np.unique(idle[idle > 0]):
         rows = np.flatnonzero(idle == count)
         kept = rates.shape[2] - count
@@ -94,27 +96,37 @@ def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Arra
         # Lagrange's multipliers: how strongly each gap keeps the joints from their home positions.
         pulls = np.einsum("nkc,nc->nk", right[rows, :kept], unknowns[rows]) / sizes[rows, :kept]
         loads = np.einsum("nrk,nk->nr", left[rows, :, :kept], pulls)
-        curvature = np.broadcast_to(np.eye(count), (len(rows), count, count)).copy()
-        for k in range(count):
-            part, there, aside = problems.take(rows), some(goal, rows), BESIDE * motions[:, k]
-            change = part.gaps(unknowns[rows] + aside, there)[1] - part.gaps(unknowns[rows] - aside, there)[1]
-            curvature[:, k] -= np.einsum("nr,nrc,nic->ni", loads, change, motions) / (2.0 * BESIDE)
-        bends, turn = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
-        along = np.einsum("nij,ni->nj", turn, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
-        step = -np.einsum("nij,nj,nic->nc", turn, along, motions)
+        curvature = _curvature(problems.take(rows), unknowns[rows], some(goal, rows), motions, loads)
+        bends, axes = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
+        amounts = np.einsum("nij,ni->nj", axes, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
+        step = -np.einsum("nij,nj,nic->nc", axes, amounts, motions)
         steps[rows] = step * np.minimum(1.0, LONGEST_STEP / np.maximum(largest(step), LEAST_DIVISOR))[:, None]
-        far[rows] = largest(slopes)
-    return steps, far
+        largest_slopes[rows] = largest(slopes)
+    return steps, largest_slopes
+
+
+def _curvature(problems: Problems, unknowns: Array, goal: Coordinates, motions: Array, loads: Array) -> Array:
+    """Curvature of half the sum of squares along idle motions, with that of the closed legs [n x motions x motions].
+
+    Args:
+        problems, goal: n problems with as many idle motions, and the coordinates of the platform in each.
+        unknowns: their solutions [n x unknowns].
+        motions: the idle motions [n x motions x unknowns].
+        loads: Lagrange's multipliers of the gaps [n x rows].
+    """
+    count, size, _ = motions.shape
+    curvature = np.broadcast_to(np.eye(size), (count, size, size)).copy()
+    for k in range(size):
+        aside = BESIDE * motions[:, k]
+        change = problems.gaps(unknowns + aside, goal)[1] - problems.gaps(unknowns - aside, goal)[1]
+        curvature[:, k] -= np.einsum("nr,nrc,nic->ni", loads, change, motions) / (2.0 * BESIDE)
+    return curvature
 
 
 def _closing_step(problems: Problems, start: Array, goal: Coordinates) -> tuple[Array, Mask]:
     """Close the legs again after a step, by least motions; return unknowns and whether that closes them."""
-
-    def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:
-        left, rates = problems.take(rows).gaps(values, some(goal, rows))
-        return largest(left), lambda going: _least_motion(rates[going], left[going])
-
-    end = newton(equations, start, len(start), most_steps=MOST_CORRECTIONS, closed=NEWTON_SETTLED, contraction=1.0)
+    equations, steps = problems.closing_equations(goal, _least_motion), MOST_CORRECTIONS
+    end = newton(equations, start, len(start), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
     return end.value, end.residual <= CLOSED
 
 
