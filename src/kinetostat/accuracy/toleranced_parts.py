@@ -51,6 +51,10 @@ LEAST_NORMAL_PROBABILITY = 1e-16
 """Probability below which no normal number is drawn: eight standard deviations."""
 
 
+UNIFORM_VARIANCE = 1.0 / 3.0
+"""Variance of a variable that is anywhere between -1 and 1."""
+
+
 @dataclass(frozen=True)
 class TolerancedPart:
     """Numbers of a machine that may be off together: a single one, or the free motion of a joint in all directions.
@@ -314,27 +318,18 @@ def random_inputs(
     work = np.einsum("nie,ni->ne", rates, load)
     # The most work that any motion of a length can do: work far below it is no reaction.
     most = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
-    shift, drawn, blocks = np.zeros((count, 6)), np.zeros(size), list[_Block]()
     reacting = np.abs(work) > NO_REACTION * most[:, None]
     pressed = np.array([part.free & reacting[:, list(part.errors)].any(axis=1) for part in parts]).T
+    shift, drawn, blocks = np.zeros((count, 6)), np.zeros(size), list[_Block]()
     for number, part in enumerate(parts):
-        places, bears = list(part.errors), pressed[:, number]
+        bears = pressed[:, number]
         changes = others and part.free
-        if bears.any() or changes:  # a joint that is pressed to one end of its play: the play itself is a variable
-            reaction = work[:, places]
-            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), LEAST_DIVISOR)[:, None] * bears[:, None]
-            half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], along)
-            value = np.zeros(size)
-            value[places] = 0.5 * part.limit * along[0]
-            blocks.append(_Block(number, 1.0 / 3.0, half[:, :, None], value[:, None]))
-            shift += half
-            drawn += value
+        if bears.any() or changes:
+            blocks.append(_pressed_block(number, part, rates, work, bears))
+            shift += blocks[-1].columns[:, :, 0]
+            drawn += blocks[-1].errors[:, 0]
         if not bears.all() or changes:
-            columns = part.limit * rates[:, :, places] * ~bears[:, None, None]
-            errors = part.limit * np.eye(size)[:, places] * (not bears[0])
-            usual = 1.0 / (len(places) + 2.0)  # of each coordinate of a point in a ball; of a single one, 1/3
-            variance = SIGMAS**-2 if part.normal and not part.free else usual
-            blocks.append(_Block(number, variance, columns, errors))
+            blocks.append(_unpressed_block(number, part, rates, bears))
     sizes = [block.columns.shape[2] for block in blocks]
     return RandomInputs(
         parts=tuple(parts),
@@ -347,3 +342,33 @@ def random_inputs(
         drawn=drawn,
         pressed=pressed,
     )
+
+
+def _pressed_block(number: int, part: TolerancedPart, rates: Array, work: Array, bears: Mask) -> _Block:
+    """The variable of a joint that a load presses to one end of its clearance, which is itself what varies.
+
+    The joint stands at half of its usual clearance from its middle, and the variable is the other half.
+
+    Args:
+        number, part: the joint.
+        rates, work: rates of all errors, and the work of the load on them [n x errors].
+        bears: the poses at which the load presses it [n].
+    """
+    places = list(part.errors)
+    sizes = np.maximum(np.linalg.norm(work[:, places], axis=1), LEAST_DIVISOR)
+    direction = work[:, places] / sizes[:, None] * bears[:, None]
+    half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], direction)
+    errors = np.zeros((rates.shape[2], 1))
+    errors[places, 0] = 0.5 * part.limit * direction[0]
+    return _Block(number, UNIFORM_VARIANCE, half[:, :, None], errors)
+
+
+def _unpressed_block(number: int, part: TolerancedPart, rates: Array, bears: Mask) -> _Block:
+    """The variables of a part that may be anywhere within its limit; arguments as of `_pressed_block`."""
+    places = list(part.errors)
+    columns = part.limit * rates[:, :, places] * ~bears[:, None, None]
+    errors = part.limit * np.eye(rates.shape[2])[:, places] * (not bears[0])
+    # Of each coordinate of a point that is anywhere in a ball; of a single one, 1/3.
+    of_ball = 1.0 / (len(places) + 2.0)
+    variance = SIGMAS**-2 if part.normal and not part.free else of_ball
+    return _Block(number, variance, columns, errors)

@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.toleranced_parts import RandomInputs
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
@@ -28,6 +28,8 @@ USUAL_PERCENT = 95.0
 """Percent of all machines that the usual error covers."""
 STARTS, FEW_STARTS = 200, 24
 """Directions from which the worst case of a length is searched: at a single pose, and at each of many."""
+SAME_LENGTH = 1e-12
+"""Relative growth of the worst case in a step below which it is round-off."""
 MOST_WORST_CASE_STEPS = 100
 """Steps of that search, which nearly always ends after ten."""
 SOLVED_AT_ONCE = 1024
@@ -181,25 +183,36 @@ def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
     if size == 1:
         reach = np.abs(rows[:, 0, alone]).sum(axis=1) + np.abs(shift[:, 0])
         return np.asarray(reach + sum(np.linalg.norm(rows[:, 0, block], axis=1) for block in joined))
-    ways = np.random.default_rng(0).standard_normal((STARTS if count == 1 else FEW_STARTS, size))
-    ways = np.broadcast_to(ways / np.linalg.norm(ways, axis=1)[:, None], (count, *ways.shape))
+    directions = np.random.default_rng(0).standard_normal((STARTS if count == 1 else FEW_STARTS, size))
+    directions = np.broadcast_to(directions / np.linalg.norm(directions, axis=1)[:, None], (count, *directions.shape))
     most = np.zeros(count)
     for _ in range(MOST_WORST_CASE_STEPS):
         # The machine that reaches farthest along a direction lies in a direction of its own, which is tried next:
         # its length never falls.
-        far = np.sign(ways @ rows[:, :, alone]) @ np.swapaxes(rows[:, :, alone], 1, 2)
-        for block in joined:
-            reach = ways @ rows[:, :, block]
-            reach = reach / np.maximum(np.linalg.norm(reach, axis=2, keepdims=True), LEAST_DIVISOR)
-            far = far + reach @ np.swapaxes(rows[:, :, block], 1, 2)
-        far = far + np.sign(np.einsum("nsk,nk->ns", ways, shift))[:, :, None] * shift[:, None]
-        lengths = np.linalg.norm(far, axis=2)
-        ways = far / np.maximum(lengths, LEAST_DIVISOR)[:, :, None]
+        farthest = _farthest(directions, rows, shift, alone, joined)
+        lengths = np.linalg.norm(farthest, axis=2)
+        directions = farthest / np.maximum(lengths, LEAST_DIVISOR)[:, :, None]
         longest = lengths.max(axis=1)
-        if (longest <= most * (1.0 + 1e-12)).all():
+        if (longest <= most * (1.0 + SAME_LENGTH)).all():
             break
         most = np.maximum(most, longest)
     return most
+
+
+def _farthest(directions: Array, rows: Array, shift: Array, alone: Integers, joined: Sequence[Integers]) -> Array:
+    """The error of the machine that reaches farthest along each direction [n x directions x k].
+
+    Args:
+        directions: unit vectors [n x directions x k].
+        rows, shift: see `_worst`.
+        alone, joined: numbers of the variables that keep a limit each, and of those that keep one together.
+    """
+    result = np.sign(directions @ rows[:, :, alone]) @ np.swapaxes(rows[:, :, alone], 1, 2)
+    for block in joined:
+        reach = directions @ rows[:, :, block]
+        reach = reach / np.maximum(np.linalg.norm(reach, axis=2, keepdims=True), LEAST_DIVISOR)
+        result = result + reach @ np.swapaxes(rows[:, :, block], 1, 2)
+    return result + np.sign(np.einsum("nsk,nk->ns", directions, shift))[:, :, None] * shift[:, None]
 
 
 def spread_of(inputs: RandomInputs, measures: Measures, machines: Iterable[Array]) -> tuple[Spread, Array]:
@@ -271,20 +284,7 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
     Raises:
         InputError: none of them can be assembled.
     """
-    path = next(path for path in values(machine) if path.startswith(POSE))
-    here = float(values(machine)[path])
-    exact, first = [], []
-    model: ErrorModel | None = None
-    for slab in inputs.machines(count, seed):
-        for start in range(0, len(slab), SOLVED_AT_ONCE):
-            drawn = slab[start : start + SOLVED_AT_ONCE]
-            if model is None or len(model) != len(drawn):
-                model = error_model(machine, {path: np.full(len(drawn), here)}, len(drawn))
-            moved, _ = model.displacement(inputs.drawn + drawn @ inputs.errors.T)
-            linear = inputs.shift[0] + drawn @ inputs.columns[0].T
-            exact.append(measures.linear(moved.T[None])[0].T)
-            first.append(measures.linear(linear.T[None])[0].T)
-    solved, linear = np.concatenate(exact), np.concatenate(first)
+    solved, linear = _solved_and_linear(machine, inputs, measures, count, seed)
     closed = np.isfinite(solved).all(axis=1)
     if not closed.any():
         raise InputError(
@@ -301,6 +301,29 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
         np.abs(sizes - measures.sizes(linear)).max(axis=0),
         _unexplained_variance(solved, linear, measures),
     )
+
+
+def _solved_and_linear(
+    machine: Machine, inputs: RandomInputs, measures: Measures, count: int, seed: int
+) -> tuple[Array, Array]:
+    """Linear measures of machines by exact solutions, and to first order [machines x rows each]; NaN without solution.
+
+    Args: as of `exact_sample`.
+    """
+    path = next(path for path in values(machine) if path.startswith(POSE))
+    coordinate = float(values(machine)[path])
+    solved, linear = [], []
+    model: ErrorModel | None = None
+    for slab in inputs.machines(count, seed):
+        for start in range(0, len(slab), SOLVED_AT_ONCE):
+            variables = slab[start : start + SOLVED_AT_ONCE]
+            if model is None or len(model) != len(variables):  # one machine for each pose of the model, all the same
+                model = error_model(machine, {path: np.full(len(variables), coordinate)}, len(variables))
+            exact, _ = model.displacement(inputs.drawn + variables @ inputs.errors.T)
+            first_order_twists = inputs.shift[0] + variables @ inputs.columns[0].T
+            solved.append(measures.linear(exact.T[None])[0].T)
+            linear.append(measures.linear(first_order_twists.T[None])[0].T)
+    return np.concatenate(solved), np.concatenate(linear)
 
 
 def _unexplained_variance(solved: Array, linear: Array, measures: Measures) -> Array:

@@ -122,16 +122,34 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
     Raises:
         InputError: gravity pulls, but nothing says a mass; or pulleys of a planar machine, or of one that is tilted.
     """
-    chains, planar = machine.chains(), machine.family.planar
-    platform = platform_placement(chains)
     table, load = machine.tables["cables"], machine.tables["load"]
     density, radius = stacked_columns([table.linear_density, table.pulley_radius], count).T
-    check_loads(machine, count, bool(platform_masses(machine, platform)) or bool(density.any()))
-    moved, tool = platform @ chains.home.inverse(), machine.tool_point(platform)
-    ends = [rod for rod in _rods(chains, planar) if rod is not None]
+    weighs = bool(platform_masses(machine, platform_placement(machine.chains()))) or bool(density.any())
+    check_loads(machine, count, weighs)
+    cables = _straight_cables(machine, signs, count)
+    gravity = of_scalars(gravity_of(load).components(), count)
+    weight = density * np.linalg.norm(gravity, axis=1)
+    if not (weight.any() or radius.any()):
+        return cables
+    if radius.any() and (machine.family.planar or (gravity[:, :2].any() and weight.any())):
+        raise InputError(
+            f"{machine.name}: cables.pulley_radius is that of pulleys which swivel about the z axis of the base, so "
+            "that cables hang and pull in planes through it; leave it out of a planar machine, and where gravity is "
+            "not along z."
+        )
+    return _hanging_cables(cables, np.where(weight[:, None] > 0.0, -_units(gravity), [0.0, 0.0, 1.0]), weight, radius)
+
+
+def _straight_cables(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
+    """The cables of a machine as straight lines, whatever their weight; arguments as of `cables_of`."""
+    chains, planar = machine.chains(), machine.family.planar
+    table, load = machine.tables["cables"], machine.tables["load"]
+    platform = platform_placement(chains)
+    motion, tool = platform @ chains.home.inverse(), machine.tool_point(platform)
+    lines = [rod for rod in _rods(chains, planar) if rod is not None]
     near, far = (
         np.stack([of_scalars(point.components(), count) for point in points], axis=1)
-        for points in ([rod.start for rod in ends], [moved.apply(rod.end) for rod in ends])
+        for points in ([rod.start for rod in lines], [motion.apply(rod.end) for rod in lines])
     )
     if planar:
         near[:, :, 2] = far[:, :, 2] = 0.0
@@ -140,34 +158,23 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
     box = np.abs(stacked_columns([*table.moment_box, *table.force_box], count))
     wrench[:, :3], box[:, :3] = wrench[:, :3] / length, box[:, :3] / length
     least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
-    parts = machine.family.components
+    components = machine.family.components
     springs = [step.element.springs[0] for leg in chains.legs for step in leg if step.element.springs]
-    cables = Cables(
+    return Cables(
         near=near,
         far=far,
         directions=_units(near - far),
         arms=(far - of_scalars(tool.components(), count)[:, None]) / length[:, None],
         signs=np.array(signs),
-        components=parts,
-        load=wrench[:, parts],
+        components=components,
+        load=wrench[:, components],
         least=np.where(np.isinf(least), 0.0, least),
         most=most,
         rule=Rule(*stacked_columns([table.level, table.exponent], count).T),
-        box=box[:, parts],
+        box=box[:, components],
         stiffness=of_scalars([spring.stiffness for spring in springs], count),
         wound=np.zeros(near.shape[:2]),
     )
-    gravity = of_scalars(gravity_of(load).components(), count)
-    weight = density * np.linalg.norm(gravity, axis=1)
-    if not (weight.any() or radius.any()):
-        return cables
-    if radius.any() and (planar or (gravity[:, :2].any() and weight.any())):
-        raise InputError(
-            f"{machine.name}: cables.pulley_radius is that of pulleys which swivel about the z axis of the base, so "
-            "that cables hang and pull in planes through it; leave it out of a planar machine, and where gravity is "
-            "not along z."
-        )
-    return _hanging_cables(cables, np.where(weight[:, None] > 0.0, -_units(gravity), [0.0, 0.0, 1.0]), weight, radius)
 
 
 def _units(vectors: Array) -> Array:

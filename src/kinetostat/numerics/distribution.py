@@ -26,6 +26,8 @@ LEAST_CURVATURE = 1e-12
 is flat at the level itself."""
 SAME_FORCE = 1e-13
 """Share of the largest force below which a step is round-off."""
+NO_CONDITION = -1
+"""Number that stands for none among those of conditions."""
 INDEPENDENT = 1e-20
 """Square of the share of a condition's normal below which other conditions leave nothing of it."""
 
@@ -218,52 +220,81 @@ def nearest_to_origin(sides: Array, ends: Array) -> tuple[Array, Mask]:
     Source: D. Goldfarb and A. Idnani, "A numerically stable dual method for solving strictly convex quadratic
     programs", Mathematical Programming 27 (1983).
     """
-    count, _, size = sides.shape
-    points, exist = np.zeros((count, size)), np.ones(count, dtype=bool)
-    lengths = np.maximum(np.sqrt((sides * sides).sum(axis=2)), UNRESISTED)
-    rows, none = np.arange(count), -1
-    # Conditions that hold exactly, and their multipliers.
-    active, pull = np.full((count, size), none), np.zeros((count, size))
-    entering, its_pull = np.full(count, none), np.zeros(count)
+    search = _DualSearch(sides, ends)
+    rows = np.arange(len(sides))
     for _ in range(MOST_CHANGES):
-        lacking = ends[rows] - np.einsum("nkr,nr->nk", sides[rows], points[rows])
-        waits = entering[rows] == none
-        worst = (lacking / lengths[rows]).argmax(axis=1)
-        met = lacking.max(axis=1) <= UNRESISTED
-        entering[rows] = np.where(waits, worst, entering[rows])
-        its_pull[rows] = np.where(waits, 0.0, its_pull[rows])
-        going = ~(waits & met)
-        rows, lacking = rows[going], lacking[going]
+        rows, lacking = search.with_violations(rows)
         if not len(rows):
             break
-        numbers, chosen, at_bound = np.arange(len(rows)), entering[rows], active[rows] != none
-        normal = sides[rows, chosen]
-        others = np.where(at_bound[:, :, None], sides[rows[:, None], active[rows]], 0.0)
+        search.change(rows, lacking)
+        rows = rows[search.exist[rows]]
+    search.exist[rows] = False
+    return search.points, search.exist
+
+
+class _DualSearch:
+    """The points of `nearest_to_origin` while conditions are taken in, one for each polyhedron in a change.
+
+    Attributes:
+        points: nearest to the origin under the active conditions [n x r].
+        exist: False once a polyhedron has been shown to be empty [n].
+    """
+
+    def __init__(self, sides: Array, ends: Array) -> None:
+        """Begin at the origin; arguments as of `nearest_to_origin`."""
+        count, _, size = sides.shape
+        self._sides, self._ends = sides, ends
+        self._lengths = np.maximum(np.sqrt((sides * sides).sum(axis=2)), UNRESISTED)
+        self.points, self.exist = np.zeros((count, size)), np.ones(count, dtype=bool)
+        # Conditions that hold exactly, and the one that is being taken in, with their multipliers.
+        self._active, self._pull = np.full((count, size), NO_CONDITION), np.zeros((count, size))
+        self._entering, self._entering_pull = np.full(count, NO_CONDITION), np.zeros(count)
+
+    def with_violations(self, rows: Integers) -> tuple[Integers, Array]:
+        """The polyhedra that still have a condition to take in: the one that is violated most, if none is begun.
+
+        Returns:
+            Their numbers, and what is lacking of that condition [rows].
+        """
+        lacking = self._ends[rows] - np.einsum("nkr,nr->nk", self._sides[rows], self.points[rows])
+        waits = self._entering[rows] == NO_CONDITION
+        worst = (lacking / self._lengths[rows]).argmax(axis=1)
+        met = lacking.max(axis=1) <= UNRESISTED
+        self._entering[rows] = np.where(waits, worst, self._entering[rows])
+        self._entering_pull[rows] = np.where(waits, 0.0, self._entering_pull[rows])
+        going = ~(waits & met)
+        rows = rows[going]
+        return rows, lacking[going, self._entering[rows]]
+
+    def change(self, rows: Integers, lacking: Array) -> None:
+        """Move points towards the entering conditions, until these hold or an active one would pull the wrong way."""
+        size, entering = self.points.shape[1], self._entering[rows]
+        numbers, at_bound = np.arange(len(rows)), self._active[rows] != NO_CONDITION
+        normal = self._sides[rows, entering]
+        # The normal without its shares along those of active conditions, which stay as they are.
+        others = np.where(at_bound[:, :, None], self._sides[rows[:, None], self._active[rows]], 0.0)
         square = np.einsum("nar,nbr->nab", others, others) + np.eye(size) * ~at_bound[:, None, :]
         share = np.linalg.solve(square, np.einsum("nar,nr->na", others, normal)[:, :, None])[:, :, 0]
         step = normal - np.einsum("nar,na->nr", others, share)
         gain = (step * step).sum(axis=1)
-        open_ = gain > INDEPENDENT * lengths[rows, chosen] ** 2
+        moves = gain > INDEPENDENT * self._lengths[rows, entering] ** 2
         with np.errstate(all="ignore"):
-            until = np.where(at_bound & (share > UNRESISTED), pull[rows] / share, np.inf)
-            full = np.where(open_, lacking[numbers, chosen] / gain, np.inf)
-        first = until.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
-        part = until[numbers, first] if size else np.full(len(rows), np.inf)
-        far = np.minimum(part, full)
-        stuck = np.isinf(far)
-        exist[rows[stuck & (lacking[numbers, chosen] > BALANCED)]] = False
-        entering[rows[stuck]] = none  # what is left of a condition that is met but for round-off
-        ends[rows[stuck], chosen[stuck]] = -np.inf
-        far = np.where(stuck, 0.0, far)
-        points[rows] += np.where(open_ & ~stuck, far, 0.0)[:, None] * step
-        pull[rows] = np.where(at_bound, pull[rows] - far[:, None] * share, 0.0)
-        its_pull[rows] += far
-        takes = ~stuck & (full <= part)
-        slots = np.argmin(at_bound, axis=1) if size else first
-        active[rows[takes], slots[takes]], pull[rows[takes], slots[takes]] = chosen[takes], its_pull[rows[takes]]
-        entering[rows[takes]] = none
-        leaves = ~stuck & ~takes
-        active[rows[leaves], first[leaves]], pull[rows[leaves], first[leaves]] = none, 0.0
-        rows = rows[exist[rows]]
-    exist[rows] = False
-    return points, exist
+            until_free = np.where(at_bound & (share > UNRESISTED), self._pull[rows] / share, np.inf)
+            until_met = np.where(moves, lacking / gain, np.inf)
+        leaving = until_free.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
+        first_free = until_free[numbers, leaving] if size else np.full(len(rows), np.inf)
+        amount = np.minimum(first_free, until_met)
+        stuck = np.isinf(amount)
+        self.exist[rows[stuck & (lacking > BALANCED)]] = False
+        self._ends[rows[stuck], entering[stuck]] = -np.inf  # it is met but for round-off, and is not asked again
+        amount = np.where(stuck, 0.0, amount)
+        self.points[rows] += np.where(moves & ~stuck, amount, 0.0)[:, None] * step
+        self._pull[rows] = np.where(at_bound, self._pull[rows] - amount[:, None] * share, 0.0)
+        self._entering_pull[rows] += amount
+        met = ~stuck & (until_met <= first_free)
+        slots = np.argmin(at_bound, axis=1) if size else leaving
+        self._active[rows[met], slots[met]] = entering[met]
+        self._pull[rows[met], slots[met]] = self._entering_pull[rows[met]]
+        self._entering[rows[stuck | met]] = NO_CONDITION
+        freed = ~stuck & ~met
+        self._active[rows[freed], leaving[freed]], self._pull[rows[freed], leaving[freed]] = NO_CONDITION, 0.0

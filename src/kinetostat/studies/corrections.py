@@ -282,19 +282,9 @@ def _table_of(
     lost = tally(np.concatenate([nodes.status, cells.status]))
     missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})."
     message = _message(machine, before, left, largest, missing if unknown else "")
+    is_exact = law_error <= EXACT_LAW * before
     return CorrectionTable(
-        command,
-        fields,
-        axes,
-        before,
-        left,
-        largest,
-        unknown,
-        law,
-        law_error,
-        tolerance,
-        law_error <= EXACT_LAW * before,
-        message,
+        command, fields, axes, before, left, largest, unknown, law, law_error, tolerance, is_exact, message
     )
 
 
