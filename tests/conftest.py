@@ -156,9 +156,10 @@ def pytest_collection_finish():
     """Collect garbage from now on, and only of what tests leave behind.
 
     Thousands of tests and all libraries stay until the end; to look through them again and again takes a third of the
-    collection, and many seconds later on.
+    collection, and many seconds later on. Generations are as large as those of the command.
     """
     gc.freeze()
+    gc.set_threshold(100_000, *gc.get_threshold()[1:])
     gc.enable()
 
 

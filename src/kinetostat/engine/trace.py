@@ -211,6 +211,17 @@ class Graph:
         """The condition that an operation gives."""
         return self._node(Condition, operation, operands)
 
+    def of_two(self, operation: str, a: Traced, b: Traced) -> Any:
+        """The number that an operation gives of two traced ones, as most are: as `number`, in half the time."""
+        if operation in COMMUTATIVE and b.number < a.number:
+            a, b = b, a
+        key = operation, a, b
+        node = self._known.get(key)
+        if node is None:
+            bounds = bounds_of(operation, (a, b)) if a.bounds and b.bounds else None
+            node = self._known[key] = Traced(self, operation, (a, b), a.fixed and b.fixed, bounds)
+        return node
+
     def known_node(self, operation: str, *operands: Operand) -> Any:
         """The node of an operation if it has been traced already, else None."""
         return self._known.get(_key(operation, operands))
@@ -337,6 +348,8 @@ def _binary(operation: str, a: Operand, b: Operand) -> Traced:
 
 
 def _add(a: Any, b: Any) -> Any:
+    if a.__class__ is b.__class__ is Traced and a.operation != "neg" != b.operation:
+        return a.graph.of_two("add", a, b)
     a, b = _operand(a), _operand(b)
     if a == 0.0:
         return b
@@ -350,6 +363,13 @@ def _add(a: Any, b: Any) -> Any:
 
 
 def _sub(a: Any, b: Any) -> Any:
+    if a.__class__ is b.__class__ is Traced and a.operation != "neg" != b.operation:
+        if a is b and a.bounds:
+            return 0.0
+        opposite = a.graph._known.get(("sub", b, a))
+        if opposite is not None:
+            return -opposite
+        return a.graph.of_two("sub", a, b)
     a, b = _operand(a), _operand(b)
     if b == 0.0:
         return a
@@ -367,6 +387,8 @@ def _sub(a: Any, b: Any) -> Any:
 
 
 def _mul(a: Any, b: Any) -> Any:
+    if a.__class__ is b.__class__ is Traced and a.operation != "neg" != b.operation:
+        return a.graph.of_two("mul", a, b)
     a, b = _operand(a), _operand(b)
     if isinstance(a, float):
         a, b = b, a
@@ -384,6 +406,10 @@ def _mul(a: Any, b: Any) -> Any:
 
 
 def _div(a: Any, b: Any) -> Any:
+    if a.__class__ is b.__class__ is Traced and a.operation != "neg" != b.operation:
+        if a is b and a.bounds:
+            return 1.0
+        return a.graph.of_two("div", a, b)
     a, b = _operand(a), _operand(b)
     if b == 1.0:
         return a
