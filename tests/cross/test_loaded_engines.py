@@ -91,9 +91,13 @@ class Engine:
 
     def displacement(self, wrench):
         """Rotation vector and displacement of the tool point under a wrench there [6]."""
-        moved = exudyn_machine._displacement(
-            self.model, self.platform, self.loads, self.start, wrench / self.model.unit
-        )
+        system, engine = self.model.system, self.model.engine
+        for load, part in zip(self.loads, np.split(wrench / self.model.unit, 2), strict=True):
+            system.SetLoadParameter(load, "loadVector", part)
+        system.systemData.SetODE2Coordinates(self.start, engine.ConfigurationType.Initial)
+        assert engine.MainSolverStatic().SolveSystem(system, exudyn_machine.settings_of(self.model))
+        moved = np.array(system.GetNodeOutput(self.platform.node, engine.OutputVariableType.Coordinates))
+        moved = moved[exudyn_machine.TRANSLATION_FIRST]
         return np.concatenate([Rotation.from_euler("XYZ", moved[:3]).as_rotvec(), moved[3:]])
 
 

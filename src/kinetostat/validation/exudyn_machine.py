@@ -43,7 +43,7 @@ MOTION_SHARES = (1e-3, 1e-4, 1e-5)
 VARIED_MOTION = "how far loads move the platform, rad or share of the machine's length"
 EPS = float(np.finfo(float).eps)
 ALL = (True,) * 6
-FACTORED_ONCE_FROM = 300
+FACTORED_ONCE_FROM = 200
 """Coordinates from which Newton's steps share the factors of a matrix: these take the cube of the number, and most of
 the time. A few more steps are then taken, which stop somewhat farther from balance."""
 PLANAR_JOINT = (True, True, False, False, False, True)
@@ -104,21 +104,15 @@ def _tangent(model: Multibody, platform: EngineBody) -> Array:
 
 def _finite_loads(model: Multibody, platform: EngineBody, tangent: Array, length: float) -> Iterable[Trial]:
     """Nonlinear statics with loads that move the platform by MOTION_SHARES, central differences; smallest first."""
-    system, items = model.system, model.items
-    marker = model.marker(platform, platform.at, np.eye(3))
-    loads = [system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in (items.Torque, items.Force)]
-    system.Assemble()
-    rest = system.systemData.GetODE2Coordinates()
     unit_loads = _loads_for_unit_motion(tangent, length)
-    for share in sorted(MOTION_SHARES):
-        compliance = np.zeros((6, 6))
-        for j in np.flatnonzero(unit_loads):
-            wrench = share * unit_loads[j] * np.eye(6)[j]
-            ends = [_displacement(model, platform, loads, rest, sign * wrench / model.unit) for sign in (1.0, -1.0)]
-            if ends[0] is None or ends[1] is None:
-                break
-            compliance[:, j] = (ends[0] - ends[1]) / (2.0 * wrench[j])
-        else:
+    felt = np.flatnonzero(unit_loads)
+    shares = sorted(MOTION_SHARES)
+    pairs = np.repeat(unit_loads[felt, None] * np.eye(6)[felt], 2, axis=0) * np.tile([1.0, -1.0], len(felt))[:, None]
+    moved = _displacements(model, platform, np.concatenate([share * pairs for share in shares]) / model.unit)
+    for share, ends in zip(shares, np.split(moved, np.arange(1, len(shares)) * len(pairs)), strict=True):
+        if len(ends) == len(pairs):
+            compliance = np.zeros((6, 6))
+            compliance[:, felt] = (ends[::2] - ends[1::2]).T / (2.0 * share * unit_loads[felt])
             yield Trial(share, compliance)
 
 
@@ -134,16 +128,36 @@ def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
     return np.asarray(known / (np.where(felt, motion, np.max(motion)) * arms))
 
 
-def _displacement(model: Multibody, platform: EngineBody, loads: list[Any], rest: Any, wrench: Array) -> Array | None:
-    """Displacement of the platform (rad, m) under a wrench in the engine's unit of force; None without convergence."""
-    system, engine = model.system, model.engine
-    for load, part in zip(loads, (wrench[:3], wrench[3:]), strict=True):
-        system.SetLoadParameter(load, "loadVector", part)
-    system.systemData.SetODE2Coordinates(rest, engine.ConfigurationType.Initial)
-    if not engine.MainSolverStatic().SolveSystem(system, settings_of(model)):
-        return None
-    moved = np.array(system.GetNodeOutput(platform.node, engine.OutputVariableType.Coordinates))
-    return moved[TRANSLATION_FIRST]
+def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> Array:
+    """Displacements of the platform (rad, m) under wrenches [n x 6] in the engine's unit of force.
+
+    The wrenches are steps of one run, from no load on, so that all of them can share the factors of one matrix. Where a
+    step does not converge the run ends, and there are fewer displacements than wrenches.
+    """
+    system, engine, items = model.system, model.engine, model.items
+    marker = model.marker(platform, platform.at, np.eye(3))
+    steps = np.vstack([np.zeros(6), wrenches])
+
+    def part_of_load(part: slice) -> Any:
+        return lambda _system, time, _load: list(steps[round(time * len(wrenches)), part])
+
+    for kind, part in ((items.Torque, slice(3)), (items.Force, slice(3, 6))):
+        system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3, loadVectorUserFunction=part_of_load(part)))
+    displacements = np.empty((len(steps), 6))
+    count = 0
+
+    def note(_system: Any, time: float) -> bool:
+        nonlocal count
+        count = round(time * len(wrenches))
+        displacements[count] = system.GetNodeOutput(platform.node, engine.OutputVariableType.Coordinates)
+        return True
+
+    system.SetPostStepUserFunction(note)
+    system.Assemble()
+    settings = settings_of(model)
+    settings.staticSolver.numberOfLoadSteps = len(wrenches)
+    engine.MainSolverStatic().SolveSystem(system, settings)
+    return displacements[1 : 1 + count, TRANSLATION_FIRST]
 
 
 def settings_of(model: Multibody) -> Any:
