@@ -207,6 +207,28 @@ def test_vibration_at_rest_of_a_platform_that_is_alone_massive():
     assert not np.array_equal(fast, slow)
 
 
+SLOWER = ("delta", "tripteron", "hexapod-rus")
+
+
+@pytest.mark.parametrize("name", ["planar-3rrr", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOWER)])
+def test_vibration_and_load_factor_of_massive_legs_that_close_loops(monkeypatch, name):
+    """At points that are well within reach, so that none is left to the solver."""
+    from kinetostat.engine import loaded
+
+    machine = moved_by_about(name, 2e-3)
+    densities = {path: 1.5 for path in values(machine) if path.startswith("linear_density.")}
+    machine, poses = with_values(machine, densities), poses_near(machine, 12)
+    names = ["loaded_frequency_2", "load_factor", "displacement_x", "loaded_frequency_1", "frequency_1"]
+    slow, fast, codes = np.empty((5, 12)), np.empty((5, 12)), np.empty((2, 12), dtype=np.int8)
+    loaded_fill(machine, list(poses), names, Way.ANY_MACHINE)(poses, slow, codes[0])
+    monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
+    loaded_fill(machine, list(poses), names, Way.NATIVE)(poses, fast, codes[1])
+    assert (codes == Status.OK).all()
+    assert (abs(slow[3] / slow[4] - 1.0) > 1e-4).all()  # loads change what vibrates
+    assert np.allclose(fast, slow, rtol=1e-9, atol=0.0)
+    assert not np.array_equal(fast, slow)
+
+
 def test_many_points_go_through_programs(monkeypatch):
     from kinetostat.engine import loaded
 

@@ -20,7 +20,7 @@ from kinetostat.engine.batch import function_of
 from kinetostat.engine.form import Specimen, form_of, objectives_of
 from kinetostat.engine.kernel import Recipe, program_of, recipe_of
 from kinetostat.engine.machine_code import SELF_LINKED, MachineCode, Program, machine_code_of
-from kinetostat.engine.native import host_lanes, object_file_of
+from kinetostat.engine.native import host_lanes, object_file_of, source
 from kinetostat.engine.program_files import HASH_SIZE, SECRET, read_program, write_program
 from kinetostat.machine.catalogue import family_text, register
 
@@ -371,7 +371,7 @@ def test_linked_code_is_what_llvm_loads():
     body = recipe(machine).formula().body
     _, fixed = form_of(machine, ["pose.z"])
     z, results, codes = np.linspace(0.1, 0.2, 33), np.empty((2, 1, 33)), np.empty((2, 33), dtype=np.int8)
-    codes_of = [machine_code_of(body), MachineCode(object_file_of(body), -1, host_lanes(), 1)]
+    codes_of = [machine_code_of(body), MachineCode(object_file_of(source(body, host_lanes())), -1, host_lanes(), 1)]
     for code, row, status in zip(codes_of, results, codes, strict=True):
         Program(code).run(fixed, [z], row, status)
     assert results[0].tobytes() == results[1].tobytes()

@@ -74,17 +74,39 @@ def test_the_quick_route_and_the_modes_give_the_same_frequencies(name, links):
     assert all(math.isinf(f) for f in quick[len(known) :])
 
 
-@pytest.mark.parametrize("name", ["zhang-gosselin-4dof", "hexapod", "delta"])
-def test_every_way_to_evaluate_many_poses_agrees(name):
-    machine = heavy(name)
+@pytest.mark.parametrize(
+    ("name", "links"),
+    [
+        *(("zhang-gosselin-4dof", False), ("hexapod", False), ("delta", False), ("delta", True), ("tripteron", True)),
+        *(("planar-3rrr", True), ("passive-leg-4dof-rus", True), ("orthoglide", True), ("hexapod-rus", True)),
+    ],
+)
+def test_every_way_to_evaluate_many_poses_agrees(name, links):
+    machine, names = heavy(name, links), ["singularity_margin", *NAMES]
     path = next(path for path in values(machine) if path.startswith("pose."))
     points = PointTable({path: values(machine)[path] + np.linspace(0.0, 0.01, 300)})
-    expected = evaluate(machine, points, NAMES)
+    expected = evaluate(machine, points, names)
     for way in (Way.ANY_MACHINE, Way.NATIVE):
-        results, status = np.empty((6, points.size)), np.empty(points.size, dtype=np.int8)
-        loaded_fill(machine, points.paths, NAMES, way)(points.columns(0, points.size), results, status)
+        results, status = np.empty((7, points.size)), np.empty(points.size, dtype=np.int8)
+        loaded_fill(machine, points.paths, names, way)(points.columns(0, points.size), results, status)
         assert (status == expected.status).all()
         np.testing.assert_allclose(results, list(expected.values.values()), rtol=1e-9)
+
+
+@pytest.mark.parametrize("names", [["frequency_2"], ["stiffness_x", "frequency_1", "compliance_z"]])
+def test_machine_code_finds_modes_of_massive_legs_beside_other_quantities(monkeypatch, names):
+    """Within reach and out of it, in another order, by fewer points than a vector has, and never by the slow solver."""
+    from kinetostat.engine import loaded
+
+    machine = heavy("delta", links=True)
+    columns = {"pose.x": np.array([0.0, 5.0, 0.02])}
+    slow, fast, codes = np.empty((len(names), 3)), np.empty((len(names), 3)), np.empty((2, 3), dtype=np.int8)
+    loaded_fill(machine, [*columns], names, Way.MODES)(columns, slow, codes[0])
+    monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
+    loaded_fill(machine, [*columns], names, Way.NATIVE)(columns, fast, codes[1])
+    assert codes.tolist() == [[Status.OK, Status.OUT_OF_REACH, Status.OK]] * 2
+    np.testing.assert_allclose(fast, slow, rtol=1e-9)
+    assert not np.array_equal(fast, slow, equal_nan=True)  # they are two routes
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,9 @@ from kinetostat.engine.kernel import (
     program_of,
     recipe_of,
 )
-from kinetostat.engine.loaded import StatePrograms
 from kinetostat.engine.modes import modes_at_rest
 from kinetostat.engine.points import Points, Population
+from kinetostat.engine.rest import StatePrograms
 from kinetostat.engine.trace import Runnable
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import units_of

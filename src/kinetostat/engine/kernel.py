@@ -7,7 +7,8 @@ left out. A new machine of the same form, with other numbers, uses the same prog
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -117,9 +118,15 @@ def program_of(recipe: Recipe, native: bool = True) -> Runnable:
     """Return the program of a recipe, compiled or run node by node in NumPy; derivatives come after all results."""
     if native:
         with suppress(ModuleNotFoundError):  # without LLVM all runs in NumPy, fifty times as long
-            return Program(_machine_code(recipe))
+            return machine_program_of(recipe)
     formula = recipe.formula()
     return Interpreted(formula.body, formula.inputs)
+
+
+@lru_cache(PROGRAMS_KEPT)
+def machine_program_of(recipe: Recipe) -> Program:
+    """Return the machine code of a recipe; without LLVM, a ModuleNotFoundError says so."""
+    return Program(_machine_code(recipe))
 
 
 def _machine_code(recipe: Recipe) -> MachineCode:
@@ -221,6 +228,12 @@ def program_columns(
     joints = solve_joints(with_values(machine, columns))
     by_joint = (np.array(np.broadcast_to(c, (count,)), dtype=float) for c in (*joints.coordinates, joints.status))
     return [*given, *by_joint]
+
+
+@cache
+def compiles() -> bool:
+    """Tell whether programs can be compiled here, so that none has to run in NumPy."""
+    return find_spec("llvmlite") is not None
 
 
 def closes_inside(machine: Machine) -> bool:

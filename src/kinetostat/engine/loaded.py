@@ -1,31 +1,30 @@
-"""Loaded states of slabs of points: Newton's steps as a program that is repeated, and the quantities at their end.
+"""Loaded states and vibrations of slabs of points: which way leads to them, and what is left to the next one.
 
-No formula lives here. The coordinates of the states are columns of the programs. Points at which this does not end
-surely in a stable state of rest, and machines whose equations cannot be reduced, are left to the solver for any
-machine.
+No formula lives here. Points at which programs do not end surely in a stable state of rest, and machines whose
+equations cannot be reduced, are left to the solver for any machine.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import lru_cache, partial
-from threading import Lock
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, form_of, objectives_of, plan_for, step_of
+from kinetostat.engine.form import plan_for
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
     FallingBack,
     Fill,
+    ProgramFill,
     closes_inside,
+    compiles,
     program_columns,
     program_fill,
-    program_of,
-    recipe_of,
 )
-from kinetostat.engine.trace import Runnable
+from kinetostat.engine.modes import ModalNumbers, rows_of_modes
+from kinetostat.engine.rest import RestFill
 from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.limit import snap_flags
@@ -37,22 +36,11 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
-from kinetostat.machine.written.family import at_home
 from kinetostat.motion.response import response_in_motion
-from kinetostat.numerics.iteration import SHRINKING
 from kinetostat.vibration.modes import frequencies
 from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
-
-MOST_NEWTON_STEPS = 8
-"""Of Newton's method after the first ones; each point takes as many as it needs, whatever its neighbours need."""
-MOST_CHORD_STEPS = 6
-"""Of the chord method before these: at a tenth of a step each, as many lead from the longest one to `LAST_STEP`."""
-ONE_STEP_AWAY = 1e-7
-"""Size of a step, rad or in units of the machine's length, after which another one is exact to round-off."""
-LAST_STEP = 1e-12
-"""Size of a step, in the same units, by which what resists at its two ends does not differ: the stiffness of slender
-machines changes by a thousand times as much."""
+from kinetostat.vibration.springwise import ModeCounts, mode_counts_of
 
 
 class Way(Enum):
@@ -80,8 +68,9 @@ class Way(Enum):
 NATIVE_FROM = 200
 """Points from which machine code pays, which is compiled once for a form of machines and then kept on disk."""
 NATIVE_FROM_WITH_LEGS = 3000
-"""The same at rest where legs close loops: programs of some ten thousand operations take seconds, the solver for any
-machine some thousandths of a second for each point."""
+"""The same for each kind of program of machines whose legs close loops, for states of rest and for modes over springs:
+these have some ten thousand operations and take seconds, the solver for any machine half a thousandth of a second to
+some thousandths for each point."""
 COLUMNS_TO = 10_000
 """Points up to which columns do for the vibrations of a platform alone: they take as long as compiling."""
 
@@ -101,10 +90,17 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
     native = count >= NATIVE_FROM and have_programs(machine, tuple(paths), quantities)
-    if native and count < NATIVE_FROM_WITH_LEGS and rest_numbers(machine, quantities):
-        machine_cut = _cut(machine, tuple(paths))
-        native = machine_cut is not None and not machine_cut.legs
+    if native and count < NATIVE_FROM_WITH_LEGS * _programs_with_legs(machine, tuple(paths), quantities):
+        native = False
     return Way.NATIVE if native else Way.ANY_MACHINE if loaded else Way.MODES
+
+
+def _programs_with_legs(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> int:
+    """Count the kinds of programs that quantities need because legs of the machine close loops."""
+    machine_cut = _cut(machine, paths) if rest_numbers(machine, quantities) else None
+    counts = _mode_counts(machine, paths, tuple(quantities))
+    needing = [name for name in quantities if counts and counts.needed_by(QUANTITIES[name])]
+    return int(machine_cut is not None and bool(machine_cut.legs)) + len(rows_of_modes(needing))
 
 
 def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
@@ -137,13 +133,9 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
     if plain or not have_programs(machine, tuple(paths), quantities):
         return solved
-    closed = closes_inside(machine)
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
-    directly: Fill = (
-        RestFill(machine, paths, quantities, closed, bool(cut.legs))
-        if cut
-        else program_fill(machine, paths, quantities, closed)
-    )
+    counts = _mode_counts(machine, tuple(paths), tuple(quantities))
+    directly = ModalFill(machine, paths, quantities, counts) if counts else _direct_fill(machine, paths, quantities)
     every = FallingBack(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
@@ -152,6 +144,15 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
         every(columns, results, status)
 
     return fill
+
+
+def _direct_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> ProgramFill | RestFill:
+    """The fill of quantities for which no modes are needed beside their program."""
+    closed = closes_inside(machine)
+    if not rest_numbers(machine, quantities):
+        return program_fill(machine, paths, quantities, closed)
+    machine_cut = _cut(machine, tuple(paths))
+    return RestFill(machine, paths, quantities, closed, bool(machine_cut and machine_cut.legs))
 
 
 def _fill_of_cables(
@@ -215,160 +216,60 @@ def _response_with_states(
     return response
 
 
-NUMBERS_TOGETHER = 2**17
-"""Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
-step takes them, and there are enough points for the call of a program to cost nothing beside them."""
+class ModalFill:
+    """The fill of quantities of which some follow from modes over springs, as legs with masses that close loops have.
 
-
-class RestFill:
-    """The fill of quantities at rest.
-
-    Where loops are cut at rods, small programs find the state, and one gives the quantities. Where legs close loops, a
-    step of Newton's method takes as long as the quantities, so that one program does both: steps of the chord method,
-    each a quarter of it, lead so near to the state that this program has to be repeated at few points.
+    The others have their own programs, which say the status too.
     """
 
-    def __init__(
-        self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool, legs: bool
-    ) -> None:
-        """Trace the programs.
+    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], counts: ModeCounts) -> None:
+        """Trace and compile the programs.
 
         Args:
-            machine, paths, quantities, closed: as for `program_fill`, of a machine whose loops can be cut.
-            legs: whether legs close loops.
+            machine, paths, quantities: as for `program_fill`.
+            counts: of modes that the quantities need.
         """
-        self._machine, self._closed, self._count = machine, closed, len(quantities)
-        self._form, self._fixed = form_of(machine, paths)
-        kind = Specimen(at_home(machine, paths))
-        objectives = tuple(((name, 1.0),) for name in quantities)
-        self._states = None if legs else StatePrograms(machine, self._form, closed, native=True)
-        step = partial(recipe_of, step_of, kind, self._form, closed=closed)
-        self._first = program_of(step(first=True))
-        self._chord = program_of(step(chord=True)) if legs else None
-        plan = plan_for(machine, quantities, paths)
-        self._step = program_of(
-            recipe_of(objectives_of, kind, self._form, objectives=objectives, closed=closed, plan=plan, stepping=legs)
-        )
+        needing = [name for name in quantities if counts.needed_by(QUANTITIES[name])]
+        others = [name for name in quantities if name not in needing]
+        if not others or (counts.at_rest and not rest_numbers(machine, others)):
+            others.append("displacement_x" if counts.at_rest else "singularity_margin")  # whatever gives the status
+        self._machine, self._count, self._closed = machine, len(others), closes_inside(machine)
+        self._others = _direct_fill(machine, paths, others)
+        self._places = [(quantities.index(name), others.index(name)) for name in quantities if name not in needing]
+        self._modal: list[tuple[ModalNumbers, list[int], list[int]]] = []
+        for what, rows in rows_of_modes(needing).items():
+            count = max(rows.values())
+            numbers = ModalNumbers(machine, self._others.form, self._closed, what, count)
+            places = [quantities.index(name) for name in rows]
+            self._modal.append((numbers, places, [number - 1 for number in rows.values()]))
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
-        count = len(status)
-        given = program_columns(self._machine, self._form, columns, count, self._closed)
-        if self._states is not None:
-            given += self._states.rest_coordinates(self._fixed, given, count)
-            self._step.run(self._fixed, given, results, status)
-            return
-        together = min(count, NUMBERS_TOGETHER // self._step.rows)
-        memory = [np.empty((self._step.rows, together)) for _ in range(2)]
-        for start in range(0, count, max(together, 1)):
-            part = slice(start, start + together)
-            self._fill([column[part] for column in given], results[:, part], status[part], memory)
-
-    def _fill(self, given: list[Array], results: Array, status: Codes, memory: list[Array]) -> None:
-        """Evaluate some points, with memory for what two steps give."""
-        rows = np.arange(len(status))
-        self._first.run(self._fixed, given, memory[0][self._count :, : len(rows)], np.empty_like(status))
-        self._approach(given, memory, len(rows))
-        states = memory[0][self._count :, : len(rows)]
-        for _ in range(MOST_NEWTON_STEPS):
-            stepped, codes = memory[1][:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
-            self._step.run(self._fixed, [*given, states[:-1]], stepped, codes)
-            if len(rows) == len(status):
-                results[:], status[:] = stepped[: self._count], codes
-            else:
-                results[:, rows], status[rows] = stepped[: self._count], codes
-            moving = stepped[-1] > LAST_STEP**2
-            if not moving.any():
-                break
-            if moving.all():
-                states = stepped[self._count :]
-            else:
-                rows, given = rows[moving], [part[moving] for part in given]
-                states = np.compress(moving, stepped[self._count :], axis=1)
-            memory.reverse()
-
-    def _approach(self, given: list[Array], memory: list[Array], count: int) -> None:
-        """Take steps of the chord method towards the states of rest, as long as they shrink fast.
-
-        Args:
-            given: columns of the programs before those of the states.
-            memory: the first part holds the states, and in its last row the squares of the sizes of their last steps.
-            count: number of points.
-        """
-        if self._chord is None:
-            return
-        rows = np.arange(count)
-        for _ in range(MOST_CHORD_STEPS):
-            states, after = (part[self._count :, :count] for part in memory)
-            every = len(rows) == count
-            at, here = (states, given) if every else (states.take(rows, axis=1), [part[rows] for part in given])
-            stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=np.int8)
-            self._chord.run(self._fixed, [*here, at[:-1]], stepped, codes)
-            before, size = at[-1], stepped[-1]
-            shrinking = size < SHRINKING**2 * before
-            # The next step is shorter by the same ratio.
-            further = rows[shrinking & (size * size > LAST_STEP**2 * before)]
-            if every and not (~shrinking & (before >= 0.0)).any():  # where there is no state, nothing is lost
-                memory.reverse()
-            else:
-                states[:, rows[shrinking]] = stepped.compress(shrinking, axis=1)
-            rows = further
-            if not len(rows):
-                break
-
-
-class StatePrograms:
-    """Programs that find states of rest of machines of one kind and form."""
-
-    def __init__(self, machine: Machine, form: Form, closed: bool, native: bool) -> None:
-        """Trace the first steps.
-
-        Args:
-            machine: whose loops can be cut.
-            form: how its parameters enter.
-            closed: whether joints are closed inside the programs.
-            native: whether to compile.
-        """
-        self._kind = Specimen(at_home(machine, form.varying) if native else machine)
-        self._form, self._closed, self._native = form, closed, native
-        self._making = Lock()
-        self._first = self._step(first=True)
-        self._size = self._first.rows - 1  # the last result is how long the step is
-
-    def _step(self, first: bool) -> Runnable:
-        with self._making:  # threads that need a program at the same time wait until it is there
-            recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, first=first)
-            return program_of(recipe, self._native)
-
-    def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
-        """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.
-
-        Args:
-            fixed: values of the parameters that are the same at all points.
-            given: columns of the others, and of joints if they are not closed inside the programs.
-            count: of points.
-        """
-        result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
-        self._first.run(fixed, given, result, codes)
-        for _ in range(MOST_NEWTON_STEPS):
-            moving = result[-1] > ONE_STEP_AWAY**2
-            rows = np.flatnonzero(moving)
-            if not len(rows):
-                break
-            step = self._step(first=False)
-            most = 2 * len(rows) > count  # then picking them out would take longer than computing the others as well
-            at = [*given, *result[:-1]] if most else [part[rows] for part in (*given, *result[:-1])]
-            stepped = np.empty((self._size + 1, len(at[0])))
-            step.run(fixed, at, stepped, codes[: len(at[0])])
-            if most:
-                np.copyto(result, stepped, where=moving)
-            else:
-                result[:, rows] = stepped
-        return [*result[:-1]]
+        others, fixed = np.empty((self._count, len(status))), self._others.fixed
+        given = program_columns(self._machine, self._others.form, columns, len(status), self._closed)
+        states: list[Array] = []
+        if isinstance(self._others, RestFill):
+            states = [np.empty((self._others.size, len(status)))]
+            self._others.solve(given, others, status, *states)
+        else:
+            self._others.program.run(fixed, given, others, status)
+        for place, row in self._places:
+            results[place] = others[row]
+        for numbers, places, rows in self._modal:
+            values, sure = numbers.at(fixed, [*given, *states] if numbers.at_rest else given)
+            results[places] = values[rows]
+            status[~sure & (status == Status.OK)] = Status.NOT_CONVERGED
+        results[:, status != Status.OK] = np.nan
 
 
 _cut = lru_cache(PROGRAMS_KEPT)(cut_machine)
 _reducible = lru_cache(PROGRAMS_KEPT)(reducible)
+
+
+@lru_cache(PROGRAMS_KEPT)
+def _mode_counts(machine: Machine, paths: tuple[str, ...], quantities: tuple[str, ...]) -> ModeCounts | None:
+    """The modes over springs that quantities need; None if they need none, or nothing can compile their programs."""
+    return mode_counts_of(machine, quantities, paths) if compiles() else None
 
 
 def have_programs(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
@@ -379,8 +280,9 @@ def have_programs(machine: Machine, paths: tuple[str, ...], quantities: Sequence
     machine_cut = _cut(machine, paths) if needed else None
     at_rest = not needed or machine_cut is not None
     if machine_cut is not None and machine_cut.legs:
-        at_rest = "factor" not in needed and ("frequency" not in needed or platform_alone(machine, paths))
+        alone = "factor" not in needed and ("frequency" not in needed or platform_alone(machine, paths))
+        at_rest = alone or _mode_counts(machine, paths, tuple(quantities)) is not None
     elif machine_cut is not None and "frequency" in needed:
         at_rest = not leaves_plane(machine, machine_cut)
     rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
-    return at_rest and rings
+    return at_rest and (rings or _mode_counts(machine, paths, tuple(quantities)) is not None)

@@ -58,12 +58,24 @@ def unpack(data: bytes) -> MachineCode:
 
 
 def machine_code_of(body: Body) -> MachineCode:
-    """Compile a body for this processor, and link it where that is done here."""
-    from kinetostat.engine.native import host_lanes, object_file_of  # LLVM takes 0.1 s to load: only where it pays
+    """Compile a body for this processor."""
+    from kinetostat.engine.native import host_lanes, source  # LLVM takes 0.1 s to load: only where it pays
 
-    file = object_file_of(body)
+    return compile_source(source(body, host_lanes()), len(body.results))
+
+
+def compile_source(assembly: str, rows: int) -> MachineCode:
+    """Compile LLVM assembly for this processor, and link it where that is done here.
+
+    Args:
+        assembly: of a function for `host_lanes` points at a time.
+        rows: number of its results.
+    """
+    from kinetostat.engine.native import host_lanes, object_file_of  # as above
+
+    file = object_file_of(assembly)
     image, entry = _image(file) if SELF_LINKED else (file, -1)
-    return MachineCode(image, entry, host_lanes(), len(body.results))
+    return MachineCode(image, entry, host_lanes(), rows)
 
 
 SECTION, SYMBOL, RELOCATION = struct.Struct("<IIQQQQIIQQ"), struct.Struct("<IBBHQQ"), struct.Struct("<QQq")

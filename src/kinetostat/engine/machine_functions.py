@@ -107,10 +107,7 @@ class MachineFunctions:
 
     def needs_modes(self, quantity: MapQuantity) -> bool:
         """Whether the program of a quantity needs modes over springs."""
-        counts = self.mode_counts or ModeCounts()
-        if quantity.loaded == "factor":
-            return bool(counts.factor)
-        return quantity.modal and bool(counts.loaded if quantity.loaded else counts.free)
+        return self.mode_counts is not None and self.mode_counts.needed_by(quantity)
 
     @cached_property
     def length(self) -> float:

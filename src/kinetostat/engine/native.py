@@ -16,9 +16,9 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes
 
 
-def object_file_of(body: Body) -> bytes:
-    """Compile a body for this processor, for `host_lanes` points at a time: 0.05 to 0.5 s."""
-    module = llvm.parse_assembly(source(body, host_lanes()))
+def object_file_of(assembly: str) -> bytes:
+    """Compile LLVM assembly for this processor; that of a body takes 0.05 to 0.5 s."""
+    module = llvm.parse_assembly(assembly)
     module.verify()
     return _target_maker()().emit_object(module)
 
@@ -74,7 +74,7 @@ entry:
   %last = sub i64 %count, {lanes}
   br label %loop
 loop:
-  %k = phi i64 [0, %entry], [%next, %loop]
+  %k = phi i64 [0, %entry], [%next, %{ends}]
   %beyond = icmp sgt i64 %k, %last
   %i = select i1 %beyond, i64 %last, i64 %k
   {inside}
@@ -85,7 +85,8 @@ exit:
   ret void
 }}
 """
-"""The last vector of points is moved back to end with the last point, and so may repeat some: %count >= lanes."""
+"""Lines inside begin in the block `loop` and end in the block `ends`. The last vector of points is moved back to end
+with the last point, and so may repeat some: %count >= lanes."""
 
 
 def source(body: Body, lanes: int) -> str:
@@ -114,7 +115,7 @@ def source(body: Body, lanes: int) -> str:
     inside.append("%at.code = getelementptr i8, ptr %codes, i64 %i")
     inside.append(f"store <{lanes} x i8> %code, ptr %at.code, align 1")
     texts = {"before": "\n  ".join(before), "inside": "\n  ".join(inside)}
-    return FUNCTION.format(declarations=declarations(lanes), name=NAME, lanes=lanes, **texts)
+    return FUNCTION.format(declarations=declarations(lanes), name=NAME, lanes=lanes, ends="loop", **texts)
 
 
 def freeing_first(nodes: Sequence[Node]) -> list[Node]:

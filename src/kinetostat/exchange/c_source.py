@@ -21,7 +21,6 @@ from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.form import objectives_of, plan_for, step_of
 from kinetostat.engine.gradient import with_gradients
-from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
     ENTRIES,
@@ -35,6 +34,7 @@ from kinetostat.engine.machine_functions import (
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
+from kinetostat.engine.rest import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.state import state_of

@@ -273,7 +273,7 @@ def _without_momentum(idle: Array, mass: Array) -> Array:
     Rows of momentum have unit length, as those of motions.
     """
     transposed = np.swapaxes(idle, 1, 2)
-    masses, turned = np.linalg.eigh(transposed @ mass @ idle)
+    masses, turned = np.linalg.eigh(np.nan_to_num(transposed @ mass @ idle))  # poses out of reach have no numbers
     motions = np.swapaxes(turned, 1, 2) @ transposed
     heavy = masses > UNRESISTED * np.trace(mass, axis1=1, axis2=2)[:, None]
     momenta = motions @ mass

@@ -11,6 +11,7 @@ Source: theory (44), (58) and (63). Units are those of `equilibrium.mechanism`.
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from kinetostat.equilibrium.solving import with_share
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, MapQuantity
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars
@@ -39,6 +40,9 @@ from kinetostat.tolerances import SURELY_MORE, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 from kinetostat.vibration.reduced import platform_alone
 from kinetostat.vibration.slopes import EQUALS, energy_of
+
+Modal: TypeAlias = Literal["free", "loaded", "factor"]
+"""Numbers that follow from modes: frequencies with relaxed springs, those at rest under loads, and the load factor."""
 
 
 @dataclass(frozen=True)
@@ -184,11 +188,36 @@ class SpringMotions:
         Returns:
             T, H, F [ways x springs], A [conditions x springs], A+ [springs x conditions], D, E.
         """
-        mixed_mass, mass = self._form_over_springs(self._inertia, self._leg_inertias())
-        mixed_stiffness, stiffness = self._form_over_springs(self._tangent.turning, self._leg_stiffnesses())
+        mixed_mass, mass = self._mass_over_springs()
+        mixed_stiffness, stiffness = self._stiffness_over_springs()
         rows = [self._twists, mixed_mass, mixed_stiffness, self._conditions, self._inverse]
-        upper = [matrix[i, j] for matrix in (mass, stiffness) for i in range(self.size) for j in range(i, self.size)]
-        return [entry for row in rows for entry in row.ravel().tolist()] + upper
+        return [entry for row in rows for entry in row.ravel().tolist()] + _triangle(mass) + _triangle(stiffness)
+
+    def pencil(self, what: Modal) -> list[Scalar]:
+        """The parts of which eigenvalues are found, in the order of `engine.eigenvalues`.
+
+        Args:
+            what: natural frequencies, of which eigenvalues are 1 / omega², with relaxed springs or at rest; or the load
+                factor, of which they are the reciprocal.
+
+        Returns:
+            T, H, A and D, and F and E behind them at rest; for the load factor -F and -E in the place of H and D.
+        """
+        mixed, form = self._stiffness_over_springs() if what == "factor" else self._mass_over_springs()
+        if what == "factor":
+            mixed, form = -mixed, -form
+        rows = [self._twists, mixed, self._conditions]
+        result = [entry for row in rows for entry in row.ravel().tolist()] + _triangle(form)
+        if what == "loaded":
+            mixed, form = self._stiffness_over_springs()
+            result += mixed.ravel().tolist() + _triangle(form)
+        return result
+
+    def _mass_over_springs(self) -> tuple[Array, Array]:
+        return self._form_over_springs(self._inertia, self._leg_inertias())
+
+    def _stiffness_over_springs(self) -> tuple[Array, Array]:
+        return self._form_over_springs(self._tangent.turning, self._leg_stiffnesses())
 
     def _leg_inertias(self) -> Iterator[Array]:
         """The inertia of each leg over its coordinates."""
@@ -276,6 +305,11 @@ class SpringMotions:
         return work
 
 
+def _triangle(matrix: Array) -> list[Scalar]:
+    """The upper triangle of a symmetric matrix, row by row."""
+    return [matrix[i, j] for i in range(len(matrix)) for j in range(i, len(matrix))]
+
+
 def motions_without_loads(machine: Machine, response: Response, joints: Joints | None) -> SpringMotions:
     """The motions of a machine with relaxed springs, with numbers of any kind; arguments as of `vibrating`."""
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
@@ -305,6 +339,12 @@ class ModeCounts:
     def at_rest(self) -> bool:
         """Whether modes at rest are needed."""
         return self.loaded + self.factor > 0
+
+    def needed_by(self, quantity: MapQuantity) -> bool:
+        """Whether a quantity needs some of them."""
+        if quantity.loaded == "factor":
+            return bool(self.factor)
+        return quantity.modal and bool(self.loaded if quantity.loaded else self.free)
 
 
 def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[str]) -> ModeCounts | None:

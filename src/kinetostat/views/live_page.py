@@ -22,7 +22,6 @@ import numpy as np
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.engine.form import drawn_points, objectives_of, step_of
 from kinetostat.engine.gradient import with_gradients
-from kinetostat.engine.loaded import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
     ENTRIES,
@@ -34,6 +33,7 @@ from kinetostat.engine.machine_functions import (
 )
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.printed import NOTATION, pack_graph
+from kinetostat.engine.rest import MOST_NEWTON_STEPS, ONE_STEP_AWAY
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
