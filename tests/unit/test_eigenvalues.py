@@ -1,5 +1,7 @@
 """Largest eigenvalues by machine code against LAPACK, of matrices with conditions."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,11 @@ from kinetostat.vibration.springwise import SpringSizes
 
 def eigenvalues(pencil, *parts):
     """The program's answer to T, H, A, D and, of pencils under load, F and E [points first]."""
-    upper = np.triu_indices(pencil.sizes.springs)
-    flat = [part[:, *upper] if number in (3, 5) else part.reshape(len(part), -1) for number, part in enumerate(parts)]
+    flat = []
+    for number, part in enumerate(parts):
+        ends = np.cumsum([pencil.sizes.springs - sum(pencil.sizes.legs), *pencil.sizes.legs])
+        legs = [part[:, first:last, first:last] for first, last in pairwise(ends)] if number in (3, 5) else []
+        flat += [leg[:, *np.triu_indices(leg.shape[1])] for leg in legs] or [part.reshape(len(part), -1)]
     columns = np.ascontiguousarray(np.concatenate(flat, axis=1).T)
     program, points = eigenvalue_program(pencil), columns.shape[1]
     memory = np.zeros(pencil.workspace * program.lanes + 8)
@@ -43,17 +48,26 @@ def by_lapack(count, twists, mixed_mass, conditions, mass, mixed_stiffness=None,
 @pytest.mark.parametrize("points", [1, 3, 29])
 @pytest.mark.parametrize("loaded", [False, True])
 @pytest.mark.parametrize(
-    ("ways", "springs", "conditions", "count"),
-    [(6, 24, 0, 6), (6, 39, 3, 6), (3, 9, 1, 2), (2, 4, 3, 6), (1, 1, 0, 1), (6, 25, 9, 1), (3, 8, 0, 9)],
+    ("ways", "legs", "conditions", "count"),
+    [
+        *((6, [4] * 6, 0, 6), (6, [13] * 3, 3, 6), (3, [3] * 3, 1, 2), (2, [4], 3, 6), (1, [1], 0, 1)),
+        *((6, [5, 0, 13, 7], 9, 1), (3, [8], 0, 9), (6, [1] * 9, 1, 3)),
+    ],
 )
-def test_they_are_those_of_lapack(ways, springs, conditions, count, loaded, points):
-    random = np.random.default_rng(springs)
+def test_they_are_those_of_lapack(ways, legs, conditions, count, loaded, points):
+    """Legs have springs of any number; two rods come before them."""
+    springs = 2 + sum(legs)
+    random, places = np.random.default_rng(springs), np.repeat(np.arange(len(legs) + 2), [1, 1, *legs])
+    apart = places[:, None] != places
+    apart[:2] = True
     twists, mixed, other = random.normal(size=(3, points, ways, springs))
     conditions = random.normal(size=(points, conditions, springs))
     roots = random.normal(size=(points, springs, springs)) * 10.0 ** random.uniform(-3.0, 3.0, springs)
     mass, stiffness = (np.swapaxes(root, 1, 2) @ root for root in (roots, 0.1 * random.normal(size=roots.shape)))
+    mass[:, apart], stiffness[:, apart] = 0.0, 0.0
+    sizes = SpringSizes(ways, springs, conditions.shape[1], tuple(legs))
     parts = [twists, mixed, conditions, mass, *([0.1 * other / springs, stiffness] if loaded else [])]
-    answer = eigenvalues(Pencil(SpringSizes(ways, springs, conditions.shape[1]), count, loaded), *parts)
+    answer = eigenvalues(Pencil(sizes, count, loaded), *parts)
     expected = by_lapack(count, *parts)
     np.testing.assert_allclose(answer, expected, rtol=0.0, atol=1e-14 * springs * expected.max())
 
@@ -66,7 +80,7 @@ def test_equal_and_separate_and_no_eigenvalues():
     sizes[4], sizes[5, 3], sizes[6], sizes[7] = -1.0, 1e-200, 1e200 * np.arange(springs), np.nan
     sizes[8, :3] = 1.0, 0.5, 0.25
     twists = np.zeros((points, 2, springs))
-    pencil = Pencil(SpringSizes(2, springs, 0), 4, loaded=False)
+    pencil = Pencil(SpringSizes(2, springs, 0, (springs,)), 4, loaded=False)
     answer = eigenvalues(pencil, twists, twists, np.zeros((points, 0, springs)), sizes[:, :, None] * np.eye(springs))
     expected = np.maximum(-np.sort(-sizes, axis=1)[:, :4], 0.0)
     expected[7] = np.nan
@@ -82,7 +96,7 @@ def test_what_is_not_held_has_no_eigenvalues():
     stiffness = np.zeros_like(mass)
     stiffness[4, 2, 2] = -10.0
     parts = [twists, mixed, np.zeros((points, 0, springs)), mass, 0.01 * other, stiffness]
-    answer = eigenvalues(Pencil(SpringSizes(2, springs, 0), 3, loaded=True), *parts)
+    answer = eigenvalues(Pencil(SpringSizes(2, springs, 0, (springs,)), 3, loaded=True), *parts)
     assert np.isnan(answer).any(axis=1).tolist() == [point == 4 for point in range(points)]
     rest = np.arange(points) != 4
     np.testing.assert_allclose(answer[rest], by_lapack(3, *(part[rest] for part in parts)), rtol=1e-13)

@@ -2,20 +2,19 @@
 
 A program of straight code would have a hundred thousand operations here. The matrices are those over the deflections of
 springs (`vibration.springwise`): mirrors bring them to tridiagonal form, those along conditions first, so that what is
-excluded leaves the matrix; then the eigenvalues are enclosed by halving, with counts of changes of sign. No branch
-depends on a number.
+excluded leaves the matrix; then `sturm` encloses the eigenvalues. No branch depends on a number.
 
-Source: Golub and Van Loan, Matrix Computations, sections 5.1, 8.3 and 8.4.
+Source: Golub and Van Loan, Matrix Computations, sections 5.1 and 8.3.
 """
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from kinetostat.engine.loops import LoopCode, Value
 from kinetostat.engine.machine_code import Program, compile_source, unpack
 from kinetostat.engine.program_files import read_program, write_program
+from kinetostat.engine.sturm import enclose
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
 from kinetostat.vibration.springwise import SpringSizes
@@ -25,23 +24,18 @@ if TYPE_CHECKING:
 else:  # as in `loops`
     native = LateModule("kinetostat.engine.native")
 
+Pairs: TypeAlias = list[tuple[Value, Value]]
 BLOCK = 4
 """Rows of a matrix that a loop goes through together, so that what they share is loaded once."""
-HALVINGS = 54
-"""Of the interval from zero to a bound of the largest eigenvalue, after which it is as long as round-off."""
-APART = 1.0 + math.sqrt(2.0) / 100.0
-"""Factor of the bound, so that no middle is an eigenvalue that is simply related to the largest: a sequence that is
-exactly zero has no signs."""
-RESCALED_AFTER, SMALL = 12, 1e-100
-"""Rows after which a Sturm sequence that has become this small is scaled up, before it underflows."""
 
 
 @dataclass(frozen=True)
 class Pencil:
     """The matrices of which eigenvalues are sought, and how many of them.
 
-    Columns of the program are, row by row, T, H [ways x springs], A [conditions x springs] and the upper triangle of D,
-    of the matrix T^T H + H^T T + D where A y = 0. F and E of another matrix, 1 + T^T F + F^T T + E, follow.
+    Columns of the program are, row by row, T, H [ways x springs], A [conditions x springs] and the upper triangles of
+    D, one for each leg, of the matrix T^T H + H^T T + D where A y = 0. F and E follow, those of another matrix
+    1 + T^T F + F^T T + E.
 
     Attributes:
         sizes: of the matrices.
@@ -63,7 +57,7 @@ class Pencil:
         """Number of vectors in the workspace that the program is given in the place of fixed inputs."""
         sizes = self.sizes
         rows = 3 * sizes.ways + sizes.conditions
-        return rows * sizes.springs + 2 * BLOCK + 2 * self.stride**2 + 6 * (self.stride + BLOCK)
+        return rows * sizes.springs + 2 * BLOCK + 2 * self.stride**2 + 7 * (self.stride + BLOCK)
 
 
 @lru_cache
@@ -102,6 +96,7 @@ class _PencilCode:
         lists = self._stiffness + pencil.stride**2
         self._mirror, self._image, self._moved = lists, lists + long, lists + 2 * long
         self._diagonal, self._squares, self._inverses = lists + 3 * long, lists + 4 * long, lists + 5 * long
+        self._before = lists + 6 * long
         self._zero = code.number(0.0)
 
     def write(self) -> None:
@@ -114,20 +109,22 @@ class _PencilCode:
             self._factor(size)
             self._divide(size)
         self._tridiagonal(size)
-        self._enclose(size)
+        enclose(self._code, self._diagonal, self._squares, size, self._pencil.count)
 
     def _write_matrices(self) -> list[int]:
         """Put the matrices together from the columns; gives where they begin."""
         ways, springs, conditions = self._sizes.ways, self._sizes.springs, self._sizes.conditions
-        over_ways, triangle = ways * springs, springs * (springs + 1) // 2
+        over_ways, triangles = ways * springs, sum(leg * (leg + 1) // 2 for leg in self._sizes.legs)
         self._copy(0, 2 * over_ways, self._twists)
         self._copy(2 * over_ways, conditions * springs, self._conditions)
         first = 2 * over_ways + conditions * springs
-        self._put_together(self._mass, self._mixed_mass, first, 0.0)
+        self._write_legs(self._mass, first, 0.0)
+        self._add_mixed(self._mass, self._mixed_mass)
         if not self._pencil.loaded:
             return [self._mass]
-        self._copy(first + triangle, over_ways, self._mixed_stiffness)
-        self._put_together(self._stiffness, self._mixed_stiffness, first + triangle + over_ways, 1.0)
+        self._copy(first + triangles, over_ways, self._mixed_stiffness)
+        self._write_legs(self._stiffness, first + triangles + over_ways, 1.0)
+        self._add_mixed(self._stiffness, self._mixed_stiffness)
         return [self._mass, self._stiffness]
 
     def _copy(self, first: int, count: int, start: int) -> None:
@@ -136,56 +133,69 @@ class _PencilCode:
         with code.loop(0, count) as loop:
             code.store(code.column(code.index("add", loop.index, first)), start, loop.index)
 
-    def _put_together(self, matrix: int, mixed: int, upper: int, diagonal: float) -> None:
-        """Write T^T X + X^T T + Z + diagonal 1 of the mixed part X and the columns of the upper triangle Z.
+    def _write_legs(self, matrix: int, column: int, diagonal: float) -> None:
+        """Write a matrix that couples no springs of different legs, with a number on its diagonal.
+
+        Args:
+            matrix: where it begins in the workspace.
+            column: the first column of the upper triangles of its legs.
+            diagonal: added to its diagonal.
+        """
+        code, sizes, stride = self._code, self._sizes, self._pencil.stride
+        with code.loop(0, stride, step=BLOCK) as rows:
+            starts = self._row_starts(rows.index)
+            with code.loop(0, code.index("add", rows.index, BLOCK)) as columns:
+                for start in starts:
+                    code.store(self._zero, matrix, code.index("add", start, columns.index))
+        for place in range(sizes.springs if diagonal else 0):
+            code.store(code.number(diagonal), matrix + place * (stride + 1), 0)
+        first = sizes.springs - sum(sizes.legs)
+        for leg in sizes.legs:
+            corner = matrix + first * (stride + 1)
+            with code.loop(0, leg) as rows:
+                i = rows.index
+                # Rows before row i have 2 leg - i + 1 entries in the mean, of which the row's own i are not there.
+                before = code.index("sdiv", code.index("mul", i, code.index("sub", 2 * leg - 1, i)), 2)
+                start = code.index("add", before, column)
+                with code.loop(i, leg) as columns:
+                    j, places = columns.index, [code.index("mul", index, stride) for index in (i, columns.index)]
+                    entry = code.column(code.index("add", start, j))
+                    entry = code.add(entry, code.load(corner, code.index("add", places[1], i)))
+                    code.store(entry, corner, code.index("add", places[0], j))
+                    code.store(entry, corner, code.index("add", places[1], i))
+            first, column = first + leg, column + leg * (leg + 1) // 2
+
+    def _add_mixed(self, matrix: int, mixed: int) -> None:
+        """Add T^T X + X^T T of the mixed part X to a matrix.
 
         Whatever fills up the last block is finite, and mirrors are zero there.
         """
         code, springs, block = self._code, self._sizes.springs, range(BLOCK)
+
+        def add(start: Value, j: Value, here: Pairs, there: Pairs) -> None:
+            place = code.index("add", start, j)
+            entry = code.load(matrix, place)
+            for (twist, other), (twist_there, other_there) in zip(here, there, strict=True):
+                entry = code.add(entry, code.mul(twist, other_there))
+                entry = code.add(entry, code.mul(other, twist_there))
+            code.store(entry, matrix, place)
+
         with code.loop(0, springs, step=BLOCK) as rows:
-            places = [code.index("add", rows.index, k) for k in block]
-            starts = self._row_starts(rows.index)
-            shown = [self._at_most(place, springs - 1) for place in places]
+            places, starts = [code.index("add", rows.index, k) for k in block], self._row_starts(rows.index)
             here = [self._twist_and_mixed(mixed, place) for place in places]
             with code.loop(0, rows.index) as before:
-                j, there = before.index, self._twist_and_mixed(mixed, before.index)
-                column = self._column_of_row(upper, j)
+                there = self._twist_and_mixed(mixed, before.index)
                 for k in block:
-                    entry = self._product(code.column(code.index("add", column, shown[k])), here[k], there)
-                    code.store(entry, matrix, code.index("add", starts[k], j))
-            columns = [self._column_of_row(upper, row) for row in shown]
+                    add(starts[k], before.index, here[k], there)
             for i in block:
                 for j in block:
-                    column = code.index("add", columns[min(i, j)], shown[max(i, j)])
-                    entry = self._product(code.column(column), here[i], here[j])
-                    if diagonal and i == j:
-                        entry = code.add(entry, code.number(diagonal))
-                    code.store(entry, matrix, code.index("add", starts[i], places[j]))
+                    add(starts[i], places[j], here[i], here[j])
 
-    def _at_most(self, index: Value, last: int) -> Value:
-        """The lesser of two integers."""
-        inside = self._code.do(f"icmp slt i64 {index}, {last}")
-        return self._code.do(f"select i1 {inside}, i64 {index}, i64 {last}")
-
-    def _column_of_row(self, upper: int, row: Value) -> Value:
-        """The column that the entry of a row in column 0 would have, if entries before the diagonal were there."""
-        code, springs = self._code, self._sizes.springs
-        before = code.index("mul", row, code.index("sub", 2 * springs - 1, row))
-        return code.index("add", code.index("sdiv", before, 2), upper)
-
-    def _twist_and_mixed(self, mixed: int, place: Value) -> list[tuple[Value, Value]]:
+    def _twist_and_mixed(self, mixed: int, place: Value) -> Pairs:
         """The entries of T and of X at a spring, in each way."""
         code, springs = self._code, self._sizes.springs
         starts = [springs * way for way in range(self._sizes.ways)]
         return [(code.load(self._twists + start, place), code.load(mixed + start, place)) for start in starts]
-
-    def _product(self, entry: Value, here: list[tuple[Value, Value]], there: list[tuple[Value, Value]]) -> Value:
-        """An entry of T^T X + X^T T + Z."""
-        code = self._code
-        for (twist, mixed), (other_twist, other_mixed) in zip(here, there, strict=True):
-            entry = code.add(entry, code.mul(twist, other_mixed))
-            entry = code.add(entry, code.mul(mixed, other_twist))
-        return entry
 
     def _leave_out(self, row: int, matrices: Sequence[int]) -> None:
         """Turn a condition onto the last coordinate that is left, which is thereby zero."""
@@ -233,52 +243,75 @@ class _PencilCode:
         return code.where(positive, code.div(unit, code.where(positive, half, unit)), self._zero), square
 
     def _reflect(self, matrix: int, size: Value, scale: Value) -> None:
-        """Turn a symmetric matrix by the mirror u from both sides: A - u w^T - w u^T, of its first rows.
+        """Turn the first rows of a symmetric matrix by the mirror from both sides."""
+        self._go_through(matrix, size, turned=False)
+        self._move(size, scale)
+        self._go_through(matrix, size, imaged=False)
 
-        The lower triangle is kept, and whole blocks on the diagonal. Beyond the size, u and w are zero.
+    def _go_through(self, matrix: int, size: Value, turned: bool = True, imaged: bool = True) -> None:
+        """Turn the first rows of a symmetric matrix by the mirror before, and find the image A u in the next one.
+
+        The lower triangle is kept, and whole blocks on the diagonal. Beyond the size, mirrors are zero.
+
+        Args:
+            matrix: where it begins in the workspace.
+            size: number of rows.
+            turned: whether there is a mirror u before: A - u w^T - w u^T.
+            imaged: whether there is a mirror next.
         """
         code, block = self._code, range(BLOCK)
         filled = code.index("mul", code.index("sdiv", code.index("add", size, BLOCK - 1), BLOCK), BLOCK)
+
+        def entry_at(row: int, column: Value, there: list[Value]) -> Value:
+            place = code.index("add", starts[row], column)
+            entry = code.load(matrix, place)
+            if turned:
+                entry = code.less(entry, code.mul(here[row][1], there[2]))
+                entry = code.less(entry, code.mul(here[row][2], there[1]))
+                code.store(entry, matrix, place)
+            return entry
+
+        def of_mirrors(place: Value) -> list[Value]:
+            lists = (self._mirror, *((self._before, self._moved) if turned else ()))
+            return [code.load(start, place) for start in lists]
+
         with code.loop(0, filled, step=BLOCK) as rows:
-            starts = self._row_starts(rows.index)
-            mirror = [code.load(self._mirror, code.index("add", rows.index, k)) for k in block]
+            starts, places = self._row_starts(rows.index), [code.index("add", rows.index, k) for k in block]
+            here = [of_mirrors(place) for place in places]
             with code.loop(0, rows.index, [self._zero] * BLOCK) as columns:
-                j, other = columns.index, code.load(self._mirror, columns.index)
+                j, there = columns.index, of_mirrors(columns.index)
                 image, sums = code.load(self._image, j), []
                 for k in block:
-                    entry = code.load(matrix, code.index("add", starts[k], j))
-                    image = code.add(image, code.mul(entry, mirror[k]))
-                    sums.append(code.add(columns.values[k], code.mul(entry, other)))
-                code.store(image, self._image, j)
-                columns.after = sums
+                    entry = entry_at(k, j, there)
+                    if imaged:
+                        image = code.add(image, code.mul(entry, here[k][0]))
+                        sums.append(code.add(columns.values[k], code.mul(entry, there[0])))
+                if imaged:
+                    code.store(image, self._image, j)
+                    columns.after = sums
             for k in block:
                 result = columns.values[k]
                 for column in block:
-                    place = code.index("add", starts[k], code.index("add", rows.index, column))
-                    result = code.add(result, code.mul(code.load(matrix, place), mirror[column]))
-                code.store(result, self._image, code.index("add", rows.index, k))
+                    entry = entry_at(k, places[column], here[column])
+                    result = code.add(result, code.mul(entry, here[column][0]))
+                if imaged:
+                    code.store(result, self._image, places[k])
+
+    def _move(self, size: Value, scale: Value) -> None:
+        """Find what a mirror moves, w = s A u - s^2 (u^T A u) u / 2, and leave the mirror behind."""
+        code = self._code
         with code.loop(0, size, [self._zero]) as loop:
             product = code.mul(code.load(self._mirror, loop.index), code.load(self._image, loop.index))
             loop.after = [code.add(loop.values[0], product)]
         back = code.mul(code.mul(code.number(0.5), code.mul(scale, scale)), loop.values[0])
         with code.loop(0, size) as loop:
-            along = code.mul(back, code.load(self._mirror, loop.index))
-            moved = code.less(code.mul(scale, code.load(self._image, loop.index)), along)
+            mirror = code.load(self._mirror, loop.index)
+            moved = code.less(code.mul(scale, code.load(self._image, loop.index)), code.mul(back, mirror))
             code.store(moved, self._moved, loop.index)
-        for beyond in block:
-            code.store(self._zero, self._moved, code.index("add", size, beyond))
-        with code.loop(0, filled, step=BLOCK) as rows:
-            starts = self._row_starts(rows.index)
-            places = [code.index("add", rows.index, k) for k in block]
-            mirror = [code.load(self._mirror, place) for place in places]
-            moved_rows = [code.load(self._moved, place) for place in places]
-            with code.loop(0, code.index("add", rows.index, BLOCK)) as columns:
-                j = columns.index
-                other, other_moved = code.load(self._mirror, j), code.load(self._moved, j)
-                for k in block:
-                    place = code.index("add", starts[k], j)
-                    entry = code.less(code.load(matrix, place), code.mul(mirror[k], other_moved))
-                    code.store(code.less(entry, code.mul(moved_rows[k], other)), matrix, place)
+            code.store(mirror, self._before, loop.index)
+        for beyond in range(BLOCK):
+            for start in (self._moved, self._before):
+                code.store(self._zero, start, code.index("add", size, beyond))
 
     def _row_starts(self, row: Value) -> list[Value]:
         """The places at which the rows of a block begin in a matrix."""
@@ -343,90 +376,29 @@ class _PencilCode:
                 code.store(entry, self._mass, code.index("add", start, rows.index))
 
     def _tridiagonal(self, size: int) -> None:
-        """Bring the mass to tridiagonal form, from the last row: its diagonal, and the squares of what is beside it."""
+        """Bring the mass to tridiagonal form, from the last row: its diagonal, and the squares of what is beside it.
+
+        Each row is turned by the mirror before it in advance of the others, so that they can be gone through once.
+        """
         code, stride = self._code, self._pencil.stride
+        with code.loop(0, size + BLOCK) as loop:
+            code.store(self._zero, self._before, loop.index)
+            code.store(self._zero, self._moved, loop.index)
         code.store(self._zero, self._squares, 0)
-        with code.loop(1, size) as loop:
-            left = code.index("sub", size, loop.index)  # coordinates before the row
+        with code.loop(0, size - 1) as loop:
+            left = code.index("sub", size - 1, loop.index)  # coordinates before the row
             start = code.index("mul", left, stride)
+            before, moved = code.load(self._before, left), code.load(self._moved, left)
+            with code.loop(0, code.index("add", left, 1)) as columns:
+                place = code.index("add", start, columns.index)
+                entry = code.less(code.load(self._mass, place), code.mul(before, code.load(self._moved, columns.index)))
+                entry = code.less(entry, code.mul(moved, code.load(self._before, columns.index)))
+                code.store(entry, self._mass, place)
             code.store(code.load(self._mass, code.index("add", start, left)), self._diagonal, left)
             scale, square = self._mirror_of(self._mass, left, start)
             code.store(square, self._squares, left)
-            self._reflect(self._mass, left, scale)
-        code.store(code.load(self._mass, 0), self._diagonal, 0)
-
-    def _enclose(self, size: int) -> None:
-        """Enclose the largest eigenvalues by halving an interval for each."""
-        code, zero, unit = self._code, self._zero, self._code.number(1.0)
-        with code.loop(0, size, [zero, zero]) as loop:
-            largest, widest = loop.values
-            entry, square = code.load(self._diagonal, loop.index), code.load(self._squares, loop.index)
-            loop.after = [
-                code.where(code.below(largest, entry), entry, largest),
-                code.where(code.below(widest, square), square, widest),
-            ]
-        double = code.mul(code.number(2.0), code.call("sqrt", loop.values[1]))
-        bound = code.mul(code.number(APART), code.add(loop.values[0], double))
-        sound = code.below(zero, bound)
-        share = code.where(sound, code.div(unit, code.where(sound, bound, unit)), zero)
-        with code.loop(0, size) as loop:
-            code.store(code.mul(share, code.load(self._diagonal, loop.index)), self._diagonal, loop.index)
-            squared = code.mul(share, code.mul(share, code.load(self._squares, loop.index)))
-            code.store(squared, self._squares, loop.index)
-        shown = min(self._pencil.count, size)
-        ends = [zero] * shown + [unit] * shown
-        with code.loop(0, HALVINGS, ends) as halving:
-            low, high = halving.values[:shown], halving.values[shown:]
-            half = code.number(0.5)
-            middles = [code.mul(half, code.add(a, b)) for a, b in zip(low, high, strict=True)]
-            above = self._counts_above(middles, size)
-            beyond = [code.below(code.number(k + 0.5), count) for k, count in enumerate(above)]
-            pairs = zip(beyond, middles, low, strict=True)
-            raised = [code.where(more, middle, a) for more, middle, a in pairs]
-            pairs = zip(beyond, middles, high, strict=True)
-            halving.after = [*raised, *(code.where(more, b, middle) for more, middle, b in pairs)]
-        # Numbers that are not finite compare as false everywhere; their sum brings them back.
-        lost = code.mul(zero, code.load(self._diagonal, 0))
-        for k in range(self._pencil.count):
-            value = code.mul(bound, halving.values[k]) if k < shown else zero
-            code.give(code.add(value, lost), k)
-
-    def _counts_above(self, middles: Sequence[Value], size: int) -> list[Value]:
-        """Count the eigenvalues above some numbers, by the signs in Sturm sequences."""
-        code, zero, unit = self._code, self._zero, self._code.number(1.0)
-        whole, rest = divmod(size, RESCALED_AFTER)
-        start = [value for _ in middles for value in (unit, zero, zero)]
-        with code.loop(0, whole * RESCALED_AFTER, start, RESCALED_AFTER) as loop:
-            loop.after = self._sequences(middles, loop.values, loop.index, RESCALED_AFTER)
-        return self._sequences(middles, loop.values, str(whole * RESCALED_AFTER), rest)[2::3]
-
-    def _sequences(self, middles: Sequence[Value], values: Sequence[Value], first: Value, rows: int) -> list[Value]:
-        """Continue Sturm sequences p' = (d - x) p - e^2 p'' by some rows.
-
-        Args:
-            middles: the number x of each sequence.
-            values: p, p'' and the number of neighbours of equal sign, of each sequence.
-            first: the first row.
-            rows: how many.
-
-        Returns:
-            The same behind these rows.
-        """
-        code, result = self._code, list(values)
-        signs = [code.sign_after(code.bits(0), values[3 * k]) for k in range(len(middles))]
-        for row in range(rows):
-            place = code.index("add", first, row)
-            entry, square = code.load(self._diagonal, place), code.load(self._squares, place)
-            for k, middle in enumerate(middles):
-                now, before = result[3 * k : 3 * k + 2]
-                across = code.mul(square, before)
-                following = code.less(code.mul(code.less(entry, middle), now), across)
-                signs[k] = code.sign_after(signs[k], following)
-                result[3 * k : 3 * k + 2] = following, now
-        for k, sign in enumerate(signs):
-            now, before, count = result[3 * k : 3 * k + 3]
-            equal = code.less(code.number(float(rows)), code.changes(sign, rows))
-            size = code.add(code.call("fabs", now), code.call("fabs", before))
-            scale = code.where(code.below(size, code.number(SMALL)), code.number(1.0 / SMALL), code.number(1.0))
-            result[3 * k : 3 * k + 3] = code.mul(now, scale), code.mul(before, scale), code.add(count, equal)
-        return result
+            self._go_through(self._mass, left)
+            self._move(left, scale)
+        # Of the first row, the entry alone is left, and its mirror has been turned with it.
+        twice = code.mul(code.number(2.0), code.mul(code.load(self._before, 0), code.load(self._moved, 0)))
+        code.store(code.less(code.load(self._mass, 0), twice), self._diagonal, 0)

@@ -151,7 +151,7 @@ class ModalNumbers:
         """
         columns = np.array(rows_of(given))
         points = columns.shape[1]
-        squares, sure = np.empty((self._pencil.count, points)), np.empty(points, dtype=bool)
+        squares, codes = np.empty((self._pencil.count, points)), np.empty(points, dtype=np.int8)
         size, lanes = min(points, POINTS_TOGETHER), self._eigenvalues.lanes
         here, matrices, roots = (
             _memory_of_vectors(rows, max(size, lanes)) for rows in (len(columns), self._matrices.rows, len(squares))
@@ -167,7 +167,8 @@ class ModalNumbers:
             here[:, :size], here[:, size:] = columns[:, part], columns[:, part][:, -1:]
             for call in calls:
                 call()
-            squares[:, part], sure[part] = roots[:, :size], statuses[:size] == Status.OK
+            squares[:, part], codes[part] = roots[:, :size], statuses[:size]
+        sure = codes == int(Status.OK)
         with np.errstate(all="ignore"):
             if self._what == "factor":
                 return np.where(squares > UNRESISTED, 1.0 / squares, np.where(np.isnan(squares), np.nan, np.inf)), sure

@@ -11,6 +11,7 @@ Source: theory (44), (58) and (63). Units are those of `equilibrium.mechanism`.
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -53,11 +54,13 @@ class SpringSizes:
         ways: number of motions that the platform has.
         springs: number of springs of all legs and rods.
         conditions: number of combinations of deflections that would open a leg.
+        legs: number of springs of each leg; those of rods come before them.
     """
 
     ways: int
     springs: int
     conditions: int
+    legs: tuple[int, ...] = ()
 
     def matrices(self, parts: Array) -> tuple[Array, Array, Array]:
         """The matrices of n states over deflections that keep all legs closed, each [n x springs x springs].
@@ -121,8 +124,9 @@ def spring_sizes(machine: Cut) -> SpringSizes:
     """Count the springs and conditions of a machine with its loops cut."""
     ways = machine.mechanism.ways.shape[1]
     joints = [leg.springs.count(None) for leg in machine.legs]
-    springs = len(machine.rods) + sum(len(leg.springs) for leg in machine.legs) - sum(joints)
-    return SpringSizes(ways, springs, len(machine.rods) + sum(ways - count for count in joints) - ways)
+    legs = tuple(len(leg.springs) - count for leg, count in zip(machine.legs, joints, strict=True))
+    conditions = len(machine.rods) + sum(ways - count for count in joints) - ways
+    return SpringSizes(ways, len(machine.rods) + sum(legs), conditions, legs)
 
 
 def springs_follow_ways(machine: Cut) -> bool:
@@ -201,17 +205,23 @@ class SpringMotions:
                 factor, of which they are the reciprocal.
 
         Returns:
-            T, H, A and D, and F and E behind them at rest; for the load factor -F and -E in the place of H and D.
+            T, H, A and D, and F and E behind them at rest; for the load factor -F and -E in the place of H and D. Of D
+            and E, the upper triangle of each leg, which are all that is not zero.
         """
         mixed, form = self._stiffness_over_springs() if what == "factor" else self._mass_over_springs()
         if what == "factor":
             mixed, form = -mixed, -form
         rows = [self._twists, mixed, self._conditions]
-        result = [entry for row in rows for entry in row.ravel().tolist()] + _triangle(form)
+        result = [entry for row in rows for entry in row.ravel().tolist()] + self._triangles(form)
         if what == "loaded":
             mixed, form = self._stiffness_over_springs()
-            result += mixed.ravel().tolist() + _triangle(form)
+            result += mixed.ravel().tolist() + self._triangles(form)
         return result
+
+    def _triangles(self, matrix: Array) -> list[Scalar]:
+        """The upper triangles of all legs."""
+        ends = np.cumsum([len(self._machine.rods), *(len(scale) for scale in self._deflections)]).tolist()
+        return [entry for first, last in pairwise(ends) for entry in _triangle(matrix[first:last, first:last])]
 
     def _mass_over_springs(self) -> tuple[Array, Array]:
         return self._form_over_springs(self._inertia, self._leg_inertias())
