@@ -1,102 +1,79 @@
-"""Largest eigenvalues by machine code against LAPACK, of matrices with conditions."""
+"""The greatest eigenvalue by rotations, against LAPACK: also where eigenvalues are equal or many decades apart."""
 
-from itertools import pairwise
+import math
 
 import numpy as np
 import pytest
 
-from kinetostat.engine.eigenvalues import Pencil, eigenvalue_program
-from kinetostat.vibration.springwise import SpringSizes
+from kinetostat.algebra.symmetric import greatest_eigenvalue
+from kinetostat.engine.gradient import Interpreted, gradient
+from kinetostat.engine.trace import Body, Graph
+
+COUNT = 5000
+ROUNDINGS = 20 * np.finfo(float).eps
 
 
-def eigenvalues(pencil, *parts):
-    """The program's answer to T, H, A, D and, of pencils under load, F and E [points first]."""
-    flat = []
-    for number, part in enumerate(parts):
-        ends = np.cumsum([pencil.sizes.springs - sum(pencil.sizes.legs), *pencil.sizes.legs])
-        legs = [part[:, first:last, first:last] for first, last in pairwise(ends)] if number in (3, 5) else []
-        flat += [leg[:, *np.triu_indices(leg.shape[1])] for leg in legs] or [part.reshape(len(part), -1)]
-    columns = np.ascontiguousarray(np.concatenate(flat, axis=1).T)
-    program, points = eigenvalue_program(pencil), columns.shape[1]
-    memory = np.zeros(pencil.workspace * program.lanes + 8)
-    first = -memory.ctypes.data // 8 % 8
-    results, codes = np.empty((pencil.count, points)), np.empty(points, dtype=np.int8)
-    program.run(memory[first:], [columns], results, codes)
-    return results.T
+def matrices(values):
+    """Random symmetric matrices with given eigenvalues [count x n]."""
+    source = np.random.default_rng(0)
+    turns = np.linalg.qr(source.normal(size=(*values.shape, values.shape[1])))[0]
+    made = np.einsum("nij,nj,nkj->nik", turns, values, turns)
+    return 0.5 * (made + made.swapaxes(1, 2))
 
 
-def whole(twists, mixed, beside):
-    product = np.swapaxes(twists, 1, 2) @ mixed
-    return product + np.swapaxes(product, 1, 2) + beside
+def greatest(stack):
+    size = stack.shape[1]
+    return greatest_eigenvalue([[stack[:, i, j] for j in range(size)] for i in range(size)])
 
 
-def by_lapack(count, twists, mixed_mass, conditions, mass, mixed_stiffness=None, stiffness=None):
-    result = np.zeros((len(twists), count))
-    for point in range(len(twists)):
-        at = slice(point, point + 1)
-        axes = np.linalg.qr(conditions[point].T, mode="complete")[0][:, conditions.shape[1] :]
-        matrix = axes.T @ whole(twists[at], mixed_mass[at], mass[at])[0] @ axes
-        if stiffness is not None:
-            stiff = axes.T @ (np.eye(len(axes)) + whole(twists[at], mixed_stiffness[at], stiffness[at])[0]) @ axes
-            factor = np.linalg.inv(np.linalg.cholesky(stiff))
-            matrix = factor @ matrix @ factor.T
-        sizes = np.linalg.eigvalsh(matrix)[::-1][:count]
-        result[point, : len(sizes)] = np.maximum(sizes, 0.0)
-    return result
+SPECTRA = {
+    "any": lambda source, n: source.random((COUNT, n)),
+    "many decades apart": lambda source, n: 10.0 ** source.uniform(-14, 0, (COUNT, n)),
+    "nearly equal": lambda source, n: 1.0 + 1e-9 * source.random((COUNT, n)),
+    "equal": lambda _, n: np.ones((COUNT, n)),
+    "one": lambda source, n: np.eye(n)[source.integers(0, n, COUNT)],
+}
 
 
-@pytest.mark.parametrize("points", [1, 3, 29])
-@pytest.mark.parametrize("loaded", [False, True])
-@pytest.mark.parametrize(
-    ("ways", "legs", "conditions", "count"),
-    [
-        *((6, [4] * 6, 0, 6), (6, [13] * 3, 3, 6), (3, [3] * 3, 1, 2), (2, [4], 3, 6), (1, [1], 0, 1)),
-        *((6, [5, 0, 13, 7], 9, 1), (3, [8], 0, 9), (6, [1] * 9, 1, 3)),
-    ],
-)
-def test_they_are_those_of_lapack(ways, legs, conditions, count, loaded, points):
-    """Legs have springs of any number; two rods come before them."""
-    springs = 2 + sum(legs)
-    random, places = np.random.default_rng(springs), np.repeat(np.arange(len(legs) + 2), [1, 1, *legs])
-    apart = places[:, None] != places
-    apart[:2] = True
-    twists, mixed, other = random.normal(size=(3, points, ways, springs))
-    conditions = random.normal(size=(points, conditions, springs))
-    roots = random.normal(size=(points, springs, springs)) * 10.0 ** random.uniform(-3.0, 3.0, springs)
-    mass, stiffness = (np.swapaxes(root, 1, 2) @ root for root in (roots, 0.1 * random.normal(size=roots.shape)))
-    mass[:, apart], stiffness[:, apart] = 0.0, 0.0
-    sizes = SpringSizes(ways, springs, conditions.shape[1], tuple(legs))
-    parts = [twists, mixed, conditions, mass, *([0.1 * other / springs, stiffness] if loaded else [])]
-    answer = eigenvalues(Pencil(sizes, count, loaded), *parts)
-    expected = by_lapack(count, *parts)
-    np.testing.assert_allclose(answer, expected, rtol=0.0, atol=1e-14 * springs * expected.max())
+@pytest.mark.parametrize("size", [1, 2, 3])
+@pytest.mark.parametrize("spectrum", SPECTRA)
+def test_it_is_that_of_lapack(spectrum, size):
+    stack = matrices(SPECTRA[spectrum](np.random.default_rng(1), size))
+    np.testing.assert_allclose(greatest(stack), np.linalg.eigvalsh(stack)[:, -1], rtol=ROUNDINGS)
 
 
-def test_equal_and_separate_and_no_eigenvalues():
-    """Matrices that are diagonal already, whose numbers are equal, halves of each other, negative, or zero."""
-    springs, points = 12, 9
-    sizes = np.zeros((points, springs))
-    sizes[1], sizes[2, ::3], sizes[3] = 7.0, 2.0, 2.0 ** -np.arange(springs)
-    sizes[4], sizes[5, 3], sizes[6], sizes[7] = -1.0, 1e-200, 1e200 * np.arange(springs), np.nan
-    sizes[8, :3] = 1.0, 0.5, 0.25
-    twists = np.zeros((points, 2, springs))
-    pencil = Pencil(SpringSizes(2, springs, 0, (springs,)), 4, loaded=False)
-    answer = eigenvalues(pencil, twists, twists, np.zeros((points, 0, springs)), sizes[:, :, None] * np.eye(springs))
-    expected = np.maximum(-np.sort(-sizes, axis=1)[:, :4], 0.0)
-    expected[7] = np.nan
-    np.testing.assert_allclose(answer, expected, rtol=1e-14, atol=1e-300)
+def test_floats_and_zeros():
+    assert greatest_eigenvalue([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 2.0]]) == 3.0
+    assert greatest_eigenvalue([[0.0, 0.0], [0.0, 0.0]]) == 0.0
+    assert greatest_eigenvalue([[0.0, 2.0], [2.0, 0.0]]) == pytest.approx(2.0)
+    assert math.isnan(greatest_eigenvalue([[1.0, math.inf], [math.inf, 1.0]]))
 
 
-def test_what_is_not_held_has_no_eigenvalues():
-    """A point at which the other matrix is not positive definite leaves its neighbours as they are."""
-    random = np.random.default_rng(1)
-    springs, points = 5, 16
-    twists, mixed, other = random.normal(size=(3, points, 2, springs))
-    mass = np.broadcast_to(np.eye(springs), (points, springs, springs)).copy()
-    stiffness = np.zeros_like(mass)
-    stiffness[4, 2, 2] = -10.0
-    parts = [twists, mixed, np.zeros((points, 0, springs)), mass, 0.01 * other, stiffness]
-    answer = eigenvalues(Pencil(SpringSizes(2, springs, 0, (springs,)), 3, loaded=True), *parts)
-    assert np.isnan(answer).any(axis=1).tolist() == [point == 4 for point in range(points)]
-    rest = np.arange(points) != 4
-    np.testing.assert_allclose(answer[rest], by_lapack(3, *(part[rest] for part in parts)), rtol=1e-13)
+@pytest.mark.parametrize("diagonal", [False, True])
+def test_its_derivatives_are_the_dyad_of_its_vector(diagonal):
+    """d(lambda)/dA_ij = v_i v_j, twice that for the two entries off the diagonal that are one."""
+    stack = matrices(np.array([[1.0, 2.0, 5.0], [0.1, 4.0, 4.5]]))
+    if diagonal:
+        stack = np.array([np.diag([1.0, 5.0, 2.0]), np.diag([3.0, 2.0, 1.0])])
+    places = [(i, j) for i in range(3) for j in range(i, 3)]
+    graph = Graph()
+    inputs = {place: graph.input() for place in places}
+    result = greatest_eigenvalue([[inputs[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
+    assert gradient(result, list(inputs.values()))
+    found, codes = np.empty((7, 2)), np.empty(2, dtype=np.int8)
+    program = Interpreted(Body([], list(inputs.values()), [result], 0.0), list(inputs.values()))
+    program.run(np.empty(0), [np.ascontiguousarray(stack[:, i, j]) for i, j in places], found, codes)
+    vectors = np.linalg.eigh(stack)[1][:, :, -1]
+    for row, (i, j) in zip(found[1:], places, strict=True):
+        expected = vectors[:, i] * vectors[:, j] * (1.0 if i == j else 2.0)
+        np.testing.assert_allclose(row, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [4, 6, 8])
+def test_larger_matrices_converge_as_well(size):
+    decades = 10.0 ** np.random.default_rng(size).uniform(-4.0, 4.0, (500, size))
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], (500, size))
+    stack = matrices(decades * signs)
+    expected = np.linalg.eigvalsh(stack)[:, -1]
+    largest = np.abs(decades).max(axis=1)
+    assert (np.abs(greatest(stack) - expected) <= 1e-13 * largest).all()

@@ -214,7 +214,7 @@ class _PencilCode:
         for matrix in matrices:
             self._reflect(matrix, str(size), scale)
 
-    def _mirror_of(self, start: int | Value, size: Value | int, first: Value | int = 0) -> tuple[Value, Value]:
+    def _mirror_of(self, start: int, size: Value | int, first: Value | int = 0) -> tuple[Value, Value]:
         """Find the mirror u that turns a row onto its last coordinate.
 
         Args:
