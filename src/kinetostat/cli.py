@@ -179,35 +179,11 @@ def _parser() -> Parser:
 def _add_file_commands(commands: "Commands") -> None:
     """Add `list`, `new`, `schema` and `check`."""
     add_command(commands, "list", _list, "list bundled machines, bundled studies and families", "kinetostat list")
-    new = add_command(
-        commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
-    )
-    source = new.add_mutually_exclusive_group(required=True)
-    source.add_argument(
-        "family",
-        metavar="FAMILY",
-        nargs="?",
-        help="a family or a bundled machine (see `kinetostat list`), or the word study for a study file",
-    )
-    source.add_argument(
-        "--from",
-        metavar="FILE",
-        type=Path,
-        dest="urdf",
-        help="convert a URDF with closed loops into a machine written leg by leg",
-    )
-    source.add_argument(
-        "--legs-of",
-        metavar="MACHINE",
-        help="write a bundled machine or one from a file leg by leg, joint by joint, at its pose",
-    )
+    _add_new_command(commands)
     schema = add_command(
-        commands,
-        "schema",
-        _schema,
-        "print the JSON Schema of machine or study files",
+        commands, "schema", _schema, "print the JSON Schema of machine or study files",
         "kinetostat schema machine > machine.schema.json",
-    )
+    )  # fmt: skip
     schema.add_argument("what", choices=["machine", "study"], help="kind of file")
     check = add_command(
         commands, "check", _check, "read a machine or study file and show its values", "kinetostat check mine.toml"
@@ -218,6 +194,26 @@ def _add_file_commands(commands: "Commands") -> None:
         "search, whose checksums are then compared",
     )
     check.set_defaults(doing=LOOKING)
+
+
+def _add_new_command(commands: "Commands") -> None:
+    """Add `new`, which prints a file from one of three sources."""
+    new = add_command(
+        commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
+    )
+    source = new.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "family", metavar="FAMILY", nargs="?",
+        help="a family or a bundled machine (see `kinetostat list`), or the word study for a study file",
+    )  # fmt: skip
+    source.add_argument(
+        "--from", metavar="FILE", type=Path, dest="urdf",
+        help="convert a URDF with closed loops into a machine written leg by leg",
+    )  # fmt: skip
+    source.add_argument(
+        "--legs-of", metavar="MACHINE",
+        help="write a bundled machine or one from a file leg by leg, joint by joint, at its pose",
+    )  # fmt: skip
 
 
 def _version_or_help(options: argparse.Namespace) -> int:

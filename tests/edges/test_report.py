@@ -24,7 +24,7 @@ from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.studies.requirements import requirements
 from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.html_page import html_page
-from kinetostat.views.report.stiffness import Origin
+from kinetostat.views.report.method import Origin
 from kinetostat.views.report.writing import report_of
 from pages import ROOT
 from studies import SMALL

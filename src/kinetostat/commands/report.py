@@ -2,6 +2,7 @@
 
 import argparse
 import re
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -130,11 +131,7 @@ def _add_report_command(commands: "Commands") -> None:
         "--date", help="date in the title block (default: none, so that equal input gives equal files)"
     )
     command.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path("report.html"),
-        help="the file, .html or .pdf (default: report.html)",
+        "-o", "--output", type=Path, default=Path("report.html"), help="the file, .html or .pdf (default: report.html)"
     )
 
 
@@ -145,17 +142,7 @@ def _report(options: argparse.Namespace) -> int:
     from kinetostat.views.tables import print_written, terminal
 
     path = report_path(options.output)
-    wanted = ReportOptions(
-        options.ranges,
-        options.without,
-        options.engine,
-        options.author,
-        options.date,
-        options.loaded,
-        options.fit,
-        options.motion,
-        options.elevations,
-    )
+    wanted = ReportOptions(**{field.name: getattr(options, field.name) for field in fields(ReportOptions)})
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
@@ -163,11 +150,11 @@ def _report(options: argparse.Namespace) -> int:
     result = result.in_units(options.units) if result and options.units else result
     machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:
-        known = wanted.fit, wanted.motion, wanted.elevations
-        answers = gather(machine, wanted.ranges, wanted.without, result, progress, *known)
+        further = wanted.fit, wanted.motion, wanted.elevations
+        answers = gather(machine, wanted.ranges, wanted.without, result, progress, *further)
         if answers.analysis.status is Status.OK:
-            named = [options.subject, *(word for text in options.settings for word in ("--set", text))]
-            write_report(answers, wanted, named, subject.inputs, path, progress)
+            words = [options.subject, *(word for text in options.settings for word in ("--set", text))]
+            write_report(answers, wanted, words, subject.inputs, path, progress)
     if answers.analysis.status is not Status.OK:
         return no_answer(answers.analysis.message)
     list_written(None, [path])

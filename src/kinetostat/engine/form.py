@@ -84,13 +84,13 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
     simple = {path: (0.0, 1.0) if path in axes else (0.0,) for path in fixed if path not in kept}
     constant = {path: v for path, v in fixed.items() if math.isinf(v) or abs(v) in simple.get(path, ())}
     numbers: list[float] = []
-    known: dict[float, int] = {}
+    places: dict[float, int] = {}  # of numbers that parameters share, by their size
     uses = []
     for path, value in fixed.items():
         if path in constant:
             continue
         alone = path in kept
-        place = len(numbers) if alone else known.setdefault(abs(value), len(numbers))
+        place = len(numbers) if alone else places.setdefault(abs(value), len(numbers))
         if place == len(numbers):
             numbers.append(value if alone else abs(value))
         uses.append((path, place, value < 0.0 and not alone))
@@ -210,49 +210,92 @@ def objectives_of(
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)
     response = respond(given.machine, joints)
-    coordinates: tuple[Traced, ...] = ()
     names = [name for weights in objectives for name, _ in weights]
-    wanted = rest_numbers(given.machine, names, limited)
-    if wanted:
-        equations = reduced.reduced_machine(given.machine, response, joints)
-        coordinates = new_inputs(given.graph, equations.size)
-        # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
-        there = equations.step([*coordinates])[0] if paths else [*coordinates]
-        loaded, status = equations.numbers(there, wanted, response, names)
-        if mode_counts is not None and mode_counts.at_rest:
-            motions = springwise.SpringMotions(equations.cut, there)
-            known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
-            coordinates = (*coordinates, *(column for mode in known for column in mode))
-            status = where(motions.sure, status, int(Status.NOT_CONVERGED))
-            if mode_counts.loaded:
-                squares = [motions.square(mode) for mode in known[: mode_counts.loaded]]
-                loaded["frequency"] = vibrations.lowest_frequencies(squares)
-            if mode_counts.factor:
-                loaded["factor"] = motions.factor(known[-1])
-        if "frequency" in wanted and "frequency" not in loaded:
-            loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, bool(paths))
-        response = replace(response, loaded=loaded, status=status)
-    if mode_counts is not None and mode_counts.free:
-        motions = springwise.motions_without_loads(given.machine, response, joints)
-        known = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
-        coordinates = (*coordinates, *(column for mode in known for column in mode))
-        squares = vibrations.lowest_frequencies([motions.square(mode) for mode in known])
-        status = where(motions.sure, response.status, int(Status.SINGULAR))
-        response = replace(response, frequencies=squares, status=status)
-    elif modes:
-        vibration = slopes.vibrating(given.machine, response, joints, modes)
-        coordinates = (*coordinates, *(unknowns := new_inputs(given.graph, vibration.columns)))
-        response = replace(response, frequencies=vibrations.lowest_frequencies(vibration.squares(unknowns)))
-    elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
-        squares = vibrations.free_frequencies(given.machine, response, joints, bool(paths))
-        response = replace(response, frequencies=squares)
+    response, coordinates = _response_at_rest(given, response, joints, names, limited, mode_counts, bool(paths))
+    response, unknowns = _response_vibrating(given, response, joints, names, modes, mode_counts, bool(paths))
     response = response_in_motion(given.machine, response, joints, plan, names)
     code = response.status if judged else response.joint_status
     accepted = code < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
     if stepping and response.loaded is not None:
         results += [result_of(value) for value in response.loaded["after"]]
-    return formula_of(given, columns, results, result_of(code), paths, coordinates)
+    return formula_of(given, columns, results, result_of(code), paths, (*coordinates, *unknowns))
+
+
+def _response_at_rest(
+    given: TracedMachine,
+    response: Response,
+    joints: Joints | None,
+    names: Sequence[str],
+    limited: bool,
+    mode_counts: "springwise.ModeCounts | None",
+    differentiated: bool,
+) -> tuple[Response, tuple[Traced, ...]]:
+    """Trace what quantities under load need; return the response with it, and the columns of the state and its modes.
+
+    Args:
+        given: the traced machine.
+        response: of the machine in its free state.
+        joints: of the machine, where its family does not place them.
+        names: of all quantities; where none is about the machine under load, there are no columns.
+        limited: as for `objectives_of`.
+        mode_counts: how many modes over springs are known, as further columns.
+        differentiated: whether results are differentiated.
+    """
+    wanted = rest_numbers(given.machine, names, limited)
+    if not wanted:
+        return response, ()
+    equations = reduced.reduced_machine(given.machine, response, joints)
+    state = new_inputs(given.graph, equations.size)
+    # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
+    there = equations.step([*state])[0] if differentiated else [*state]
+    loaded, status = equations.numbers(there, wanted, response, names)
+    modes: list[tuple[Traced, ...]] = []
+    if mode_counts is not None and mode_counts.at_rest:
+        motions = springwise.SpringMotions(equations.cut, there)
+        modes = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
+        status = where(motions.sure, status, int(Status.NOT_CONVERGED))
+        if mode_counts.loaded:
+            squares = [motions.square(mode) for mode in modes[: mode_counts.loaded]]
+            loaded["frequency"] = vibrations.lowest_frequencies(squares)
+        if mode_counts.factor:
+            loaded["factor"] = motions.factor(modes[-1])
+    if "frequency" in wanted and "frequency" not in loaded:
+        loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, differentiated)
+    columns = (*state, *(column for mode in modes for column in mode))
+    return replace(response, loaded=loaded, status=status), columns
+
+
+def _response_vibrating(
+    given: TracedMachine,
+    response: Response,
+    joints: Joints | None,
+    names: Sequence[str],
+    modes: int,
+    mode_counts: "springwise.ModeCounts | None",
+    differentiated: bool,
+) -> tuple[Response, tuple[Traced, ...]]:
+    """Trace the frequencies about the free state that quantities need; return also the columns of modes that are known.
+
+    Modes over springs are known where legs with masses close loops; others where derivatives are wanted; else the
+    program solves for frequencies itself.
+    """
+    if mode_counts is not None and mode_counts.free:
+        motions = springwise.motions_without_loads(given.machine, response, joints)
+        shapes = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
+        squares = vibrations.lowest_frequencies([motions.square(shape) for shape in shapes])
+        status = where(motions.sure, response.status, int(Status.SINGULAR))
+        columns = tuple(column for shape in shapes for column in shape)
+        return replace(response, frequencies=squares, status=status), columns
+    if modes:
+        vibration = slopes.vibrating(given.machine, response, joints, modes)
+        unknowns = new_inputs(given.graph, vibration.columns)
+        squares = vibrations.lowest_frequencies(vibration.squares(unknowns))
+        return replace(response, frequencies=squares), unknowns
+    if any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
+        squares = vibrations.free_frequencies(given.machine, response, joints, differentiated)
+        return replace(response, frequencies=squares), ()
+    return response, ()
 
 
 def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()) -> "rigid.MotionPlan | None":
@@ -386,14 +429,14 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
     for spring, share in zip(springs(response.configuration), compliance_shares(response.statics), strict=True):
         diagonal = [share.entry(i, i) for i in range(6)]
         if not all(is_zero(entry) for entry in diagonal):
-            known = parts.get(str(spring.of))
-            parts[str(spring.of)] = [a + b for a, b in zip(known, diagonal, strict=True)] if known else diagonal
+            before = parts.get(str(spring.of))
+            parts[str(spring.of)] = [a + b for a, b in zip(before, diagonal, strict=True)] if before else diagonal
     results = [result_of(where(accepted, value, math.nan)) for row in parts.values() for value in row]
     return TracedShares(formula_of(given, columns, results, result_of(response.status), ()), tuple(parts))
 
 
 def new_inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
-    """Further columns."""
+    """Make further columns of the program."""
     return tuple(graph.input() for _ in range(count))
 
 
@@ -422,14 +465,14 @@ def formula_of(
     paths: Sequence[str] | None = None,
     coordinates: Sequence[Traced] = (),
 ) -> TracedFormula:
-    """The formula of some results and a code, whose columns are those that vary, of joints, and further coordinates."""
+    """Join results and a code into a formula; its columns are those that vary, of joints, and further coordinates."""
     body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
     inputs = () if paths is None else (*(given.parameters[path] for path in paths), *joints[:-1])
     return TracedFormula(body, inputs)
 
 
 def traced_joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
-    """The joints of a traced machine, and the columns that bring them: coordinates and a status."""
+    """Return the joints of a traced machine, and the columns that bring them: coordinates and a status."""
     if given.machine.family.chains is None:
         return None, ()
     if closed:
@@ -446,5 +489,5 @@ def _weighted_sum(response: Response, weights: Weights) -> Scalar:
 
 
 def result_of(value: Scalar) -> Operand:
-    """A result as a program takes it: a node, or a float where it depends on nothing."""
+    """Return a result as a program takes it: a node, or a float where it depends on nothing."""
     return float(value) if isinstance(value, int | float) else value

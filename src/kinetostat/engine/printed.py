@@ -17,7 +17,7 @@ from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed_nod
 from kinetostat.frozen import dataclass
 
 LONGEST_EXPRESSION = 92
-"""Characters up to which an expression takes in another one."""
+"""Characters up to which an expression takes in another one: with its name and indentation a line stays below 120."""
 
 NOTATION: dict[str, str] = {
     "add": "{0} + {1}",
@@ -73,13 +73,12 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
     Raises:
         ValueError: a result needs another input.
     """
-    written = {given.number: name for given, name in zip(inputs, names, strict=True)}
+    written = {node.number: name for node, name in zip(inputs, names, strict=True)}
     condition, values = _condition_of(results)
     decided = [code] if condition is None else [condition, code]
     before = dict.fromkeys(needed_nodes(decided))
     used = [*before, *(node for node in needed_nodes([*values, *decided]) if node not in before)]
-    uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
-    uses.update(result.number for result in (*values, *decided) if isinstance(result, Node))
+    uses = _use_counts(used, [*values, *decided])
     lines: list[str] = []
     first = 0
     for place, node in enumerate(used, 1):
@@ -105,8 +104,15 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
     )
 
 
+def _use_counts(nodes: Sequence[Node], results: Sequence[Operand]) -> Counter[int]:
+    """Count how often each node is used, by other nodes and as a result."""
+    uses = Counter(operand.number for node in nodes for operand in node.operands if isinstance(operand, Node))
+    uses.update(result.number for result in results if isinstance(result, Node))
+    return uses
+
+
 def _condition_of(results: Sequence[Operand]) -> tuple[Condition | None, list[Operand]]:
-    """The condition of which all results are NaN unless it holds, and their values where it does."""
+    """Find the condition without which all results are NaN, and return it with their values where it holds."""
     values: list[Operand] = []
     conditions: set[Condition] = set()
     for result in results:
@@ -129,13 +135,13 @@ def _expression(node: Node, written: dict[int, str]) -> str:
 
 
 def _is_plain(text: str) -> bool:
-    """Whether an operand is a name, a positive number, an element or a call, which needs no brackets."""
+    """Return whether an operand is a name, a positive number, an element or a call, which needs no brackets."""
     call = CALL.match(text)
     return bool(ATOM.match(text)) or (call is not None and _closes_at_end(text, call.end()))
 
 
 def _closes_at_end(text: str, start: int) -> bool:
-    """Whether the bracket before a place of a text is closed by its last character."""
+    """Return whether the bracket before a place of a text is closed by its last character."""
     depth = 1
     for place in range(start, len(text)):
         depth += (text[place] == "(") - (text[place] == ")")
@@ -182,11 +188,10 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
         ValueError: a result needs another input.
     """
     used = needed_nodes(results)
-    uses = Counter(operand.number for node in used for operand in node.operands if isinstance(operand, Node))
-    uses.update(result.number for result in results if isinstance(result, Node))
+    uses = _use_counts(used, results)
     letters = {operation: chr(ord("a") + place) for place, operation in enumerate(NOTATION)}
-    kept = [given.number for given in inputs]
-    known = set(kept)  # to ask the list itself would read all of it for each operation
+    kept = [node.number for node in inputs]
+    all_kept = set(kept)  # to ask the list itself would read all of it for each operation
     numbers: dict[str, int] = {}  # by their digits, so that 0 is not -0
     code: list[str] = []
     counts: list[int] = []
@@ -201,8 +206,8 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
             code.append(letters[operand.operation].upper() if again else letters[operand.operation])
             if again:
                 kept.insert(0, operand.number)
-                known.add(operand.number)
-        elif operand.number in known:
+                all_kept.add(operand.number)
+        elif operand.number in all_kept:
             counts.append(kept.index(operand.number))
             kept.insert(0, kept.pop(counts[-1]))
             code.append(EARLIER)
@@ -216,7 +221,7 @@ def pack_graph(inputs: Sequence[Traced], results: Sequence[Operand]) -> dict[str
 
 
 def _digits(count: int) -> str:
-    """A count in digits of `LETTERS`, the least first."""
+    """Write a count in digits of `LETTERS`, the least first."""
     text = ""
     while count >= 32:
         text += LETTERS[32 + count % 32]

@@ -17,6 +17,7 @@ from kinetostat.engine.points import PointTable
 from kinetostat.exchange.formats import ascii_line
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
@@ -28,8 +29,11 @@ ACROSS, UPWARDS, HEIGHT = "pose.x", "pose.y", "pose.z"
 ROUNDS = 3
 """Times that the sag is computed, each at the height to which the one before has raised the tool: it changes little."""
 POINTS = 9
-"""Points along each axis where no ranges are given."""
+"""Points along each axis where no ranges are given: sag bends smoothly, and splines go between the points."""
+FEWEST_POINTS = 3
+"""Points along each axis at least: both controllers refuse a mesh of fewer."""
 MILLIMETRES = 1e3
+"""Millimetres of a metre: both controllers take these."""
 FEWEST_BICUBIC = 4
 """Points along an axis from which Klipper interpolates by cubic splines; it takes Lagrange's polynomials below."""
 KLIPPER = Template("""\
@@ -124,13 +128,13 @@ def write_reprapfirmware(analysis: Analysis, path: Path, over: Sequence[str] | N
 
 
 def _narrower(chart: HeightMap) -> str:
-    """The widest ranges inside of a map, as many points narrower on all sides, in which it has no hole; as options."""
+    """Write as options the widest ranges in which a map has no hole, narrower by as many points on all sides."""
     for margin in range(1, (min(chart.heights.shape) - 1) // 2):
         inside = slice(margin, -margin)
         if np.isfinite(chart.heights[inside, inside]).all():
             ends = {name: MILLIMETRES * axis[inside][[0, -1]] for name, axis in (("x", chart.x), ("y", chart.y))}
-            given = [f'--over "{name}={low:.4g} mm:{high:.4g} mm:{POINTS}"' for name, (low, high) in ends.items()]
-            return f", for instance {' '.join(given)}"
+            ranges = [f'--over "{name}={low:.4g} mm:{high:.4g} mm:{POINTS}"' for name, (low, high) in ends.items()]
+            return f", for instance {' '.join(ranges)}"
     return ""
 
 
@@ -145,21 +149,42 @@ def height_map(analysis: Analysis, over: Sequence[str]) -> HeightMap:
         InputError: nothing loads the machine, other axes than x and y, fewer than three points along one, or no rest.
     """
     machine = analysis.machine
+    x, y = _map_axes(machine, over)
+    heights = _raised_heights(machine, x, y)
+    if not np.isfinite(heights).any():
+        raise InputError("At no point of these ranges is the machine at rest; choose other ranges with --over.")
+    if not np.nan_to_num(heights).any():
+        raise InputError(
+            "Nothing loads the machine, so that no height needs a correction; give it a load, for instance "
+            "with --set tool.mass=\"2 kg\" --set 'load.gravity=[0, 0, -9.81]'."
+        )
+    return HeightMap(x, y, heights)
+
+
+def _map_axes(machine: Machine, over: Sequence[str]) -> tuple[Array, Array]:
+    """Return the coordinates of the columns and the rows of a map, m, increasing.
+
+    Raises:
+        InputError: as `height_map` about axes.
+    """
     missing = [path.removeprefix(POSE) for path in (ACROSS, UPWARDS, HEIGHT) if path not in values(machine)]
     if missing:
         raise InputError(
             f"The pose of {machine.name} has no {' and no '.join(missing)}, and a map of heights corrects z over x and "
             "y; kinetostat command computes the corrections of any pose."
         )
-    pairs = chosen_axes(machine, over or usual_ranges(machine, POINTS))
-    grid = grid_of(pairs)
+    grid = grid_of(chosen_axes(machine, over or usual_ranges(machine, POINTS)))
     axes = {path: axis.values for axis in grid.axes for path in axis.paths}
-    if set(axes) != {ACROSS, UPWARDS} or min(map(len, axes.values())) < 3:
+    if set(axes) != {ACROSS, UPWARDS} or min(map(len, axes.values())) < FEWEST_POINTS:
         raise InputError(
             "A map of heights needs ranges of x and of y with at least three points each: "
             '--over "x=-100 mm:100 mm:9" --over "y=-100 mm:100 mm:9".'
         )
-    x, y = np.sort(axes[ACROSS]), np.sort(axes[UPWARDS])
+    return np.sort(axes[ACROSS]), np.sort(axes[UPWARDS])
+
+
+def _raised_heights(machine: Machine, x: Array, y: Array) -> Array:
+    """Compute by how much the tool must be raised at each point, m [rows x columns]; NaN without a state of rest."""
     across, upwards = (part.ravel() for part in np.meshgrid(x, y))
     home = float(values(machine)[HEIGHT])
     raised = np.zeros(across.size)
@@ -168,11 +193,4 @@ def height_map(analysis: Analysis, over: Sequence[str]) -> HeightMap:
         answers = evaluate(machine, PointTable(columns), ["displacement_z"])
         sag = answers.values["displacement_z"]
         raised = np.where(answers.status == Status.OK, -sag, np.nan)
-    if not np.isfinite(raised).any():
-        raise InputError("At no point of these ranges is the machine at rest; choose other ranges with --over.")
-    if not np.nan_to_num(raised).any():
-        raise InputError(
-            "Nothing loads the machine, so that no height needs a correction; give it a load, for instance "
-            "with --set tool.mass=\"2 kg\" --set 'load.gravity=[0, 0, -9.81]'."
-        )
-    return HeightMap(x, y, raised.reshape(len(y), len(x)))
+    return raised.reshape(len(y), len(x))

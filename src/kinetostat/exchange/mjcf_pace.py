@@ -43,19 +43,21 @@ from kinetostat.validation.pieces import (
 )
 
 NOMINAL_MASS = 1.0
-"""kg, of every body where no mass is known: deflections do not depend on it."""
+"""Mass of every body where none is known, kg: deflections do not depend on it."""
 GYRATION = 0.25
-"""Radius of gyration of every body, as a share of the machine's characteristic length."""
+"""Radius of gyration of every body, as a share of the machine's characteristic length: deflections do not
+depend on it, and a part of this size turns about as fast as it moves."""
 IMPEDANCE = 0.9999
-"""d: the stiffest constraint that MuJoCo allows."""
+"""d in the text above: the stiffest constraint that MuJoCo allows."""
 LEAST_STEPS = 2.0
 """Time constant of a constraint in time steps: the shortest that MuJoCo allows."""
 DAMPING = 0.7
 """Damping ratio of the machine's slowest motion: it comes to rest after one swing."""
 CALM = 2.0
-"""Ratio of the period of a spring's armature to the geometric mean of step and damping time."""
+"""Square root of a spring's armature over its stiffness, in units of the geometric mean of step and damping time:
+smaller, springs would be too fast for the step; larger, they would still swing where the machine has come to rest."""
 UNKNOWN_COMPLIANCE = 1e-7
-"""m/N, assumed where the machine is free or rigid, so that its compliance says nothing."""
+"""Compliance that is assumed where the machine is free or rigid, m/N: that of a machine of 10 N/um."""
 LIGHT_SHARE = 2e-5
 """Mass of a body that has none, as a share of all known masses: the engine moves no body without a mass."""
 THIN_SHARE = 1e-3
@@ -128,7 +130,7 @@ def compliances(analysis: Analysis, arm: float) -> list[float]:
 
 
 def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
-    """Mass of every body, kg: known masses of a leg are spread evenly over its bodies, others get the mean of those."""
+    """Return the mass of every body, kg; bodies of legs without known masses get the mean of the others."""
     bodies = [body for body in model.world.every() if body is not model.world]
     masses = {body.name: _share(body, bodies, known) for body in bodies}
     masses[model.platform.name] = sum(
@@ -140,7 +142,8 @@ def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
 
 
 def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
-    masses = [float(p.mass) for p in known if p.mass is not None and p.leg == body.leg]
+    """Return the mass of a body if the known masses of its leg are spread evenly over all bodies of the leg, kg."""
+    masses = [float(part.mass) for part in known if part.mass is not None and part.leg == body.leg]
     return sum(masses) / sum(other.leg == body.leg for other in bodies)
 
 

@@ -21,11 +21,11 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.validation.pieces import Heavy, matrix_of
 
 MOST_JOINTS = 2000
-"""Most joints of a file: more is a mistake."""
+"""Most joints of a file: a hundred times those of a hexapod, so that more is a mistake or an attack."""
 AXISLESS = ("fixed", "spherical")
 """Kinds of joints whose axis, often written as 0 0 0, has no meaning."""
 LARGEST_NUMBER = 1e100
-"""Bound of the size of every number in a file."""
+"""Bound of the size of every number in a file: products of three are still finite."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class UrdfFile:
     Attributes:
         origin: name of the file, for messages.
         name: the name of the robot.
-        about: attributes of the element <kinetostat> of the robot.
+        extension: attributes of the element <kinetostat> of the robot.
         root: name of the link that hangs on no joint.
         joints: the joints by name of their child link.
         frames: the frames of every link in the root link's frame, m [4 x 4].
@@ -81,7 +81,7 @@ class UrdfFile:
 
     origin: str
     name: str
-    about: dict[str, str]
+    extension: dict[str, str]
     root: str
     joints: dict[str, FileJoint]
     frames: dict[str, Array]
@@ -148,25 +148,47 @@ class _Reader:
 
     def read(self) -> UrdfFile:
         """Return everything, placed from the root outwards."""
+        root, children = self._tree()
+        joints, frames = self._placed_joints(root, children)
+        name, loops = self._robot.get("name", "machine"), tuple(self._loops(frames))
+        masses = dict(self._masses(frames))
+        return UrdfFile(self._origin, name, _extension(self._robot), root, joints, frames, loops, masses)
+
+    def _tree(self) -> tuple[str, dict[str, list[Element]]]:
+        """Return the link that hangs on no joint, and the joints that hang on each link.
+
+        Raises:
+            InputError: a link hangs on two joints, or several on none.
+        """
         children: dict[str, list[Element]] = {}
-        parents: dict[str, str] = {}
+        hanging: set[str] = set()
         for element in self._elements:
             where = self._where(element)
             parent, child = (self._link(element, end, where) for end in ("parent", "child"))
-            if child in parents:
+            if child in hanging:
                 raise InputError(
                     f"{where}: link {shorten(child)} is the child of two joints; close the loop with <loop>."
                 )
-            parents[child] = parent
+            hanging.add(child)
             children.setdefault(parent, []).append(element)
-        roots = [link for link in self._links if link not in parents]
+        roots = [link for link in self._links if link not in hanging]
         if len(roots) != 1:
             raise InputError(
                 f'"{self._origin}" has {len(roots)} links that are not the child of a joint; it needs one, the base.'
             )
-        frames: dict[str, Array] = {roots[0]: np.eye(4)}
+        return roots[0], children
+
+    def _placed_joints(
+        self, root: str, children: dict[str, list[Element]]
+    ) -> tuple[dict[str, FileJoint], dict[str, Array]]:
+        """Place joints and links from the root outwards; return the joints by their children, and all frames.
+
+        Raises:
+            InputError: a link cannot be reached from the root.
+        """
+        frames: dict[str, Array] = {root: np.eye(4)}
         joints: dict[str, FileJoint] = {}
-        pending = [roots[0]]
+        pending = [root]
         while pending:
             parent = pending.pop()
             for element in children.get(parent, ()):
@@ -177,27 +199,21 @@ class _Reader:
             lost = next(link for link in self._links if link not in frames)
             raise InputError(
                 f'"{self._origin}": link {shorten(lost)} is on a closed chain of joints; joints must form a tree, and '
-                "a "
-                "loop is closed with <loop>."
+                "a loop is closed with <loop>."
             )
-        loops = tuple(self._loops(frames))
-        about = self._robot.find("kinetostat")
-        name = self._robot.get("name", "machine")
-        extension = dict(about.attrib if about is not None else {})
-        masses = dict(self._masses(frames))
-        return UrdfFile(self._origin, name, extension, roots[0], joints, frames, loops, masses)
+        return joints, frames
 
     def _masses(self, frames: dict[str, Array]) -> Iterator[tuple[str, Heavy]]:
-        """The elements <inertial> of all links that have a mass."""
+        """Give the mass of each link that has one, from its element <inertial>."""
         for link, name in zip(self._robot.findall("link"), self._links, strict=True):
             where = f'"{self._origin}": link {shorten(name)}: inertial'
             inertial = link.find("inertial")
             if inertial is None:
                 continue
             placed = frames[name] @ self._placement(inertial.find("origin"), where)
-            weight, about = inertial.find("mass"), inertial.find("inertia")
+            weight, inertia = inertial.find("mass"), inertial.find("inertia")
             (mass,) = numbers("0" if weight is None else weight.get("value", "0"), 1, f"{where}: mass")
-            entries = " ".join("0" if about is None else about.get(f"i{entry}", "0") for entry in TENSOR)
+            entries = " ".join("0" if inertia is None else inertia.get(f"i{entry}", "0") for entry in TENSOR)
             tensor = numbers(entries, 6, f"{where}: inertia")
             if mass < 0.0 or not is_tensor_of_body(tensor):
                 raise InputError(
@@ -205,14 +221,13 @@ class _Reader:
                     "body has; correct them, or remove <inertial>."
                 )
             if mass > 0.0:
-                turn = placed[:3, :3]
-                yield name, Heavy(mass, placed[:3, 3], turn @ matrix_of(tensor) @ turn.T)
+                rotation = placed[:3, :3]
+                yield name, Heavy(mass, placed[:3, 3], rotation @ matrix_of(tensor) @ rotation.T)
 
     def _joint(self, element: Element, parent: str, frame: Array) -> FileJoint:
         where = self._where(element)
         placed = frame @ self._placement(element.find("origin"), where)
-        about = element.find("kinetostat")
-        extension = dict(about.attrib if about is not None else {})
+        extension = _extension(element)
         name = self._text(element, "name", "a joint")
         driven = name in self._driven or "true" in (element.get("independent"), extension.get("actuated"))
         return FileJoint(
@@ -280,6 +295,12 @@ class _Reader:
             frame[:3, 3] = numbers(element.get("xyz", "0 0 0"), 3, f"{where}: xyz")
             frame[:3, :3] = _rotation(*numbers(element.get("rpy", "0 0 0"), 3, f"{where}: rpy"))
         return frame
+
+
+def _extension(element: Element) -> dict[str, str]:
+    """Return the attributes of the element <kinetostat> within another one."""
+    extension = element.find("kinetostat")
+    return {} if extension is None else dict(extension.attrib)
 
 
 def numbers(text: str, count: int, where: str) -> list[float]:

@@ -21,7 +21,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.machine.written.plan import BASE, NAME, PLANAR_POSE, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
-from kinetostat.spec.validation import SCHEMA_VERSION
+from kinetostat.spec.validation import LONGEST_MACHINE_NAME, SCHEMA_VERSION
 from kinetostat.tolerances import COINCIDENT_HINGES, INDEPENDENT_AXES, OPEN_LOOP
 from kinetostat.units import RIGID
 from kinetostat.validation.pieces import one_body
@@ -30,7 +30,8 @@ CLOSING = ("fixed", "revolute", "continuous", "prismatic", "spherical")
 """Kinds of joints that may close a loop."""
 ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 """Kinds of URDF joints with one freedom, and what they are called in a machine file."""
-LONGEST_NAME = 40
+LONGEST_PART_NAME = 40
+"""Characters of the name of a leg or a joint: messages and tables have room for it."""
 
 
 def read_machine(path: Path) -> tuple[Machine, list[str]]:
@@ -85,11 +86,14 @@ class Bodies:
         self.left = {link for link in file.masses if self._body[link] != file.root}
 
     def links(self, link: str) -> list[str]:
-        """The links with a mass in the body of a link."""
+        """Return the links with a mass in the body of a link."""
         return self._parts.get(self._body[link], [])
 
     def table(self, links: Iterable[str]) -> Document:
-        """Mass, centre and inertia of some links in one, in the root link's frame; empty without a mass."""
+        """Join some links into one mass with its centre and inertia, in the root link's frame; empty without a mass.
+
+        What is joined here is taken, so that no mass counts twice.
+        """
         names = {name for link in links for name in self.links(link)} & self.left
         self.left -= names
         if not names:
@@ -109,42 +113,49 @@ def document_of(file: UrdfFile, bodies: Bodies | None = None) -> Document:
     Raises:
         InputError: if the file is not legs between the root link and a platform.
     """
-    space = choice(file.about.get("space", "spatial"), ("spatial", "planar"), f'"{file.origin}": space')
-    platform = file.about.get("platform", PLATFORM)
+    space = choice(file.extension.get("space", "spatial"), ("spatial", "planar"), f'"{file.origin}": space')
+    platform = _platform_of(file)
+    rigid = _rigid_with(file, platform)
+    legs = [_path(file, platform), *(_path(file, _tip(file, loop, rigid)) for loop in file.loops)]
+    _check_apart(file, legs)
+    bodies = bodies or Bodies(file)
+    welded = [path[-1].child for path, loop in zip(legs[1:], file.loops, strict=True) if path and loop.kind == "fixed"]
+    tool = bodies.table([platform, *welded])
+    point = file.frames[platform][:3, 3]
+    if tool:
+        tool["centre_of_mass"] = (np.array(tool["centre_of_mass"]) - point).tolist()
+    end = file.extension.get("tool", "tool")
+    if end in file.frames:
+        tool["offset"] = _tool_offset(file, end, rigid, point)
+    coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
+    document: Document = {
+        "schema": SCHEMA_VERSION,
+        "name": one_line(file.name)[:LONGEST_MACHINE_NAME],
+        "family": NAME,
+        "space": space,
+        "pose": {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in coordinates},
+        "platform": {"point": point.tolist()},
+        "legs": [
+            _leg(_leg_name(path, number), path, loop, bodies, file.origin)
+            for number, (path, loop) in enumerate(zip(legs, [None, *file.loops], strict=True), 1)
+        ],
+    }
+    return document | ({"tool": tool} if tool else {})
+
+
+def _platform_of(file: UrdfFile) -> str:
+    """Return the link that is the platform: the one of that name, or the one that the file names."""
+    platform = file.extension.get("platform", PLATFORM)
     if platform not in file.frames or platform == file.root:
         raise InputError(
             f'"{file.origin}": no link is called {shorten(platform)}; give the platform that name, or name it with '
             '<kinetostat platform="..."/> in <robot>.'
         )
-    rigid = _rigid_with(file, platform)
-    ways = [(_path(file, platform), None), *((_path(file, _tip(file, loop, rigid)), loop) for loop in file.loops)]
-    _check_apart(file, [path for path, _ in ways])
-    names = [_leg_name(path, number) for number, (path, _) in enumerate(ways, 1)]
-    bodies = bodies or Bodies(file)
-    carried = bodies.table(
-        [platform, *(path[-1].child for path, loop in ways if path and loop and loop.kind == "fixed")]
-    )
-    legs = [_leg(name, path, loop, bodies, file.origin) for name, (path, loop) in zip(names, ways, strict=True)]
-    point = file.frames[platform][:3, 3]
-    given = PLANAR_POSE if space == "planar" else SPATIAL_POSE
-    pose = {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in given}
-    document: Document = {
-        "schema": SCHEMA_VERSION,
-        "name": one_line(file.name)[:80],
-        "family": NAME,
-        "space": space,
-        "pose": pose,
-    }
-    document |= {"platform": {"point": point.tolist()}, "legs": legs}
-    if carried:
-        carried["centre_of_mass"] = (np.array(carried["centre_of_mass"]) - point).tolist()
-    tool = file.about.get("tool", "tool")
-    if tool in file.frames:
-        carried["offset"] = _tool(file, tool, rigid, point)
-    return document | ({"tool": carried} if carried else {})
+    return platform
 
 
-def _tool(file: UrdfFile, tool: str, rigid: set[str], point: Array) -> list[float]:
+def _tool_offset(file: UrdfFile, tool: str, rigid: set[str], point: Array) -> list[float]:
+    """Return the place of the tool as seen from the platform point, m, base axes."""
     if tool not in rigid:
         raise InputError(f'"{file.origin}": link {shorten(tool)}, the tool, must be fixed to the platform.')
     return [float(c) for c in file.frames[tool][:3, 3] - point]
@@ -213,7 +224,7 @@ def _check_apart(file: UrdfFile, paths: Sequence[Sequence[FileJoint]]) -> None:
 def _leg_name(path: Sequence[FileJoint], number: int) -> str:
     """The name that `urdf_export` gave the tip of a leg, or the number of the leg."""
     links = [joint.child for joint in path if joint.child.endswith(TIP)]
-    return links[-1].removesuffix(TIP).replace(".", "-")[:LONGEST_NAME] if links else f"leg {number}"
+    return links[-1].removesuffix(TIP).replace(".", "-")[:LONGEST_PART_NAME] if links else f"leg {number}"
 
 
 def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bodies, origin: str) -> Document:
@@ -257,7 +268,7 @@ def _as_joint(loop: FileLoop) -> FileJoint:
 
 def _name(text: str, leg: str) -> str:
     """A name as a machine file takes it."""
-    return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_NAME]
+    return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_PART_NAME]
 
 
 def _first_joint(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Document]:

@@ -20,7 +20,7 @@ from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.requirements import TABLE, requirements_schema
 from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
 from kinetostat.spec.tolerance_table import tolerances_schema
-from kinetostat.spec.validation import DISPLAY_SCHEMA, LONGEST_NAME, SCHEMA_VERSION
+from kinetostat.spec.validation import DISPLAY_SCHEMA, LONGEST_MACHINE_NAME, SCHEMA_VERSION
 from kinetostat.units import RIGID
 
 STATE = "what is shown where no quantity is named: the free machine, or the machine at rest under its loads"
@@ -70,7 +70,12 @@ def _file_model(family: str, tables: Mapping[str, type]) -> type[BaseModel]:
         ),
         "name": (
             str,
-            Field(description="what people call the machine", min_length=1, max_length=LONGEST_NAME, pattern=PRINTABLE),
+            Field(
+                description="what people call the machine",
+                min_length=1,
+                max_length=LONGEST_MACHINE_NAME,
+                pattern=PRINTABLE,
+            ),
         ),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }

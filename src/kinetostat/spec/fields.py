@@ -231,7 +231,7 @@ def leaves(name: str, quantity: Quantity) -> Iterator[str]:
 MOST_VALUES = 1_000_000
 """Values along one axis."""
 
-HOW = 'write FIELD=from:to:count or FIELD=from:to:count:log, e.g. pose.x="-2 cm:2 cm:41"'
+RANGE_FORM = 'write FIELD=from:to:count or FIELD=from:to:count:log, e.g. pose.x="-2 cm:2 cm:41"'
 
 
 @dataclass(frozen=True)
@@ -290,7 +290,7 @@ def parse_range(text: str) -> Range:
     parts = [part.strip().strip('"') for part in rest.strip().strip('"').split(":")]
     logarithmic = len(parts) == 4 and parts[3] == "log"
     if not equals or not field.strip() or len(parts) - logarithmic != 3:
-        raise InputError(f"{shorten(text)} is not a range; {HOW}.")
+        raise InputError(f"{shorten(text)} is not a range; {RANGE_FORM}.")
     count = parts[2]
     if not count.isdecimal() or not 2 <= int(count[:9]) <= MOST_VALUES:
         raise InputError(f"{shorten(text)}: the count is {shorten(count)}; it must be 2 to {MOST_VALUES}.")

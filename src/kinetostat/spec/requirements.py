@@ -13,13 +13,11 @@ from kinetostat.spec.document import Document, override, read_text, toml_key, to
 from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
-MOST_POSES = 10_000
-MOST_CONDITIONS, MOST_RANGES = 50, 6
-"""Entries of a requirement."""
-LONGEST_NAME = 80
-"""Characters of the name of a requirement."""
-
-
+MOST_POSES, MOST_CONDITIONS, MOST_RANGES = 10_000, 50, 6
+"""Entries of a requirement at most: each pose is solved for whenever a requirement is judged, and a box has no more
+axes than a pose."""
+LONGEST_REQUIREMENT_NAME = 80
+"""Characters of the name of a requirement: a row of a table has room for it."""
 FILES = ("motion", "catalogue")
 """Parts of a requirement that are texts of files, or the name of a file beside that of the machine."""
 DRIVEN = ("fits", *FILES, "gear", "screw")
@@ -54,11 +52,12 @@ class Requirement:
 
 Requirements: TypeAlias = dict[str, Requirement]
 """Requirements by the names that people give them."""
-HOW = (
+REQUIREMENT_FORM = (
     'write NAME = "free_stiffness_z > 50 N/um", or NAME = { demand = "...", over = ["x=-2 cm:2 cm:11"] } for a box, or '
     'NAME = { demand = "...", poses = [{ x = "1 cm" }, { x = "2 cm" }] } for a list of poses, or '
     'NAME = { fits = "MOTOR", motion = "motion.csv" } for a motor of a catalogue'
 )
+"""End of the messages on what is not a requirement."""
 
 
 def take_requirements(
@@ -77,9 +76,9 @@ def take_requirements(
     Raises:
         InputError: names the requirement that is not one, and how to write it.
     """
-    meant = [text for text in several(settings) if text.partition("=")[0].strip().split(".")[0] == TABLE]
-    others = [text for text in several(settings) if text not in meant]
-    written = override({TABLE: document.get(TABLE, {})}, meant, {})[TABLE]
+    overrides = [text for text in several(settings) if text.partition("=")[0].strip().split(".")[0] == TABLE]
+    others = [text for text in several(settings) if text not in overrides]
+    written = override({TABLE: document.get(TABLE, {})}, overrides, {})[TABLE]
     return {key: value for key, value in document.items() if key != TABLE}, others, read_requirements(written, origin)
 
 
@@ -90,24 +89,24 @@ def read_requirements(written: object, origin: str) -> Requirements:
         InputError: names the requirement that is not one, and how to write it.
     """
     if not isinstance(written, dict):
-        raise InputError(f'"{origin}": {TABLE} is wrong in {shorten(written)}; {HOW}.')
+        raise InputError(f'"{origin}": {TABLE} is wrong in {shorten(written)}; {REQUIREMENT_FORM}.')
     requirements = {}
-    for name, given in written.items():
-        table = {"demand": given} if isinstance(given, str | list) else given
+    for name, entry in written.items():
+        table = {"demand": entry} if isinstance(entry, str | list) else entry
         wrong = _wrong_part(name, table)
         if wrong is not None:
             place = ".".join([TABLE, str(name), *wrong])
-            raise InputError(f'"{origin}": {place} is wrong in {shorten(given)}; {HOW}.')
+            raise InputError(f'"{origin}": {place} is wrong in {shorten(entry)}; {REQUIREMENT_FORM}.')
         requirements[name] = _requirement_of(**table)
     return requirements
 
 
 def _wrong_part(name: object, table: Any) -> list[str] | None:
     """Return the key of the first part of a requirement that is not as it must be; no key where the whole is not."""
-    if not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and isinstance(table, dict)):
+    if not (isinstance(name, str) and 0 < len(name) <= LONGEST_REQUIREMENT_NAME and isinstance(table, dict)):
         return []
     if "fits" in table:
-        wrong = [str(key) for key, given in table.items() if key not in DRIVEN or not isinstance(given, str)]
+        wrong = [str(key) for key, value in table.items() if key not in DRIVEN or not isinstance(value, str)]
         return wrong[:1] or next(([key] for key in ("fits", "motion") if not table.get(key)), None)
     demand, over, poses = table.get("demand"), table.get("over", []), table.get("poses", [])
     if not (isinstance(demand, str) or (_are_texts(demand, MOST_CONDITIONS) and demand)):
@@ -161,71 +160,73 @@ def _with_files(requirement: Requirement, name: str, folder: Path) -> Requiremen
     return replace(requirement, **texts)
 
 
-def is_text(given: str) -> bool:
-    """Whether a part of a requirement is the text of a file, and not the name of one."""
-    return "\n" in given
+def is_text(part: str) -> bool:
+    """Return whether a part of a requirement is the text of a file, and not the name of one."""
+    return "\n" in part
 
 
-def _are_texts(given: Any, most: int) -> bool:
-    return isinstance(given, list | tuple) and len(given) <= most and all(isinstance(text, str) for text in given)
+def _are_texts(entries: Any, most: int) -> bool:
+    return isinstance(entries, list | tuple) and len(entries) <= most and all(isinstance(text, str) for text in entries)
 
 
-def _is_pose(given: object) -> bool:
-    """Whether fields are given by name, each as a number or a text."""
-    return isinstance(given, dict) and all(
-        isinstance(key, str) and isinstance(value, int | float | str) for key, value in given.items()
+def _is_pose(pose: object) -> bool:
+    """Return whether something holds fields by name, each with a number or a text."""
+    return isinstance(pose, dict) and all(
+        isinstance(key, str) and isinstance(value, int | float | str) for key, value in pose.items()
     )
 
 
 def requirements_schema() -> dict[str, Any]:
-    """The JSON Schema of the table, in which one condition or a list of them may stand for a whole requirement."""
-    text: dict[str, Any] = {"type": "string", "examples": ["free_stiffness_z > 50 N/um"]}
-    several_texts = {"type": "array", "items": text, "minItems": 1}
+    """Return the JSON Schema of the table, in which a condition or a list of them may stand for a whole requirement."""
+    return {
+        "type": "object",
+        "description": "what must hold, by name: at the pose of the file, over a box, or at a list of poses",
+        "additionalProperties": {"anyOf": [CONDITION, CONDITIONS, _conditions_schema(), _motor_schema()]},
+    }
+
+
+CONDITION: Mapping[str, Any] = {"type": "string", "examples": ["free_stiffness_z > 50 N/um"]}
+CONDITIONS: Mapping[str, Any] = {"type": "array", "items": CONDITION, "minItems": 1}
+
+
+def _conditions_schema() -> dict[str, Any]:
+    """Return the schema of conditions that hold over a box or at a list of poses."""
     pose = {"type": "object", "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "string"}]}}
     lists = {
         "over": ('a box: ranges as "x=-2 cm:2 cm:11"', {"type": "string"}, MOST_RANGES),
         "poses": ("poses, each with the fields in which it differs", pose, MOST_POSES),
     }
-    table = {
-        "additionalProperties": False,
-        "description": str(Requirement.__doc__).partition("\n")[0],
-        "properties": {
-            "demand": {"anyOf": [text, several_texts], "description": "conditions that must all hold"},
-            **{
-                name: {
-                    "default": [],
-                    "description": description,
-                    "items": items,
-                    "maxItems": most,
-                    "title": name.title(),
-                    "type": "array",
-                }
-                for name, (description, items, most) in lists.items()
-            },
-        },
-        "required": ["demand"],
-        "title": "Requirement",
-        "type": "object",
+    properties: dict[str, Any] = {
+        "demand": {"anyOf": [CONDITION, CONDITIONS], "description": "conditions that must all hold"}
     }
-    words = {
+    for name, (description, items, most) in lists.items():
+        properties[name] = {"default": [], "description": description, "items": items, "maxItems": most}
+        properties[name] |= {"title": name.title(), "type": "array"}
+    return _table_schema(str(Requirement.__doc__).partition("\n")[0], properties, ["demand"], "Requirement")
+
+
+def _motor_schema() -> dict[str, Any]:
+    """Return the schema of a motor that must do a motion."""
+    meanings = {
         "fits": "name of a motor of the catalogue",
         "motion": "that it must do: name of a CSV file beside this one, or its lines",
         "catalogue": "of motors: name of a TOML file beside this one, or its lines; default that of kinetostat",
         "gear": "of the catalogue; default as in [drives]",
         "screw": "of the catalogue; default as in [drives]",
     }
-    motor = {
-        "additionalProperties": False,
-        "description": "A motor that must do a motion at every drive.",
-        "properties": {name: {"type": "string", "description": meaning} for name, meaning in words.items()},
-        "required": ["fits", "motion"],
-        "title": "Motor",
-        "type": "object",
-    }
+    properties = {name: {"type": "string", "description": meaning} for name, meaning in meanings.items()}
+    return _table_schema("A motor that must do a motion at every drive.", properties, ["fits", "motion"], "Motor")
+
+
+def _table_schema(description: str, properties: dict[str, Any], required: list[str], title: str) -> dict[str, Any]:
+    """Return the schema of a table that has no other fields than its properties."""
     return {
+        "additionalProperties": False,
+        "description": description,
+        "properties": properties,
+        "required": required,
+        "title": title,
         "type": "object",
-        "description": "what must hold, by name: at the pose of the file, over a box, or at a list of poses",
-        "additionalProperties": {"anyOf": [text, several_texts, table, motor]},
     }
 
 
@@ -240,8 +241,8 @@ def requirement_lines(requirements: Mapping[str, Requirement]) -> Iterator[str]:
 
 def _text(requirement: Requirement) -> str:
     if requirement.fits:
-        return toml_value({part: given for part in DRIVEN if (given := getattr(requirement, part))})
+        return toml_value({part: text for part in DRIVEN if (text := getattr(requirement, part))})
     demand: Any = requirement.demand if len(requirement.demand) > 1 else requirement.demand[0]
-    where = {"over": requirement.over, "poses": requirement.poses}
-    written = {name: entries for name, entries in where.items() if entries}
-    return toml_value({"demand": demand, **written} if written else demand)
+    places = {"over": requirement.over, "poses": requirement.poses}
+    named = {name: entries for name, entries in places.items() if entries}
+    return toml_value({"demand": demand, **named} if named else demand)

@@ -109,7 +109,7 @@ COSTS = (1e-6, 1e6)
 LARGEST_SIZE = 1e3
 """The largest nominal size that may be written with a class, m."""
 LINE_KEYS = ("tolerance", "cost")
-HOW = (
+TOLERANCE_FORM = (
     'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '
     '0.02 mm" (a standard deviation), "0.05 mm normal" (three of them), "IT7 at 300 mm" or "ISO 2768-m at 300 mm" '
     "(a class)"
@@ -255,7 +255,7 @@ def read_tolerances(written: object, origin: str = "") -> Tolerances:
         InputError: names the line, its value, what is allowed, and how to write it.
     """
     if not isinstance(written, Mapping):
-        raise InputError(f"{origin}{TABLE} is {shorten(written)}; it must be a table: {HOW}.")
+        raise InputError(f"{origin}{TABLE} is {shorten(written)}; it must be a table: {TOLERANCE_FORM}.")
     lines = list(_lines(written))
     if len(lines) > MOST_LINES:
         raise InputError(f"{origin}{TABLE} has {len(lines)} lines; at most {MOST_LINES} are allowed.")
@@ -281,7 +281,7 @@ def _tolerance(about: str, value: object, place: str) -> Tolerance:
     entries = table.get("tolerance")
     texts = entries if isinstance(entries, list | tuple) else [entries]
     if not 0 < len(texts) <= MOST_VALUES:
-        raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_VALUES}: {HOW}.")
+        raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_VALUES}: {TOLERANCE_FORM}.")
     deviations = tuple(_deviation(text, place) for text in texts)
     for kind in LARGEST_TOLERANCE:
         if sum(deviation.fits(kind) for deviation in deviations) > 1:
@@ -295,7 +295,9 @@ def _tolerance(about: str, value: object, place: str) -> Tolerance:
 def _deviation(written: object, place: str) -> Deviation:
     """Read one value: a plus-minus, a standard deviation, or a class of a standard."""
     if not isinstance(written, str) or len(written) > LINE_WIDTH:
-        raise InputError(f"{place} is {shorten(written)}; a tolerance is a text with a unit or a class: {HOW}.")
+        raise InputError(
+            f"{place} is {shorten(written)}; a tolerance is a text with a unit or a class: {TOLERANCE_FORM}."
+        )
     text = " ".join(written.split())
     words, spread = text, UNIFORM
     for name in (UNIFORM, NORMAL):
@@ -340,7 +342,7 @@ def _amount(text: str, written: object, place: str) -> tuple[str, float]:
     length, angle, relative = LARGEST_TOLERANCE.values()
     raise InputError(
         f"{place} is {shorten(written)}, which is not a tolerance from 0 to {length:g} m, {angle:g} rad or "
-        f"{100.0 * relative:g} %, with its unit; {HOW}."
+        f"{100.0 * relative:g} %, with its unit; {TOLERANCE_FORM}."
     )
 
 

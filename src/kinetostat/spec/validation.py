@@ -16,8 +16,8 @@ from kinetostat.spec.fields import Quantity, optional, quantities
 from kinetostat.units import KINDS, UnitError
 
 SCHEMA_VERSION = 1
-LONGEST_NAME = 80
-"""Characters of a machine's name."""
+LONGEST_MACHINE_NAME = 80
+"""Characters of a machine's name: titles of figures and pages have room for it."""
 HEAD = ("schema", "name", "family")
 """Keys at the top of a file that are no tables."""
 NO_TABLE = "Input should be a valid dictionary or instance of {}"
@@ -84,7 +84,7 @@ def _mistakes_in_head(document: Document, family: str) -> Iterator[Mistake]:
         yield Mistake("wrong", ("schema",))
     if "name" not in document:
         yield Mistake("missing", ("name",))
-    elif not (isinstance(name, str) and 0 < len(name) <= LONGEST_NAME and re.fullmatch(PRINTABLE, name)):
+    elif not (isinstance(name, str) and 0 < len(name) <= LONGEST_MACHINE_NAME and re.fullmatch(PRINTABLE, name)):
         yield Mistake("wrong", ("name",))
     if document.get("family") != family:
         yield Mistake("wrong", ("family",), f'an override cannot change it from "{family}"; start from another machine')
@@ -171,7 +171,7 @@ def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
     if name == "schema":
         return f"schema is {value}; this version reads schema = {SCHEMA_VERSION}."
     if name == "name":
-        printable = f"text of 1 to {LONGEST_NAME} characters that can be printed"
+        printable = f"text of 1 to {LONGEST_MACHINE_NAME} characters that can be printed"
         return f'name is {value}; it must be {printable}, e.g. name = "my machine".'
     return f"{name} is {value}: {mistake.reason}."
 

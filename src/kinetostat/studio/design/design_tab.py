@@ -16,7 +16,7 @@ from kinetostat.studies.comparison import MOST_DESIGNS, Design, compare
 from kinetostat.studio.design.draft import Draft
 from kinetostat.studio.design.run_panel import RunPanel
 from kinetostat.studio.design.runs import Runs
-from kinetostat.studio.design.state_folder import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
+from kinetostat.studio.design.state_folder import LONGEST_FAVOURITE_NAME, LONGEST_FAVOURITE_NOTE, Favourite, Favourites
 from kinetostat.studio.design.study_form import StudyForm
 from kinetostat.studio.design.texts import comparison_text
 from kinetostat.studio.elements import MAIN_BUTTON, confirm, icon_button, in_quotes, refuse
@@ -121,8 +121,12 @@ class FavouritesPanel:
         self._lane = Lane(_comparison_of, self._show)
         self._chosen: set[int] = set()
         with ui.element("div").classes("keep-row"):
-            self.name = ui.input("name").props(f"dense outlined maxlength={LONGEST_NAME}").mark("favourite-name")
-            self.note = ui.input("note").props(f"dense outlined maxlength={LONGEST_NOTE}").mark("favourite-note")
+            self.name = (
+                ui.input("name").props(f"dense outlined maxlength={LONGEST_FAVOURITE_NAME}").mark("favourite-name")
+            )
+            self.note = (
+                ui.input("note").props(f"dense outlined maxlength={LONGEST_FAVOURITE_NOTE}").mark("favourite-note")
+            )
             for box in (self.name, self.note):
                 box.classes("field grow")
             button = ui.button("Keep", icon="star", on_click=self._keep).props(MAIN_BUTTON)
@@ -132,7 +136,7 @@ class FavouritesPanel:
             self.quantities = ui.input("numbers", placeholder="frequency_1, mass").mark("favourite-quantities")
             self.over = ui.input("over", placeholder="x=-2 cm:2 cm:5").mark("favourite-over")
             for box in (self.quantities, self.over):
-                box.props(f"dense outlined stack-label maxlength={LONGEST_NOTE}").classes("field grow")
+                box.props(f"dense outlined stack-label maxlength={LONGEST_FAVOURITE_NOTE}").classes("field grow")
         with ui.element("div").classes("design-foot"):
             ui.label(f"Tick two to {MOST_DESIGNS} machines to compare them.").classes("note grow")
             self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)

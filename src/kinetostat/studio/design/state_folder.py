@@ -18,7 +18,7 @@ from kinetostat.studies.storage import write_text
 
 MOST = 100
 """Machines that are kept."""
-LONGEST_NAME, LONGEST_NOTE = 80, 400
+LONGEST_FAVOURITE_NAME, LONGEST_FAVOURITE_NOTE = 80, 400
 RUNS, FAVOURITES = "runs", "favourites"
 """Folders of searches and of machines that are kept, in the state folder."""
 REMARK = "# Note:"
@@ -125,10 +125,12 @@ class Favourites:
             InputError: the name is empty or too long, too many machines are kept, or the folder cannot be written.
         """
         name, note = _printable(name), _printable(note)
-        if not name or len(name) > LONGEST_NAME:
-            raise InputError(f"the name has {len(name)} characters; the name of a favourite has 1 to {LONGEST_NAME}.")
-        if len(note) > LONGEST_NOTE:
-            raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_NOTE}.")
+        if not name or len(name) > LONGEST_FAVOURITE_NAME:
+            raise InputError(
+                f"the name has {len(name)} characters; the name of a favourite has 1 to {LONGEST_FAVOURITE_NAME}."
+            )
+        if len(note) > LONGEST_FAVOURITE_NOTE:
+            raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_FAVOURITE_NOTE}.")
         present = numbered_entries(self._folder)
         if len(present) >= MOST:
             raise InputError(f"{MOST} favourites are kept, the most there may be; delete one that you no longer need.")

@@ -1,20 +1,14 @@
-"""Sections on the stiffness: K and C, attribution, indices, load case, maps; its theory; and how to repeat the report.
+"""Sections on the stiffness: K and C, attribution, indices, load case, maps.
 
 Nothing is computed here.
 """
 
-import platform
-from collections.abc import Sequence
-from importlib.metadata import version
-
 import xarray as xr
 
 from kinetostat.display import number
-from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid import failures
-from kinetostat.studies.paper.printed import CITATION
 from kinetostat.studies.report import NOTHING_TO_MAP, Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,
@@ -31,124 +25,9 @@ from kinetostat.views.analysis_tables import (
 from kinetostat.views.figures import missing_line
 from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.grid_figures import contour_maps, grid_curves
-from kinetostat.views.report.content import (
-    Block,
-    Figure,
-    Formula,
-    Listing,
-    Paragraph,
-    Section,
-    Table,
-    as_table,
-    typeset,
-)
+from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table, as_table, typeset
+from kinetostat.views.report.method import MOTION
 from kinetostat.views.report.pictures import PICTURE_WIDTH, MachinePictures, figure_of
-
-LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
-THEORY_TEXT = (
-    "Every elastic part is described by its compliance, which is 0 for a rigid part: rigid and flexible parts are one "
-    "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; a twist is "
-    "(rotation, translation), a wrench (moment, force), both at the reference point. K and C hold for small motions."
-)
-LEGS_TEXT = (
-    "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p). Under them it "
-    "deflects by its elastic coordinates (unit twists J with index e, compliances S):"
-)
-SUM_TEXT = (
-    "The stiffnesses of the legs add up; where springs are rigid or the machine is overconstrained, the force method "
-    "is used instead:"
-)
-AGAIN_TEXT = (
-    "The same command with the same input and the same versions makes this report again, byte for byte. The machine "
-    "with all digits (machine.toml) and the results (results.json) are inside this file."
-)
-
-
-def _matrix(letter: str, below: str = "", above: str = "") -> str:
-    """A bold letter with an index and a power, as MathML."""
-    base = f'<mi mathvariant="normal" class="matrix">{letter}</mi>'
-    if below and above:
-        return f"<msubsup>{base}{below}{above}</msubsup>"
-    return f"<msub>{base}{below}</msub>" if below else base
-
-
-_LEG, _ELASTIC, _PASSIVE, _TRANSPOSED = (f"<mi>{letter}</mi>" for letter in ("i", "e", "p", "T"))
-_INVERSE = "<mrow><mo>−</mo><mn>1</mn></mrow>"
-_EQUALS, _AND = "<mo>=</mo>", '<mo>,</mo><mspace width="2em"/>'
-_CARRIED = [_matrix("J", _PASSIVE, _TRANSPOSED), _matrix("W", _LEG), _EQUALS, "<mn>0</mn>"]
-_DEFLECTING = [
-    _matrix("G", _LEG), _EQUALS, _matrix("W", _LEG, _TRANSPOSED), _matrix("J", _ELASTIC), _matrix("S"),
-    _matrix("J", _ELASTIC, _TRANSPOSED), _matrix("W", _LEG),
-]  # fmt: skip
-
-MOTION = Formula(
-    "".join([
-        _matrix("w"), _EQUALS, _matrix("K"), _matrix("t"), _AND, _matrix("t"), _EQUALS, _matrix("C"), _matrix("w"),
-    ]),
-    "bold(w) = bold(K) thin bold(t), quad quad bold(t) = bold(C) thin bold(w)",
-)  # fmt: skip
-"""Relation of a load and the small motion that it causes."""
-LEG = Formula(
-    "".join([*_CARRIED, _AND, *_DEFLECTING]),
-    "bold(J)_p^T bold(W)_i = 0, quad quad bold(G)_i = bold(W)_i^T bold(J)_e bold(S) bold(J)_e^T bold(W)_i",
-)
-"""Wrenches that a leg carries, and its deflection."""
-ASSEMBLY = Formula(
-    "".join([
-        _matrix("K"), _EQUALS, f"<munder><mo>∑</mo>{_LEG}</munder>", _matrix("W", _LEG), _matrix("G", _LEG, _INVERSE),
-        _matrix("W", _LEG, _TRANSPOSED),
-    ]),
-    "bold(K) = sum_i bold(W)_i bold(G)_i^(-1) bold(W)_i^T",
-)  # fmt: skip
-"""Sum of the stiffnesses of the legs."""
-
-
-def method_section() -> Section:
-    """Write the section with the theory in two formulas."""
-    source = f"Source: {CITATION}, and the documentation of kinetostat, theory."
-    return Section(
-        "Method",
-        (Paragraph(THEORY_TEXT), Paragraph(LEGS_TEXT), LEG, Paragraph(SUM_TEXT), ASSEMBLY, Paragraph(source)),
-    )
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The sources of a report.
-
-    Attributes:
-        command: the command that makes it again.
-        inputs: name and text of each file, as written.
-        machine_file: the machine with all overrides, all digits.
-        results: the analysis as JSON.
-    """
-
-    command: str
-    inputs: tuple[tuple[str, str], ...]
-    machine_file: str
-    results: str
-
-
-def record_section(origin: Origin, engine: Sequence[str]) -> Section:
-    """Write the section with the command, the versions and the input.
-
-    Args:
-        origin: the origin of the report.
-        engine: name and version of the independent engine; empty without one.
-    """
-    versions = [(name, version(name)) for name in LIBRARIES] + [("Python", platform.python_version())]
-    if engine:
-        versions.append((engine[0], engine[1]))
-    return Section(
-        "Record",
-        (
-            Paragraph(AGAIN_TEXT),
-            Listing("Command.", origin.command),
-            Table("Versions.", ("program", "version"), tuple(versions), (False, False)),
-            *(Listing(f"Input: {name}.", text) for name, text in origin.inputs),
-        ),
-    )
-
 
 BLOCK_UNITS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
@@ -226,10 +105,7 @@ def load_section(analysis: Analysis, pictures: MachinePictures) -> Section:
         return Section("Load case", (Paragraph(NO_LOAD.format(point)),))
     loaded = load_table(analysis.load, display)
     tables = [
-        (
-            loaded,
-            f"{str(loaded.title).replace('Load', f'The load at the {point}', 1)}.",
-        ),
+        (loaded, f"{str(loaded.title).replace('Load', f'The load at the {point}', 1)}."),
         (actuator_table(analysis.load, display), "Actuators under the load."),
         (
             reaction_table(analysis.load, analysis.axes, display),

@@ -34,16 +34,10 @@ from kinetostat.views.report.answers import (
 )
 from kinetostat.views.report.content import InnerPage, Paragraph, Report, Section, typeset
 from kinetostat.views.report.html_page import html_page
+from kinetostat.views.report.method import Origin, method_section, record_section
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
-from kinetostat.views.report.stiffness import (
-    Origin,
-    load_section,
-    method_section,
-    record_section,
-    stiffness_section,
-    workspace_section,
-)
+from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
 
 SUFFIXES = (".html", ".pdf")
@@ -76,16 +70,9 @@ class ReportOptions:
 
     def words(self) -> list[str]:
         """Words of the command line that give the same options."""
-        single = {
-            "engine": self.engine,
-            "author": self.author,
-            "date": self.date,
-            "fit": self.fit,
-            "motion": self.motion,
-            "elevations": self.elevations,
-        }
+        single = [(name, getattr(self, name)) for name in ("engine", "author", "date", "fit", "motion", "elevations")]
         pairs = [("--over", self.ranges), ("--without", self.without)]
-        pairs += [(f"--{name}", [str(value)]) for name, value in single.items() if value]
+        pairs += [(f"--{name}", [str(value)]) for name, value in single if value]
         words = [word for name, values in pairs for value in values for word in (name, value)]
         return ["--loaded", *words] if self.loaded else words
 
@@ -180,11 +167,11 @@ def write_report(
     command = shlex.join(["kinetostat", "report", *subject, *options.words(), "-o", path.name])
     results = json.dumps(results_of(answers), ensure_ascii=False, allow_nan=False, indent=1)
     origin = Origin(command, inputs, as_file(answers.machine), results)
-    about = {name: text for name, text in (("Author", options.author), ("Date", options.date)) if text}
+    title_lines = {name: text for name, text in (("Author", options.author), ("Date", options.date)) if text}
     page = path.suffix == ".html"
     validation = _validation(answers.machine, options)
     progress(REPORT_STEPS - 1, REPORT_STEPS)
-    whole = report_of(answers, validation, origin, about, page)
+    whole = report_of(answers, validation, origin, title_lines, page)
     data = html_page(whole).encode() if page else pdf_bytes(whole)
     write_bytes(path, data)
     progress(REPORT_STEPS, REPORT_STEPS)
@@ -209,7 +196,7 @@ def results_of(answers: Answers) -> dict[str, Any]:
 
 
 def report_of(
-    answers: Answers, validation: Validation | str, origin: Origin, about: Mapping[str, str], live: bool
+    answers: Answers, validation: Validation | str, origin: Origin, title_lines: Mapping[str, str], live: bool
 ) -> Report:
     """Assemble the report on a machine, or on a study and its best design.
 
@@ -217,7 +204,7 @@ def report_of(
         answers: the answers at a pose whose status is OK.
         validation: the validation by an independent engine, or why there is none.
         origin: the sources of the report.
-        about: further lines of the title block, by name.
+        title_lines: further lines of the title block, by name.
         live: whether the report will be a page, which may show the machine in three dimensions.
 
     Raises:
@@ -246,14 +233,14 @@ def report_of(
     return Report(
         "Stiffness report" if result is None else "Design study report",
         analysis.machine.name if result is None else result.problem.study.name,
-        (*_title_block(answers), *about.items()),
+        (*_title_block(answers), *title_lines.items()),
         tuple(sections),
         {"machine.toml": origin.machine_file, "results.json": origin.results},
     )
 
 
 def moving_sections(analysis: Analysis) -> list[Section]:
-    """A section with the page that moves the machine; none where legs have no closed form, so that it has no page."""
+    """Write the section with the page that moves the machine; none where its legs have no closed form, and no page."""
     machine = analysis.machine
     if machine.family.chains is not None and not closes_inside(machine):
         return []
