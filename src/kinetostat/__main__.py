@@ -12,7 +12,7 @@ gc.set_threshold(100_000, *gc.get_threshold()[1:])
 # Libraries make half a million objects that stay as long as the process. Python would look through them for garbage
 # hundreds of times, which takes a sixth of their import.
 CODE = 130
-"""Exit code of a command that Ctrl-C has stopped."""
+"""Exit code of a command that Ctrl-C has stopped: 128 and the number of the signal, as shells have it."""
 
 
 def main() -> int:

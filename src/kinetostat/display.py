@@ -15,14 +15,15 @@ from kinetostat.units import UnitError, multiple_of_unit
 SI = "si"
 """Word of a file for results that are all shown in SI units."""
 DIGITS = (2, 12)
-"""The fewest and the most significant digits that may be asked for."""
+"""The fewest and the most significant digits that may be asked for: one hides which of two is larger, and beyond
+twelve lies round-off."""
 DASH = "–"
 """Stands where there is no number."""
 INFINITE = "∞"
 _VALUE = re.compile(r"([-+]?[\d.]+(?:e-?\d+)?) (\S+)")
 _HYPHEN_OF_NUMBER = re.compile(r"(?<![\w.,)-])-(?=[\d.∞])")
 MOST_DECIMALS = 6
-"""Decimals with which a number stands beside its uncertainty at most."""
+"""Decimals with which a number stands beside its uncertainty at most: a smaller uncertainty has a power of ten."""
 PLAIN_POWERS = (-3, 5)
 """Numbers are written without a power of ten from 0.001 to 999999."""
 UNIT_OF = {

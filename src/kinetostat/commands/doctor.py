@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SOUNDNESS_MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
 NAME_WIDTH = 14
-"""Characters for the name of what is checked."""
+"""Characters for the name of what is checked: those of the longest name, and a gap."""
 
 
 def add_doctor_command(commands: "Commands") -> None:

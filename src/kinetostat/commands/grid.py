@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from kinetostat.views.question import Question
 
 MOST_WORKERS = 1024
-"""Greatest number of processes that may be asked for."""
+"""Greatest number of processes that may be asked for: more than any machine has cores, so that more is a mistake."""
 
 
 def add_grid_commands(commands: "Commands") -> None:

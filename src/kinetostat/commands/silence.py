@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 PATIENCE = 0.3
-"""Seconds for which nothing may be printed without a word."""
+"""Seconds for which nothing may be printed without a word: below it nobody wonders whether the program works."""
 COURTESY = 0.1
 """Seconds that a progress bar has for its next picture where one computation has held up all threads."""
 CLEAR_LINE = "\r\x1b[K"

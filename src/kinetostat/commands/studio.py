@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 FIRST = "zhang-gosselin-4dof"
 """The machine that is shown where none is named."""
 PORT = 8000
+"""Port of the page where none is asked for: the usual one of web servers under development."""
 LOCAL = ("127.0.0.1", "localhost", "::1")
 EXTRA = "nicegui"
 """Packages that the studio needs besides kinetostat itself."""

@@ -37,7 +37,7 @@ else:
 NUMPY_SLAB = 4096
 """Points per NumPy call, so that intermediate arrays stay in the second level of the cache."""
 FUNCTIONS_KEPT = 64
-"""Number of functions kept in memory with their machines."""
+"""Number of functions kept in memory with their machines: more than a session asks about, some megabytes."""
 NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt takes effect soon."""
 

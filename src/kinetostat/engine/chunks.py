@@ -77,7 +77,8 @@ def in_this_process(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, E
 
 DASK_MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
 CHUNKS_AHEAD = 2
-"""Chunks handed out per thread of the cluster: one that is computed and one that waits."""
+"""Chunks handed out per thread of the cluster: one that is computed and one that waits, so that no thread stands
+idle."""
 GO_ON = "Results that are already in a folder are kept: the same command continues from there."
 CLUSTER_PATIENCE = "10 s"
 """Time in which a cluster must answer."""

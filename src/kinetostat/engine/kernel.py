@@ -28,7 +28,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.machine.written.family import at_home
 
 PROGRAMS_KEPT = 128
-"""Programs kept in memory, of some 20 kB each."""
+"""Programs kept in memory, of some 20 kB each: a few megabytes together."""
 
 Fill = Callable[[Mapping[str, Array], Array, Codes], None]
 """From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""

@@ -86,6 +86,7 @@ ALLOCATED = 2
 RELATIVE = (2, 4)
 """Types of relocations that say how far away something is, in 32 bits: R_X86_64_PC32 and R_X86_64_PLT32."""
 GLOBAL_FUNCTION = 0x12
+"""Binding and type of a symbol that is a function seen from outside, in one byte (ELF: STB_GLOBAL and STT_FUNC)."""
 
 
 def _image(file: bytes) -> tuple[bytes, int]:

@@ -30,13 +30,14 @@ VARIABLE = "KINETOSTAT_CACHE"
 """Variable of the environment with another folder for them, or "off"."""
 OFF = "off"
 MOST_BYTES = 64 << 20
-"""Of all files together; programs have some 10 to 300 kB."""
+"""Bytes of all files together; programs have some 10 to 300 kB, so that hundreds stay."""
 KEPT_SHARE = 0.75
-"""Share of these bytes that stay when there are more: the files that were used last."""
+"""Share of these bytes that stay when there are more, so that not each new program asks for room: the files used
+last."""
 DAY, HOUR = 86400.0, 3600.0
 SECRET, SECRET_SIZE, HASH_SIZE = "secret", 32, 32
 PRIVATE = 0o077
-"""Rights of others."""
+"""Rights of others, none of which a folder with programs may give."""
 
 
 def read_program(text: str) -> bytes | None:

@@ -57,16 +57,18 @@ from kinetostat.vibration.springwise import ModeCounts, SpringSizes
 FILE_NAME = re.compile(r"[\w.-]+$", re.ASCII)
 TEMPLATES = Path(__file__).with_name("c")
 PLACE = 12
-"""Numbers that place the tool: T and the columns of Q."""
+"""Numbers that place the tool: three of T and nine of the columns of Q."""
 STEPS_OF_COMMAND = 30
-"""Poses that are tried until the loaded tool is where it should be."""
+"""Poses that are tried until the loaded tool is where it should be; a handful are enough where it comes there at
+all."""
 NEARLY_COMMANDED, ASIDE = 1e-6, 1e-4
 """Correction, rad or in units of the machine's length, below which the rates of the loaded tool are computed if it only
 comes near its pose, and the displacement of the coordinates whose differences they are."""
 SWEEPS = 30
-"""Sweeps of Jacobi's rotations at most; ten are enough for hundreds of springs."""
+"""Sweeps of Jacobi's rotations at most: they converge quadratically, and ten are enough for hundreds of springs."""
 AGREED = 1e-10
-"""Share of the largest number of its kind by which C and Python may differ in the test."""
+"""Share of the largest number of its kind by which C and Python may differ in the test: orders of operations differ,
+not formulas."""
 
 
 def write(

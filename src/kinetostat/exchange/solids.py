@@ -31,7 +31,7 @@ FLOAT, SHORT, INTEGER = 5126, 5123, 5125
 POINTS, INDICES = 34962, 34963
 """Targets of buffer views."""
 ALIGNED = 4
-"""Bytes at whose multiples parts of the file begin."""
+"""Bytes at whose multiples parts of the file begin, as the format demands."""
 Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 """Quaternion that turns the base frame's z, which is up, to glTF's y."""
 

@@ -45,7 +45,7 @@ MIMIC_RATIO = -1.0
 """Turn of the second joint of a parallelogram while the first one turns by one."""
 TOOL = "tool"
 ROD_RADIUS = 0.02
-"""Radius of a link in the picture, as a share of the machine's characteristic length."""
+"""Radius of a link in the picture, as a share of the machine's characteristic length: that of a slender strut."""
 STROKE = 10.0
 """Limit of a slide from the pose, in machine lengths: URDF requires one and the machine file has none."""
 EFFORT, VELOCITY = 1e6, 1.0

@@ -8,7 +8,7 @@ from typing import TypeVar
 PRINTABLE = r"^[^\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]*$"
 """Names: no control characters, which would reach terminals, and none that reverse the text after them."""
 LONGEST_WORD = 300
-"""Characters without a space in a message: more than paths usually have."""
+"""Characters without a space in a message: more than paths usually have, and less than would fill a terminal."""
 _LONG = re.compile(rf"\S{{{LONGEST_WORD},}}")
 M = TypeVar("M")
 SHOWN, WORDED = 5, 100

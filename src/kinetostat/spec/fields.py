@@ -229,7 +229,7 @@ def leaves(name: str, quantity: Quantity) -> Iterator[str]:
 
 
 MOST_VALUES = 1_000_000
-"""Values along one axis."""
+"""Values along one axis: a mistyped count is refused before memory runs out."""
 
 RANGE_FORM = 'write FIELD=from:to:count or FIELD=from:to:count:log, e.g. pose.x="-2 cm:2 cm:41"'
 

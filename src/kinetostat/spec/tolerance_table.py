@@ -96,18 +96,18 @@ def _range_of(size: float, ends: Sequence[float], name: str) -> int:
 TABLE = "tolerances"
 MOST_LINES = 200
 MOST_VALUES = 3
-"""Values of a line: one for each kind of number."""
+"""Values of a line: one for each kind of number, length, angle and ratio."""
 LINE_WIDTH = 120
 """Characters of a name or a value."""
 SIGMAS = 3.0
-"""Standard deviations that a plus-minus stands for, where a number is normally distributed."""
+"""Standard deviations that a plus-minus stands for, where a number is normally distributed: 99.7 % lie within three."""
 UNIFORM, NORMAL = "uniform", "normal"
 LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "share": 0.5}
 """The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
 COSTS = (1e-6, 1e6)
-"""The least and the greatest cost of a line, in units of those of other lines."""
+"""The least and the greatest cost of a line, in units of those of other lines: any that mean something."""
 LARGEST_SIZE = 1e3
-"""The largest nominal size that may be written with a class, m."""
+"""The largest nominal size that may be written with a class, m: the tables of the standards end far below."""
 LINE_KEYS = ("tolerance", "cost")
 TOLERANCE_FORM = (
     'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '

@@ -32,17 +32,17 @@ templates in the browser, which is an evaluation."""
 PACE = "kinetostat pace"
 """Key of a connection's `Pace` in its scope."""
 MESSAGE = 0.002
-"""Seconds that a message of a tab counts at least."""
+"""Seconds that a message of a tab counts at least: what the server needs to take any message."""
 SENDING = 0.2
-"""Seconds that a file sent by a tab counts."""
+"""Seconds that a file sent by a tab counts: it is written to the disk and read by a process."""
 MOST_TABS = 1000
-"""Tabs of which it is remembered how much they have sent."""
+"""Tabs of which it is remembered how much they have sent: some kilobytes, and more than one server has."""
 TAB = re.compile(r"/_nicegui/client/([^/]+)/")
 """The address to which a tab sends files."""
 SHARE = 0.5
-"""Share of the server's time that the messages of one tab may take in the long run."""
+"""Share of the server's time that the messages of one tab may take in the long run: half is left to all others."""
 CREDIT = 2.0
-"""Seconds that they may take at once."""
+"""Seconds that they may take at once, so that a drag of the slider is never refused."""
 
 
 class OwnOrigin:

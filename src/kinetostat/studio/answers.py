@@ -42,10 +42,11 @@ from kinetostat.views.scene.overlays import loaded_overlays, overlays_of, swing_
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
 
 MAP_POINTS = 41
-"""Points of a map along each coordinate."""
+"""Points of a map along each coordinate: the eye sees no more in a small map, and they take milliseconds."""
 SLOW_POINTS = 11
-"""The same of a quantity that is solved for pose by pose."""
+"""The same of a quantity that is solved for pose by pose: a map then takes about a second."""
 CURVE_POINTS = 61
+"""Points of a curve: it looks smooth on a page."""
 SINGULARITY = "singularity_margin"
 
 

@@ -19,23 +19,23 @@ from kinetostat.units import KINDS
 
 PANELS = ("Pose", "Geometry", "Stiffness", "Mass", "Load")
 STEPS = 1000
-"""Positions of a slider."""
+"""Positions of a slider: more than it has pixels."""
 LENGTH_SHARE = 0.75
 """Range of a length about its value, in units of the machine's length in the pose, of the value itself elsewhere."""
 TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0), "load": math.pi}
 """Range of an angle about its value, rad."""
 STIFFNESS_FACTOR = 1e3
-"""Factor by which a stiffness varies about its value, up and down."""
+"""Factor by which a stiffness varies about its value, up and down: from a rubber to a rigid part."""
 USUAL_STIFFNESS = 1e6
-"""Middle of the range of a stiffness that is rigid or free, SI."""
+"""Middle of the range of a stiffness that is rigid or free, SI: between soft bearings and stiff links."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
 OF_MASSES = (*VIBRATION_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
 """Beginnings of the fields in the panel Mass, which also has all fields whose kind is an amount of matter."""
 LARGEST_MASS = 1000.0
-"""Upper end of the range of a mass that is zero, in kg per square of the machine's length."""
+"""Upper end of the range of a mass that is zero, in kg per square of the machine's length: 10 kg for one of 10 cm."""
 SLENDERNESS = 10.0
-"""Lengths of the machine over which such a mass would be spread as that of links."""
+"""Lengths of the machine over which such a mass would be spread as that of links: those of six legs and some more."""
 LARGEST = {
     "drives.rotor_inertia": 1e-4,
     "drives.lead": 0.02,
@@ -52,7 +52,7 @@ LARGEST = {
 PRODUCTS = ("xy", "xz", "yz")
 """Entries of an inertia that may be negative."""
 ROOM = 3.0
-"""Upper end of the range of such a number that is not zero, in units of itself."""
+"""Upper end of the range of such a number that is not zero, in units of itself: what it is lies well within."""
 OF_LOADED_STATES = (
     "load.gravity",
     "load.gravity_angle",
@@ -63,7 +63,8 @@ OF_LOADED_STATES = (
 )
 """Fields that change nothing unless the machine is shown under its loads: they are offered only then."""
 LEAST_SHARE = 0.02
-"""Lower end of a number that must be positive, as a share of the upper end."""
+"""Lower end of a number that must be positive, as a share of the upper end: the slider comes near zero and stays
+above."""
 
 
 @dataclass(frozen=True)
@@ -240,8 +241,9 @@ def _usual(parameter: Parameter, length: float) -> float | None:
 AUTO = "auto"
 """Word that leaves the choice of the factor to the page."""
 DECADES = (-3, 9)
-"""Powers of ten between which the factor lies."""
+"""Powers of ten between which the factor lies: shapes smaller than they are, and picometres as centimetres."""
 ROUND = (1.0, 2.0, 5.0)
+"""Factors within a power of ten: about equal steps to the eye."""
 FACTOR_STEPS = len(ROUND) * (DECADES[1] - DECADES[0])
 """Positions of the slider: 1, 2 and 5 times every power of ten."""
 

@@ -22,7 +22,7 @@ MODULES = {"kinetostat-studio": str(COMPONENTS), "kinetostat-scene": str(RENDERE
 MAIN_BUTTON = "unelevated no-caps text-color=accent-ink dense"
 """Style of the button that does what its part of the page is for."""
 THROTTLE = 0.03
-"""Seconds between two positions that a browser sends during a drag; the last one is always sent."""
+"""Seconds between two positions that a browser sends during a drag, about two pictures; the last one is always sent."""
 
 
 class Labelled(Element):

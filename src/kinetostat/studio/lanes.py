@@ -21,7 +21,7 @@ WORKERS = 4
 SHARE = 2
 """Threads that one page may use at a time, so that a page with a slow machine leaves some to the others."""
 PATIENCE = 0.3
-"""Seconds for which a computation may take without a word."""
+"""Seconds for which a computation may take without a word: below it a word would only flicker."""
 
 log = logging.getLogger("kinetostat")
 

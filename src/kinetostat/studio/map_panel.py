@@ -29,9 +29,9 @@ UNITS_OF_LENGTH = ("m", "mm")
 LOADED_PREFIX = "loaded_"
 """Beginning of the names of quantities of the machine under its loads."""
 MARGIN_POINTS = 2
-"""Points of the map that are kept about the part of a range that can be reached."""
+"""Points of the map that are kept about the part of a range that can be reached, so that its edge is seen."""
 MOSTLY_REACHED = 0.8
-"""Share of a range from which on it is left as it is."""
+"""Share of a range from which on it is left as it is: there is nothing to gain by cutting it."""
 RANGE_HINT = 'range of the {} axis, such as "-5 to 8 cm"; empty for where the machine can be'
 
 

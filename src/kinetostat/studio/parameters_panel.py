@@ -18,7 +18,7 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import shown_value
 
 OPEN = 12
-"""Controls of a group up to which it is open from the start."""
+"""Controls of a group up to which it is open from the start: longer ones would push all others off the screen."""
 AT_ONCE = ("load", "tool")
 """Groups that come first and are open however many controls there are: what moves a loaded machine."""
 

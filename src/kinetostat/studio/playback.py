@@ -20,9 +20,9 @@ from kinetostat.studio.elements import icon_button, refuse, upload_field
 from kinetostat.studio.session import Session
 
 BETWEEN = 24
-"""Poses from one kept pose to the next."""
+"""Poses from one kept pose to the next: two seconds of motion."""
 PERIOD = 0.08
-"""Seconds between two poses of a path, if the computer keeps up."""
+"""Seconds between two poses of a path, if the computer keeps up: each is a whole analysis."""
 EMPTY = "No path yet: open a CSV file of poses (as `kinetostat path` reads it), or keep two poses or more."
 
 Poses: TypeAlias = dict[str, Array]

@@ -62,7 +62,7 @@ def make_modest(process: int) -> None:
 
 READING_PROGRAM = "kinetostat.studio.processes"
 SECONDS_TO_READ = 10
-"""Processor time of the process; a usual machine takes one second, nearly all of it to start."""
+"""Processor time of the process, s; a usual machine takes one second, nearly all of it to start."""
 PATIENCE = 60.0
 """Time, s, after which the process is stopped, on a server with much other work as well."""
 MEMORY_TO_READ = 2 << 30

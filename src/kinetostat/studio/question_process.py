@@ -28,9 +28,9 @@ from kinetostat.views.report.content import as_table, typeset
 
 ASKING_PROGRAM = "kinetostat.studio.question_process"
 SECONDS_TO_ANSWER = 3600
-"""Processor time of a question."""
+"""Processor time of a question, s: an hour, after which nobody waits in front of a page."""
 MEMORY_TO_ANSWER = 4 << 30
-"""Address space of the process, bytes."""
+"""Address space of the process, bytes: that of a large map with room to spare; a hostile one ends there."""
 SHOWN = "shown.html"
 """The answer as the page shows it."""
 ANSWER = "answer"

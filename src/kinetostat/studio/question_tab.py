@@ -42,9 +42,9 @@ NOTHING_ASKED = "Choose a question and ask it; its answer is about the machine a
 CHANGED = "The machine has been changed since; ask again for its new answer."
 STOPPED = "The question was stopped."
 MOST_FILES = 8
-"""Files that an option takes at most."""
+"""Files that an option takes at most: designs to compare, of which no more fit side by side."""
 LARGEST_ANSWER = 24 << 20
-"""Bytes of an answer that the page shows; a larger one is only downloaded."""
+"""Bytes of an answer that the page shows; a larger one would stop the browser, and is only downloaded."""
 NAMES_OF_FORMS = {"json": "JSON", "csv": "CSV", "nc": "NetCDF"}
 EVERY_ROW = "full"
 """Name of the switch for tables with every row, which is not an option of a question."""

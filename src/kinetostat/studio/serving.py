@@ -36,7 +36,8 @@ MEMORY, ADDRESSES = "machine", "addresses"
 REMEMBERED = 60
 """Addresses that are remembered: the browser shows them with a delay, in which there may be as many."""
 PATIENCE = 30.0
-"""Seconds within which a page that has been loaded must open its socket."""
+"""Seconds within which a page that has been loaded must open its socket: a slow phone does; an idle download would
+keep memory."""
 MARK = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#0b5ea8"/>'
     '<path d="M7 25h18M10 25l3-14h6l3 14M11 9h10" stroke="#fff" stroke-width="2.4" fill="none" stroke-linecap="round"/>'

@@ -30,7 +30,7 @@ from kinetostat.units import UnitError
 TEXT = "text"
 """Word in the place of a path while the text of the machine is being typed."""
 REMEMBERED = 200
-"""Steps that can be undone."""
+"""Steps that can be undone: more than anybody goes back, at some kilobytes each."""
 
 
 @dataclass(frozen=True)

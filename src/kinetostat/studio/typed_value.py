@@ -9,7 +9,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.units import KINDS, UNIT, UnitError, parse
 
 LONGEST = 64
-"""Characters that are read as arithmetic."""
+"""Characters that are read as arithmetic: longer texts are no number that anybody types."""
 _TOKEN = re.compile(
     rf"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<unit>{UNIT.pattern})|(?P<sign>[-+*/()]))"
 )

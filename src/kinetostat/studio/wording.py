@@ -14,7 +14,7 @@ from kinetostat.units import KINDS
 from kinetostat.views.page import breakable
 
 FIELD_DIGITS = 6
-"""Significant digits of a value in a field that may be typed over."""
+"""Significant digits of a value in a field that may be typed over: what was written in a file comes back as it was."""
 LEAST_FULL_BAR = 1e-3
 """Least logarithm of a gain that fills a whole bar, so that bars stay short if all gains are tiny."""
 

@@ -22,16 +22,17 @@ from kinetostat.validation.comparison import Answer, Trial, difference
 from kinetostat.validation.pieces import Piece, StrutPiece, array, columns, joint_of, pieces, section_axes
 
 TRIALS = 10
-"""Number of stiffnesses that are tried for rigid parts."""
+"""Number of stiffnesses that are tried for rigid parts: enough to see where more of it only adds round-off."""
 STIFFER = 100.0
 """The greatest of them, in units of the stiffest part; the least is that of the softest part. The compliance that rigid
 parts then have is taken away again by extrapolation, exactly so where no leg is redundant."""
 LARGEST_CONTRAST = 1e7
 """Largest ratio of stiffnesses in one machine; beyond it a redundant stiff part can stay hidden from every trial."""
 MOST_TRIALS_EXTRAPOLATED = 6
-"""Most trials that one extrapolation uses."""
+"""Most trials that one extrapolation uses: polynomials of higher degree amplify round-off."""
 STUB_LENGTH = 0.4
-"""Length of the member that represents a joint, as a share of the machine's."""
+"""Length of the member that represents a joint, as a share of the machine's: its own stiffness does not depend on
+it."""
 LOAD_NAMES = ("MX", "MY", "MZ", "FX", "FY", "FZ")
 DISPLACEMENT_NAMES = ("RX", "RY", "RZ", "DX", "DY", "DZ")
 

@@ -32,7 +32,7 @@ from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, 
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
 MOST_LISTED_PARTS = 12
-"""Single tolerances that are listed; all of them with --full, and in JSON."""
+"""Single tolerances that are listed, which fill a screen; all of them with --full, and in JSON."""
 PER_METRE = 1e-6
 """Ratios are read in µm/m."""
 

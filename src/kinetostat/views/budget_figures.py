@@ -16,9 +16,9 @@ from kinetostat.views.lettering import width_of
 from kinetostat.views.question import Drawing
 
 MOST_BARS = 15
-"""Single tolerances that have bars, at most."""
+"""Single tolerances that have bars, at most: as many as a page has lines beside the other panels."""
 LEAST_LABEL_WIDTH = 4.0
-"""Inches for the labels of bars, at least."""
+"""Least room for the labels of bars, inches: most paths fit."""
 BAR_HEIGHT = 0.8
 """Height of all bars of a row together, as a share of the distance between rows."""
 

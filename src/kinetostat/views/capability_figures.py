@@ -18,9 +18,10 @@ from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 BEYOND = 3.0
-"""Half the width of a panel in units of the greatest or least amount, where a set has no end."""
+"""Half the width of a panel in units of the greatest or least amount, where a set has no end: one sees that it goes
+on."""
 ROOM = 1.12
-"""Width of a panel over that of what it shows."""
+"""Width of a panel over that of what it shows: a line at its edge would be taken for the frame."""
 MOVING, TURNING = ("force", "speed", "acceleration"), ("moment", "rate", "angular acceleration")
 """Sets of a figure each."""
 FIGURES = {"capability": MOVING, "capability_turning": TURNING}

@@ -23,9 +23,9 @@ from kinetostat.views.question import LAW_TOLERANCE, MESSAGE, NAME, Description,
 from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_LISTED_TERMS = 40
-"""Terms of a law that are printed; a longer one is in JSON."""
+"""Terms of a law that are printed, which fill a screen; a longer one is in JSON."""
 COEFFICIENT_DIGITS = 7
-"""Significant digits of coefficients, which are typed into a controller."""
+"""Significant digits of coefficients, which are typed into a controller: a metre to 0.1 µm."""
 UNNAMED_TABLES = ("pose.", "load.")
 """Tables of a file whose fields are understood without the name of the table."""
 RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")

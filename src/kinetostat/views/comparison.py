@@ -14,11 +14,11 @@ from kinetostat.views.question import Description, Field, Lines
 from kinetostat.views.tables import FittedTable, numeric_table, readable, text_table
 
 MOST_SHARES = 3
-"""Parts that are named for a direction."""
+"""Parts that are named for a direction: a cell of a table has room for them."""
 LEAST_SHARE = 0.005
 """Share below which a part is not named: it would read 0 %."""
 SAME_PERCENT = 0.05
-"""Percent of difference up to which two values are shown as equal."""
+"""Percent of difference up to which two values are shown as equal: with one decimal the change reads 0.0 %."""
 
 
 def letters_of(comparison: Comparison) -> str:

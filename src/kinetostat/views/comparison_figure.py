@@ -18,12 +18,14 @@ from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 WIDE = 30.0
-"""An axis is logarithmic if the largest bar exceeds the least by more than this factor."""
+"""Ratio of the largest bar to the least beyond which an axis is logarithmic: the least one could not be seen
+otherwise."""
 LONGEST_DESIGN_NAME = 100
-"""Greatest number of characters of a design's name in the legend."""
+"""Greatest number of characters of a design's name in the legend, which is as wide as the figure."""
 
 
 PANELS_IN_A_ROW = 4
+"""Panels beside each other at most: more would not fit across a page."""
 
 
 def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}") -> Figure:

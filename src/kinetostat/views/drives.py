@@ -25,9 +25,9 @@ from kinetostat.views.tables import FittedTable, numeric_table
 PER_MINUTE = 30.0 / np.pi
 """Turns per minute of 1 rad/s."""
 MOST_MODES = 6
-"""Excited modes that are named."""
+"""Excited modes that are named: the lowest ones move the tool most."""
 MOST_LEGEND = 8
-"""Drives that a legend names."""
+"""Drives that a legend names: a longer one would be taller than the figure."""
 MARKS = "\N{MULTIPLICATION SIGN} peak\n\N{BLACK CIRCLE} RMS"
 """Meaning of the marks in a speed-torque diagram."""
 

@@ -55,9 +55,11 @@ FORMATS: dict[str, Any] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDa
 PNG_LEVEL = 3
 """Level of compression; a higher one takes twice the time and saves a tenth of the size."""
 METRES_PER_INCH = 0.0254
+"""Metres of an inch: PNG states its resolution in pixels per metre."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
+"""Dashes of curves, which tell them apart without colours."""
 NOTE_CHARACTERS_PER_INCH, TITLE_CHARACTERS_PER_INCH = 19, 12
 """Characters of the notes below a figure and of its title that fit into an inch, at 6.5 and 10 points."""
 PAGE_MARGIN = 0.04

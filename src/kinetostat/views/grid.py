@@ -41,9 +41,10 @@ else:  # it needs states of rest, which most maps do not
     carrying_study = LateModule("kinetostat.studies.carrying")
 
 MOST_ROWS_OF_A_SWEEP = 60
-"""Rows of a sweep that are printed one by one; of longer ones and of maps, the extremes."""
+"""Rows of a sweep that are printed one by one, on two screens; of longer ones and of maps, the extremes."""
 MOST_NAMED_SETS = 11
-"""Sets of legs that have a row and a colour each; all rarer ones share one more."""
+"""Sets of legs that have a row and a colour each; all rarer ones share one more, since twelve colours can be told
+apart."""
 USUAL_OF_A_SWEEP, USUAL_OF_A_MAP = "stiffness", "compliance"
 """Quantities that are computed where nobody names one."""
 ONE_OF_A_SWEEP = "sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`."

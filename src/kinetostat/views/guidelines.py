@@ -38,11 +38,11 @@ TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "d
 DIGITS_OF_K = 6
 """Digits of the coefficients of K, which are compared with those of papers."""
 BOLD_SHARE = 0.5
-"""Share from which an element is printed in bold."""
+"""Share from which an element is printed in bold: it alone contributes more than all others."""
 MOST_PARAMETERS = 16
-"""Parameters that have a line unless all are wanted."""
+"""Parameters that have a line unless all are wanted: the strongest, which fill half of a screen."""
 MOST_NAMED_PATHS = 8
-"""Paths of parameters that a sentence names; it counts the others."""
+"""Paths of parameters that a sentence names, on two lines; it counts the others."""
 NO_NUMBER, NO_EFFECT = "–", "·"
 """Signs in tables: for a rigid or free direction, and for an effect too small to count."""
 

@@ -33,7 +33,7 @@ from kinetostat.views.tables import FittedTable, numeric_table, text_table
 RATIO, SHARE = Scale(1e6, "ppm"), Scale(1e2, "%")
 """Units in which gains and errors of compliances are read."""
 MOST_LISTED_OUTLIERS = MOST_LISTED_POSES = 40
-"""Greatest number of rows of the table of outliers, and of that of poses to measure next."""
+"""Greatest number of rows of the table of outliers, and of that of poses to measure next: those of a screen."""
 NOT_EXPLAINED = 1.5
 """Residuals over their standard deviations from which something else must be said to move the tool."""
 NOT_SEEN = "not seen"

@@ -29,17 +29,17 @@ from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
 
 MOST_ROWS = 30
-"""Parameters that a table of coloured cells shows."""
+"""Parameters that a table of coloured cells shows: those that fit on a page."""
 LEAST_NAME_WIDTH = 2.1
-"""Inches for the names of parameters, at least."""
+"""Least room for the names of parameters, inches: most paths fit."""
 LEAST_SCALE = 0.1
 """Percent per percent at the end of the colour scale, at least: influences that are all small stay pale."""
 LETTERS_PER_INCH = 12
-"""Characters of the label of a colour bar, per inch of its height."""
+"""Characters of the label of a colour bar per inch of its height, at the size of labels in all figures."""
 BAR_SHARE = 0.75
-"""Height of a colour bar as a share of the figure's, about."""
+"""Height of a colour bar as a share of the figure's, about: titles and notes take the rest."""
 DARK_SHARE = 0.6
-"""Share of the colour scale beyond which text on it is white."""
+"""Share of the colour scale beyond which text on it is white: black could no longer be read."""
 
 
 def sensitivity_figure(sensitivity: Sensitivity, title: str = "{}") -> Figure:
@@ -102,11 +102,11 @@ def _draw_cells(panel: Axes, cells: Array, colours: str, label: str) -> None:
 
 
 MOST_PANELS = 6
-"""Number of elements whose curves are shown, a panel each."""
+"""Number of elements whose curves are shown, a panel each: two rows of three fit on a page."""
 CURVE_POINTS = 161
-"""Number of points along each curve."""
+"""Number of points along each curve: it looks smooth over several powers of ten."""
 DECADES = 1.0
-"""Powers of ten by which curves go beyond the limits of rigidity and the present stiffness."""
+"""Powers of ten by which curves go beyond the limits of rigidity and the present stiffness: one sees them level out."""
 
 
 def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:

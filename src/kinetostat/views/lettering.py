@@ -28,8 +28,9 @@ WIDE_FONTS = (
 MATHEMATICS = re.compile(r"\$[^$]*\$")
 """Text that Matplotlib takes as mathematics."""
 POINTS_PER_INCH = 72
+"""Points of an inch, as printers and Matplotlib count."""
 TICK_LABEL_SIZE = 7.5
-"""Size of the labels beside an axis, points."""
+"""Size of the labels beside an axis, points: that of the style of all figures."""
 NUMBER_COMMAND = r"\mathdefault"
 """The command that Matplotlib writes around numbers on an axis, such as powers of ten."""
 

@@ -15,7 +15,7 @@ from kinetostat.views.question import Lines
 from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_LISTED_SPRINGS = 12
-"""Springs that have a row each."""
+"""Springs that have a row each: a machine with more has many alike, which are told by kind."""
 NOTHING_LOADS = "[load] has no force, no moment and no preload, and no mass under gravity"
 SIGNS = (
     "A load is positive where it pulls: of an actuator, cable or link, where it pulls its ends together. Of a bearing "

@@ -17,9 +17,9 @@ from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import tool_of
 
 SHOWN = 12
-"""Speeds with a row of the table, at equal distances."""
+"""Speeds with a row of the table, at equal distances: enough to see the pockets; all are in the files."""
 HEADROOM = 8.0
-"""Height of the picture in multiples of the least width."""
+"""Height of the picture in multiples of the least width: pockets between lobes have no end."""
 
 
 def _speed_text(turns: float) -> str:

@@ -18,7 +18,7 @@ from kinetostat.views.measured import SOURCE_WORDS
 from kinetostat.views.question import Drawing
 
 MOST_PATHS = 60
-"""Greatest number of unknowns whose paths fit beside a matrix."""
+"""Greatest number of unknowns whose paths fit beside a matrix without meeting each other."""
 PATH_SIZE = 6.0
 """Size of the letters of these paths, points."""
 LEAST_PATH_WIDTH = 1.4

@@ -23,7 +23,7 @@ from kinetostat.views.page import Markup, table
 from kinetostat.views.picture import machine_picture
 
 LINE_LENGTH = 200
-"""Greatest number of characters in a line: a notebook scrolls."""
+"""Greatest number of characters in a line: a notebook scrolls, and no table is folded."""
 PICTURE_PIXELS = (640, 480)
 """Pixels of a picture, which is shown at half this size to be sharp."""
 PIXELS_PER_INCH = 110

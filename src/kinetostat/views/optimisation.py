@@ -77,7 +77,7 @@ def _unit(unit: str, display: Display) -> str:
 
 
 MOST_ROWS = 25
-"""Designs of a front that are printed; result.json has all."""
+"""Designs of a front that are printed, on one screen; result.json has all."""
 LEAST_PERCENT = 1e-4
 """Percent per percent below which a 0 is printed."""
 LEAST_STIFFNESS_LEFT = 0.01

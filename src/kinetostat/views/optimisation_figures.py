@@ -17,6 +17,7 @@ from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import Drawing
 
 BINS = 40
+"""Bars of a histogram: about ten designs each for the usual number of designs."""
 CAPTIONS = {
     "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
     "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",

@@ -35,7 +35,7 @@ from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
 Theme: TypeAlias = Literal["light", "dark"]
 
 SAMPLES_PER_SIDE = 2
-"""Samples of a pixel across and down: their mean has smooth edges."""
+"""Samples of a pixel across and down: their mean has smooth edges, and more of them take longer than they show."""
 SMALLEST, LARGEST = 16, 4096
 """Smallest and largest side of a picture, pixels."""
 HIDDEN_BY_DEFAULT = ("frames", "labels")

@@ -22,11 +22,11 @@ from kinetostat.views.question import (
 from kinetostat.views.tables import FittedTable, numeric_table, words_on_omitted
 
 MOST_INFLUENCES = 40
-"""Parameters that have a line unless all are wanted."""
+"""Parameters that have a line unless all are wanted: the strongest, which fill a screen."""
 DIGITS_OF_PARAMETERS = 6
-"""Digits of the value of a parameter."""
+"""Digits of the value of a parameter: it can be found again in the file."""
 NEGLIGIBLE = 0.0005
-"""Percent per percent below which a 0 is shown."""
+"""Percent per percent below which a 0 is shown: with three decimals it would read 0.000."""
 
 
 def influence_table(answer: Sensitivity, count: int) -> FittedTable:

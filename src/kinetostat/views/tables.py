@@ -138,9 +138,9 @@ def _widths(columns: Sequence[_ColumnWidths], gap: int, width: int) -> list[int]
 
 
 DIGITS_OF_INPUT = 10
-"""Digits of what people have written themselves."""
+"""Digits of what people have written themselves: they find it again as it was."""
 PIPED = 100
-"""Width of texts, in characters, where there is no terminal."""
+"""Width of texts, in characters, where there is no terminal: that of a wide one, in which most tables fit."""
 UNBOUND = 10_000
 """Width that no table reaches, to measure what a table needs."""
 
@@ -299,7 +299,7 @@ def print_requirements(console: Console, verdicts: "Sequence[Verdict]", display:
 
 
 HEADS = 11
-"""Least width of the words that stand before the sentences, in columns of the terminal."""
+"""Least width of the words that stand before the sentences, in columns of the terminal: sentences then begin alike."""
 GAP = 2
 """Width of the gap between these words and the sentences, in columns of the terminal."""
 

@@ -14,7 +14,7 @@ from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field,
 from kinetostat.views.tables import FittedTable, numeric_table
 
 BAR_HEIGHT = 0.28
-"""Height of the figure for each cable, inches."""
+"""Height of the figure for each cable, inches: its name fits beside its bar."""
 FARTHEST_BOUND = 3.0
 """Bound, in multiples of the greatest tension, from which it is not drawn, so that bars are not too short."""
 

@@ -15,7 +15,7 @@ from kinetostat.views.question import NAME, Axis, Description, Field, Lines, Rec
 from kinetostat.views.tables import numeric_table
 
 COMPARED_DIGITS = 9
-"""Digits in which a machine is compared with an independent engine."""
+"""Digits in which a machine is compared with an independent engine: differences of 1e-9 are to be seen."""
 REBUILT = (
     "The machine was rebuilt in the engine from its geometry, cross-sections and springs alone; no Jacobian of "
     "kinetostat is used there."

@@ -20,9 +20,9 @@ AXES: Mapping[str, Sequence[float]] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0
 LEAST_SHARE = 0.005
 """Share of the energy of every mode below which a part has no line of its own."""
 MOST_PARTS = 12
-"""Parts that have a line; where more springs deform, their kinds have one."""
+"""Parts that have a line; where more springs deform, their kinds have one, so that the table stays on a screen."""
 LEAST_PERCENT = 0.0005
-"""Share that is shown as nothing."""
+"""Share that is shown as nothing: it would read 0.0 %."""
 
 
 def masses_of(answer: Vibration) -> str:

@@ -26,11 +26,11 @@ from kinetostat.studio.wording import shown_value
 from kinetostat.units import UNIT, UnitError
 
 AROUND = 0.2
-"""Bounds of a new variable, as a share of its present value."""
+"""Bounds of a new variable, as a share of its present value: a change that a designer would consider."""
 FORM = "the study"
 """Name of a draft in messages, where a file would have its path."""
 MOST_OBJECTIVES = 4
-"""Objectives that the form offers; a file may have more."""
+"""Objectives that the form offers, as many as a front can be looked at with; a file may have more."""
 _NUMBER_AND_UNIT = re.compile(rf"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*{UNIT.pattern}\s*")
 SEARCH = OptimizerTable()
 """The search that is offered first."""

@@ -34,7 +34,7 @@ NOTHING = "No search has been started yet. Choose variables and objectives of th
 DAMAGED = 'Search {} cannot be shown, because its folder "{}" is damaged: {}. The other searches are not affected.'
 NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
 INTERVAL = 0.5
-"""Seconds between two looks at a search."""
+"""Seconds between two looks at a search: it seems to move, and reading takes milliseconds."""
 NO_COLOUR = -1
 """The choice of no objective for the colour of a front."""
 AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}

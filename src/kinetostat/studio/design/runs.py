@@ -25,7 +25,7 @@ from kinetostat.studio.processes import make_modest
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""
 MOST_RUNS = 60
-"""Searches that are kept."""
+"""Searches that are kept: more than anybody reads in a list."""
 WORKER = "kinetostat.studio.design.worker"
 RESULT = "result.json"
 

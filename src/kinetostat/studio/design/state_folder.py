@@ -17,7 +17,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import write_text
 
 MOST = 100
-"""Machines that are kept."""
+"""Machines that are kept: more than anybody reads in a list."""
 LONGEST_FAVOURITE_NAME, LONGEST_FAVOURITE_NOTE = 80, 400
 RUNS, FAVOURITES = "runs", "favourites"
 """Folders of searches and of machines that are kept, in the state folder."""

@@ -24,11 +24,11 @@ from kinetostat.views.drives import DRIVES
 
 FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
 FRAMES = 100
-"""Steps of a motion that is played."""
+"""Steps of a motion that is played: a movement to the eye, and each is a whole analysis."""
 PERIOD = 0.12
-"""Seconds between two of them, if the computer keeps up."""
+"""Seconds between two of them, if the computer keeps up: the longest at which steps still look like a motion."""
 SHOWN = 300
-"""Points of a curve."""
+"""Points of a curve: about as many as it has pixels across."""
 NO_MOTION = (
     "No motion yet: open a CSV file of one (poses with times, poses with a feed rate, or sines), or name it in a "
     'requirement of the file, { fits = "MOTOR", motion = "motion.csv" }.'

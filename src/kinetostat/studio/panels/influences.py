@@ -37,7 +37,7 @@ LEAST_SHARE = 5e-4
 FIRST_RANKED = "free_stiffness_{}"
 """Quantity that is ranked until another is chosen; the braces are for the last component of the machine."""
 MOST_PARAMETERS = 24
-"""Greatest number of parameters that are listed."""
+"""Greatest number of parameters that are listed: those of one screen."""
 CURVE_SPAN = 1e3
 """Ratio of the ends of a curve to the present stiffness: it runs from the stiffness over this to it times this."""
 BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance", "r"),

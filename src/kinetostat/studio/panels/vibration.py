@@ -43,7 +43,7 @@ COUPLED = 1e-9
 LARGEST_MASS = 1e300
 """In the place of an infinite modal mass, kg: a browser has no infinity."""
 DIGITS = 5
-"""Significant digits of a point of a curve."""
+"""Significant digits of a point of a curve: finer than a pixel, and half of the bytes of a float."""
 
 
 class VibrationPanel(Panel):

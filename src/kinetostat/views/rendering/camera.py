@@ -21,9 +21,9 @@ VIEWPOINTS = {
 }
 """Direction from the machine to the camera, base axes."""
 FIELD_OF_VIEW = math.radians(32.0)
-"""Angle of view across the picture's shorter side."""
+"""Angle of view across the picture's shorter side: that of a moderate telephoto lens, which bends no parallels."""
 EMPTY_MARGIN = 0.07
-"""Share of the picture that stays empty on each side."""
+"""Share of the picture that stays empty on each side, so that nothing touches its edge."""
 FITTING_STEPS = 12
 """Number of times the camera is moved until the machine fills the picture."""
 
@@ -97,7 +97,7 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
 LIKE_NORMALS = 0.97
 """Cosine between normals above which samples of one pixel on one solid share their shading."""
 CHUNK_PIXELS = 1_000_000
-"""Pixels that are worked on together: it limits the memory that a large picture takes."""
+"""Pixels that are worked on together: some hundred megabytes at a time, however large the picture is."""
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 """The two corners of a triangle that lie opposite each corner."""
 

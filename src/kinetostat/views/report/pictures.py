@@ -30,14 +30,14 @@ from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, sol
 PICTURE_SIZE = (800, 560)
 """Pixels of a picture of the machine: 150 to an inch on A4; they take a quarter of the time of a report."""
 PICTURE_WIDTH = 0.6
-"""Width of that picture as a share of the width of the text."""
+"""Width of that picture as a share of the width of the text: its caption and the text around it stay on the page."""
 FULL_WIDTH = 7.4
 """Width of a drawing that takes the whole width of the text, inches: its letters then have the size of captions."""
 LOADED_LAYERS = ("load", "deflection")
 """Layers of a loaded machine."""
 SCRIPT = Path(__file__).with_name("live.js")
 SWINGING_MODES = 6
-"""Modes whose shapes swing on a page."""
+"""Modes whose shapes swing on a page: the lowest ones, since each adds its solids to the file."""
 NO_RENDERER = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
 """Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 

@@ -17,9 +17,9 @@ from kinetostat.tolerances import NO_CIRCLE
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
 
 REVOLVED_SIDES = 40
-"""Sides of a solid of revolution."""
+"""Sides of a solid of revolution: it looks round on a screen."""
 WIRE_SIDES = 12
-"""Sides of a wire."""
+"""Sides of a wire, which is thinner: they are not seen."""
 CHAMFER_STEPS = 3
 """Steps of a chamfer, which make it look round."""
 SMOOTH_EDGE = 0.8

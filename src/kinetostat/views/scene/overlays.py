@@ -27,7 +27,7 @@ from kinetostat.views.scene.machine_scene import plates, tool_solids
 from kinetostat.views.scene.solids import Solid, Swept, Turned, solid_data, unit, upright
 
 LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
-"""Longest semi-axis of an ellipsoid as a share of the machine's diagonal."""
+"""Longest semi-axis of an ellipsoid as a share of the machine's diagonal: it stands out and hides no leg."""
 THINNEST = 0.012
 """Least semi-axis in units of the longest: an ellipsoid that is flat or thin can still be seen."""
 
@@ -138,11 +138,12 @@ def _bent_arrow(
 
 
 SHOWN_DEFLECTION = 0.09
-"""Greatest displacement of an exaggerated shape as a share of the machine's diagonal."""
+"""Greatest displacement of an exaggerated shape as a share of the machine's diagonal: seen, and still the same
+machine."""
 GHOST_WIDTH = 0.7
-"""Radius of a deflected link, in radii of its leg."""
+"""Radius of a deflected link, in radii of its leg: the leg and the link can both be seen where they cross."""
 GHOST_POINTS = 12
-"""Points along a deflected link."""
+"""Points along a deflected link: enough for a beam that bends both ways."""
 
 
 def overlays_of(

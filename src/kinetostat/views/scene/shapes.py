@@ -9,11 +9,11 @@ from functools import lru_cache
 from kinetostat.views.scene.solids import Extruded, Point2, Swept, Turned
 
 HALF_CIRCLE_POINTS = 24
-"""Points of a half circle."""
+"""Points of a half circle: it looks round on a screen."""
 COIL_TURN_POINTS = 18
-"""Points of a turn of a coil."""
+"""Points of a turn of a coil, which is small: it looks round."""
 CORNER_POINTS = 8
-"""Points of a rounded corner."""
+"""Points of a rounded corner, a quarter of a circle: it looks round."""
 
 shared = lru_cache(512)
 """Decorator: a shape that does not change while a machine moves is one object, whose mesh is made once."""
