@@ -10,25 +10,19 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, where
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array
 from kinetostat.engine.trace import ORDINARY_SIZE, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints, closing_equations, within_reach
+from kinetostat.kinematics.closing import Joints, closing_equations
 from kinetostat.kinematics.closure import CLOSED_FORMS
-from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
-from kinetostat.kinetostatics.assembly import compliance_shares
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_masses, needs_motion, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.late import LateModule
-from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
-from kinetostat.machine.leg import Leg
-from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Machine, springs
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.motion.response import response_in_motion
 from kinetostat.spec.errors import InputError
@@ -165,6 +159,11 @@ def traced_machine(kind: Specimen, form: Form) -> TracedMachine:
 
 Weights: TypeAlias = tuple[tuple[str, float], ...]
 """A weighted sum of quantities: their names and weights."""
+
+
+def each_alone(names: Iterable[str]) -> list[Weights]:
+    """Return quantities as objectives, each by itself with the weight 1."""
+    return [((name, 1.0),) for name in names]
 
 
 @dataclass(frozen=True)
@@ -345,94 +344,6 @@ def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False, chord
     stepped, square = equations.start() if first else step([*coordinates])
     results = [result_of(value) for value in (*stepped, square)]
     return formula_of(given, columns, results, 0.0, coordinates=coordinates)
-
-
-@dataclass(frozen=True)
-class TracedPlacement:
-    """Places of the actuators, the tool and the legs of a traced machine.
-
-    Attributes:
-        formula: whose results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
-            and the `drawn_points` of the legs (m), in the base frame; its code is the `Status` by reach alone.
-        actuators: with traced coordinates.
-    """
-
-    formula: TracedFormula
-    actuators: tuple[Actuator, ...]
-
-
-def drawn_points(leg: Leg) -> list[Vector]:
-    """Return the points of a leg that a drawing joins (base frame, m): joints, links, springs, then ends of bars."""
-    path = [point for element in leg.chain for point in element.path]
-    path += [spring.joint.point for spring in leg.springs if spring.joint.point is not None]
-    pairs = [element.bars for element in leg.chain if isinstance(element, Parallelogram)]
-    return path + [end for bars in pairs for bar in bars for end in bar]
-
-
-def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool) -> TracedPlacement:
-    """Trace the places of actuators, tool and legs of a machine.
-
-    Args:
-        kind: of a machine whose joints have closed forms.
-        form: how its parameters enter; numbers of joints in the drawing are constant.
-        paths: leaf paths of the parameters to differentiate by.
-        closed: whether joints are computed inside the program, as legs written leg by leg need it.
-    """
-    given = traced_machine(kind, form)
-    joints = CLOSED_FORMS.over_scalars(given.machine.chains()) if closed else None
-    configuration = given.machine.configure(joints.coordinates if joints else ())
-    status: Scalar = joints.status if joints else int(Status.OK)
-    if joints:
-        at_home = joint_actuators(kind.machine.chains(), leg_names(kind.machine))
-        actuators = [actuator.at(joints.coordinates) for actuator in at_home]
-    else:
-        actuators = actuators_of(configuration)
-        status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
-    platform = configuration.platform
-    tool = platform.apply(Vector(*given.machine.tables["tool"].offset))
-    points = [point for leg in configuration.legs for point in drawn_points(leg)]
-    vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *points]
-    wanted = [actuator.coordinate for actuator in actuators] + [c for vector in vectors for c in vector.components()]
-    accepted = status < Status.OK + 0.5
-    results = [result_of(where(accepted, value, math.nan)) for value in wanted]
-    formula = formula_of(given, (), results, result_of(status), paths)
-    return TracedPlacement(formula, tuple(actuators))
-
-
-@dataclass(frozen=True)
-class TracedShares:
-    """The compliance that parts of a machine contribute.
-
-    Attributes:
-        formula: whose results are what each part contributes to each diagonal entry of C, [part x 6] row by row, SI;
-            NaN where the status is not OK.
-        parts: names of the parts, those of springs that are not rigid.
-    """
-
-    formula: TracedFormula
-    parts: tuple[str, ...]
-
-
-def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
-    """Trace what the parts of a machine contribute to its compliance.
-
-    Args:
-        kind: of a machine.
-        form: how its parameters enter.
-        closed: as for `objectives_of`.
-    """
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    response = respond(given.machine, joints)
-    accepted = response.status < Status.OK + 0.5
-    parts: dict[str, list[Scalar]] = {}
-    for spring, share in zip(springs(response.configuration), compliance_shares(response.statics), strict=True):
-        diagonal = [share.entry(i, i) for i in range(6)]
-        if not all(is_zero(entry) for entry in diagonal):
-            before = parts.get(str(spring.of))
-            parts[str(spring.of)] = [a + b for a, b in zip(before, diagonal, strict=True)] if before else diagonal
-    results = [result_of(where(accepted, value, math.nan)) for row in parts.values() for value in row]
-    return TracedShares(formula_of(given, columns, results, result_of(response.status), ()), tuple(parts))
 
 
 def new_inputs(graph: Graph, count: int) -> tuple[Traced, ...]:

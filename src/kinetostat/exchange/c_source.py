@@ -19,7 +19,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.form import objectives_of, plan_for, step_of
+from kinetostat.engine.form import each_alone, objectives_of, plan_for, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
@@ -144,7 +144,7 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     """Print the formulas that the functions of a machine need."""
     kind, form, closed = functions.specimen, functions.form, functions.closed
     # Limits of loads need a state of rest, which only functions of what is under load are given.
-    entries = objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed, limited=False)
+    entries = objectives_of(kind, form, each_alone(ENTRIES), closed=closed, limited=False)
     yield _program(functions, "entries_at", entries.body)
     placement, count = functions.placement, len(functions.actuators)
     body, inputs = placement.formula.body, placement.formula.inputs
@@ -154,22 +154,21 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     if functions.rests:
         for name, first in (("first_steps_at", True), ("step_at", False)):
             yield _program(functions, name, step_of(kind, form, closed, first).body)
-        displacements = objectives_of(kind, form, [((name, 1.0),) for name in DISPLACEMENTS], closed=closed)
+        displacements = objectives_of(kind, form, each_alone(DISPLACEMENTS), closed=closed)
         yield _program(functions, "displacement_at", displacements.body)
         places = Body(body.fixed, body.columns, body.results[count : count + PLACE], body.code)
         sloped = with_gradients(places, inputs).results
         yield _program(functions, "placement_at", Body(body.fixed, body.columns, [*driven.results, *sloped], body.code))
     if functions.quantities:
-        wanted = [((name, 1.0),) for name in functions.quantities]
         plan = plan_for(functions.machine, functions.quantities, functions.inputs)
         counts = functions.mode_counts
         if counts and counts.free:
             yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
         if counts and counts.at_rest:
             yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
-        limited = functions.needs_state
+        objectives, limited = each_alone(functions.quantities), functions.needs_state
         traced = partial(
-            objectives_of, kind, form, wanted, closed=closed, limited=limited, plan=plan, mode_counts=counts
+            objectives_of, kind, form, objectives, closed=closed, limited=limited, plan=plan, mode_counts=counts
         )
         yield _program(functions, "quantities_at", traced().body)
         formula = traced(functions.inputs)

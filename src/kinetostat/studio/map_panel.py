@@ -129,10 +129,10 @@ class MapPanel:
     def _narrow(self, request: MapRequest, values: Array) -> bool:
         """Narrow the ranges of axes to where a first map has values, with a margin; return whether any has changed."""
         points = math.isqrt(values.size)
-        known = np.isfinite(values).reshape(points, points)
-        if not known.any():
+        reached = np.isfinite(values).reshape(points, points)
+        if not reached.any():
             return False
-        for ends, inside in ((request.across, known.any(axis=1)), (request.up, known.any(axis=0))):
+        for ends, inside in ((request.across, reached.any(axis=1)), (request.up, reached.any(axis=0))):
             places = np.flatnonzero(inside)
             first, last = max(places[0] - MARGIN_POINTS, 0), min(places[-1] + MARGIN_POINTS, points - 1)
             if last - first <= MOSTLY_REACHED * (points - 1) and ends.path not in self._chosen_ranges:
@@ -146,21 +146,29 @@ class MapPanel:
         return control, self._session.machine.display.scale(kind.unit)
 
     def _deliver(self, request: MapRequest, maps: dict[str, Array] | str) -> None:
+        """Show the map that was computed, or the reason why there is none, and how long it took."""
         quantity = str(self.quantity.value)
         refused = isinstance(maps, str) and request.quantity == quantity
         if (request.across, request.up) != self._ends() or not (refused or quantity in maps):
             return  # other axes have been chosen meanwhile, and their map is being computed
-        (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
         values = np.full(4, np.nan) if isinstance(maps, str) else maps[quantity]
         if self._is_first_map and not isinstance(maps, str):
             self._is_first_map = False
             if self._narrow(request, values):
                 self.refresh(request.since)
                 return
+        self._show_map(request, values, quantity)
+        took = time.perf_counter() - request.since
+        words = f"{1e3 * took:.0f} ms" if took < 1.0 else f"{took:.1f} s"
         points = math.isqrt(values.size)
-        known = values[np.isfinite(values)]
-        ends = np.array(usual_range(known) if known.size else (0.0, 0.0))
-        scale = self._session.machine.display.fitting(QUANTITIES[quantity].unit, known)
+        self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {words}")
+
+    def _show_map(self, request: MapRequest, values: Array, quantity: str) -> None:
+        """Show values of a quantity over the axes of a request, in the units of the machine's file."""
+        (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
+        points, finite_values = math.isqrt(values.size), values[np.isfinite(values)]
+        ends = np.array(usual_range(finite_values) if finite_values.size else (0.0, 0.0))
+        scale = self._session.machine.display.fitting(QUANTITIES[quantity].unit, finite_values)
         self.view.run_method(
             "show",
             {
@@ -175,9 +183,6 @@ class MapPanel:
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
-        took = time.perf_counter() - request.since
-        words = f"{1e3 * took:.0f} ms" if took < 1.0 else f"{took:.1f} s"
-        self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {words}")
 
     def _range_field(self, side: str) -> ui.input:
         field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE_HINT.format(side))
@@ -214,15 +219,15 @@ class MapPanel:
         if not text:
             return None
         control, scale = self._scale(path)
-        what = f"the range of {full_label(control.parameter)}"
+        subject = f"the range of {full_label(control.parameter)}"
         first, to, last = text.partition(" to ")
         if not to:
-            raise InputError(f'{what} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
+            raise InputError(f'{subject} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
         high = read_typed(control.parameter, last, scale.unit)
         unit = last.strip().lstrip("+-.0123456789eE \u2212").strip() or scale.unit
         low = read_typed(control.parameter, first, unit)
         if not low < high:
-            raise InputError(f"{what} is {shorten(text)}; its first end must be the lower one.")
+            raise InputError(f"{subject} is {shorten(text)}; its first end must be the lower one.")
         return low, high
 
     def _choose(self) -> None:
@@ -237,8 +242,9 @@ class MapPanel:
     def _pick(self, event: GenericEventArguments) -> None:
         (across, x), (up, y) = self._scale(str(self.across.value)), self._scale(str(self.up.value))
         try:
-            where = {across.path: float(event.args["x"]) / x.factor, up.path: float(event.args["y"]) / y.factor}
-            self._session.move(where)
+            self._session.move(
+                {across.path: float(event.args["x"]) / x.factor, up.path: float(event.args["y"]) / y.factor}
+            )
         except InputError as error:
             refuse(str(error))
             return

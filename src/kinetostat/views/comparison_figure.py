@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.display import Display
 from kinetostat.machine.machine import frame_of
 from kinetostat.studies.comparison import Comparison
@@ -26,6 +27,8 @@ LONGEST_DESIGN_NAME = 100
 
 PANELS_IN_A_ROW = 4
 """Panels beside each other at most: more would not fit across a page."""
+GROUP_WIDTH = 0.8
+"""Width of the bars of all designs together, in distances of groups: groups stay apart."""
 
 
 def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}") -> Figure:
@@ -46,9 +49,8 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
         for row, (line, widths) in enumerate(zip(lines, sizes, strict=True)):
             cells = rows[row].subgridspec(1, len(line), width_ratios=widths)
             for column, (name, bars) in enumerate(line):
-                _bars(
-                    figure.add_subplot(cells[column]), name, bars, len(comparison.designs), comparison.machine.display
-                )
+                panel = figure.add_subplot(cells[column])
+                _draw_bars(panel, name, bars, len(comparison.designs), comparison.machine.display)
         styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
         handles = [
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
@@ -107,15 +109,15 @@ def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
     ]
 
 
-def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> None:
+def _draw_bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> None:
+    """Draw a group of bars for each row, a bar for each of so many designs, in the unit that fits all of them."""
     unit = bars[0][1].unit
     heights = np.array([_numbers(bar) for _, bar, _ in bars])
     dots = np.array([_numbers(dot) if dot else [math.nan] * count for _, _, dot in bars])
     scale = display.fitting(unit, [*heights.flat, *dots.flat])
     heights, dots = heights * scale.factor, dots * scale.factor
-    width = 0.8 / count
-    positive = heights[np.isfinite(heights) & (heights > 0.0)]
-    logarithmic = bool(positive.size) and positive.max() > WIDE * positive.min()
+    logarithmic = _spans_decades(heights)
+    width = GROUP_WIDTH / count
     for i in range(count):
         places = np.arange(len(bars)) + (i - (count - 1) / 2) * width
         if logarithmic:
@@ -137,6 +139,12 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     panel.set_axisbelow(True)
     panel.tick_params(axis="x", length=0)
     panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)" if "margin" in title else title)
+
+
+def _spans_decades(heights: Array) -> bool:
+    """Return whether heights differ so much that the least could not be seen beside the greatest."""
+    positive = heights[np.isfinite(heights) & (heights > 0.0)]
+    return bool(positive.size) and bool(positive.max() > WIDE * positive.min())
 
 
 def _say_missing(panel: Axes, place: float, row: DesignRow, i: int) -> None:

@@ -17,6 +17,7 @@ from kinetostat.motion.forces import PARTS
 from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
 from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.requirements import motor_requirements
+from kinetostat.units import load_unit, motion_unit
 from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, new_figure, note_setting
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
@@ -42,47 +43,41 @@ def _lines(answer: DriveLoads) -> Lines:
     yield "Drives", answer.message
     if answer.worst is None:
         return
-    show, (point, name) = answer.machine.display.show, answer.worst
+    point, name = answer.worst
     if answer.motion.timeless:
-        rates, gains = (
+        speed, acceleration = (
             _direction(part, point) for part in (answer.motion.path.rates, answer.motion.path.accelerations)
         )
-        yield "Worst way", f"{name} does most at the speed {rates} m/s with the acceleration {gains} m/s²."
+        yield "Worst way", f"{name} does most at the speed {speed} m/s with the acceleration {acceleration} m/s²."
         return
     if names := ", ".join(answer.motion.loads):
         yield "Loads", f"The motion says {names}, in the place of what the file has there."
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
-    given, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
-    whole = number(max(given + back, 0.0))
+    taken, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
+    whole = number(max(taken + back, 0.0))
     yield "Energy", f"All motors together give {whole} J, and take back {number(back)} J while they brake."
     if answer.greatest_deflection is not None:
-        size, where = answer.greatest_deflection
-        shown = answer.machine.display.show_deflection(size, "m")
-        moment = f"{answer.motion.times[where]:.4g} s"
-        yield (
-            "Deflection",
-            f"The tool deflects by up to {shown}, at {moment}, as it would at rest under the same forces.",
-        )
+        size, place = answer.greatest_deflection
+        shown, moment = answer.machine.display.show_deflection(size, "m"), f"{answer.motion.times[place]:.4g} s"
+        text = f"The tool deflects by up to {shown}, at {moment}, as it would at rest under the same forces."
+        yield "Deflection", text
     if answer.along_modes is not None:
         yield "Vibration", _modes_text(answer, answer.along_modes)
     if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
-        example = show(0.01, "m")
-        yield (
-            "Motors",
-            f'The file gives no lead, so that motors are taken for linear ones; write lead = "{example}" in [drives].',
-        )
+        lead = f'lead = "{answer.machine.display.show(0.01, "m")}"'
+        yield "Motors", f"The file gives no lead, so that motors are taken for linear ones; write {lead} in [drives]."
 
 
 def _modes_text(answer: DriveLoads, along: ModesAlong) -> str:
-    """Whether springs follow the motion as at rest, or which modes it excites, and how far the tool deflects then."""
+    """Say whether springs follow the motion as at rest, or which modes it excites and how far the tool deflects."""
     if not along.modes or answer.greatest_with_modes is None:
         return (
             f"The motion excites no mode, of which the lowest has {number(along.frequency)} Hz with motors that "
             "stand still: springs follow it as at rest."
         )
     show = answer.machine.display.show_deflection
-    known = list(dict.fromkeys(number(frequency) for frequency in along.modes))
-    listed = ", ".join(known[:MOST_MODES]) + (", ..." if len(known) > MOST_MODES else "")
+    frequencies = list(dict.fromkeys(number(frequency) for frequency in along.modes))
+    listed = ", ".join(frequencies[:MOST_MODES]) + (", ..." if len(frequencies) > MOST_MODES else "")
     size, moment = answer.greatest_with_modes
     text = f"The motion excites modes at {listed} Hz: with them the tool deflects by up to {show(size, 'm')}, at "
     text += f"{moment:.4g} s"
@@ -102,22 +97,33 @@ def _pose(answer: DriveLoads, point: int) -> str:
 
 
 def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
-    if not answer.drives:
-        return
+    if answer.drives:
+        yield _drive_table(answer)
+        yield _motor_table(answer)
+        yield _parts_table(answer)
+        if full:
+            yield _joint_table(answer)
+
+
+def _drive_table(answer: DriveLoads) -> FittedTable:
+    """Return the range of each drive, and its greatest speed, acceleration and force."""
     display = answer.machine.display
     heads = ["from", "to", "speed", "acceleration", "force", "RMS"]
     table = numeric_table("Drives: greatest values", "drive", heads)
     for drive in answer.drives:
-        length = "m" if drive.slides else "rad"
+        length = motion_unit(not drive.slides)
         scale = display.scale(length)
-        places = [display.show(end, length) for end in drive.coordinate]
+        ends = [display.show(end, length) for end in drive.coordinate]
         rates = [
             f"{number(v * scale.factor)} {scale.unit}/s{s}" for v, s in ((drive.speed, ""), (drive.acceleration, "²"))
         ]
-        table.add_row(
-            drive.name, *places, *rates, *(display.show(f, drive.unit) for f in (drive.force, drive.rms_force))
-        )
-    yield table
+        forces = [display.show(force, drive.unit) for force in (drive.force, drive.rms_force)]
+        table.add_row(drive.name, *ends, *rates, *forces)
+    return table
+
+
+def _motor_table(answer: DriveLoads) -> FittedTable:
+    """Return what each motor must give, and the inertia that it feels."""
     table = numeric_table("Motors", "motor", ["speed", "torque", "RMS", "power", "energy", "load inertia", "ratio"])
     for drive in answer.drives:
         inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
@@ -125,18 +131,25 @@ def _tables(answer: DriveLoads, full: bool) -> Iterator[FittedTable]:
         torques = (_show(answer, torque, drive.motor_unit) for torque in (drive.motor_torque, drive.rms_torque))
         work = (f"{number(drive.power[0])} W", DASH if np.isnan(drive.energy[0]) else f"{number(drive.energy[0])} J")
         table.add_row(drive.name, _motor_speed(drive), *torques, *work, inertia, ratio)
-    yield table
+    return table
+
+
+def _parts_table(answer: DriveLoads) -> FittedTable:
+    """Return the greatest size of each part of the force of each drive, of parts that there are."""
     shown = [part for part in PARTS if any(drive.parts[part] > 0.0 for drive in answer.drives)]
     table = numeric_table("Force of the drives: greatest size of each part", "drive", shown)
     for drive in answer.drives:
-        table.add_row(drive.name, *(display.show(drive.parts[part], drive.unit) for part in shown))
-    yield table
-    if full:
-        table = numeric_table("Joints: greatest loads", "joint", ["force", "moment"])
-        for joint in answer.joints:
-            moment = DASH if joint.moment is None else display.show(joint.moment, "N·m")
-            table.add_row(joint.name, display.show(joint.force, "N"), moment)
-        yield table
+        table.add_row(drive.name, *(answer.machine.display.show(drive.parts[part], drive.unit) for part in shown))
+    return table
+
+
+def _joint_table(answer: DriveLoads) -> FittedTable:
+    """Return the greatest loads of each joint."""
+    table, display = numeric_table("Joints: greatest loads", "joint", ["force", "moment"]), answer.machine.display
+    for joint in answer.joints:
+        moment = DASH if joint.moment is None else display.show(joint.moment, "N·m")
+        table.add_row(joint.name, display.show(joint.force, "N"), moment)
+    return table
 
 
 def _show(answer: DriveLoads, value: float, unit: str) -> str:
@@ -150,13 +163,13 @@ def _motor_speed(drive: DriveLoad) -> str:
 def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the motion") -> Figure:
     """Draw speed, force and power of all drives over time."""
     curves, display = _curves(answer), answer.machine.display
-    groups = [(what, [d.slides is s for d in answer.drives]) for what, s in (("m", True), ("rad", False))]
     rows: list[tuple[Array, str, list[bool]]] = []
-    for length, chosen in groups:
+    for turning, kind in ((False, "force"), (True, "torque")):
+        chosen = [drive.slides is not turning for drive in answer.drives]
         if any(chosen):
-            scale, force = display.scale(length), display.scale("N" if length == "m" else "N·m")
+            scale, force = display.scale(motion_unit(turning)), display.scale(load_unit(turning))
             rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
-            rows.append((curves.force * force.factor, force.label("force" if length == "m" else "torque"), chosen))
+            rows.append((curves.force * force.factor, force.label(kind), chosen))
     rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
     with new_figure((6.6, 0.9 + 1.7 * len(rows)), title.format(answer.machine.name)) as figure:
         panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
@@ -196,7 +209,7 @@ def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
         rotary: whether motors that turn are drawn, in turns per minute, or those that are linear drives themselves.
     """
     curves, times = _curves(answer), answer.motion.times
-    scale = answer.machine.display.scale("N·m" if rotary else "N")
+    scale = answer.machine.display.scale(load_unit(rotary))
     factor = PER_MINUTE if rotary else 1.0
     timeless = times[-1] == times[0]
     width, opacity = (1.2, 1.0) if timeless else (0.7, 0.6)
@@ -235,15 +248,9 @@ def name_drives(figure: Figure, answer: DriveLoads, meaning: str = "") -> None:
     named = {name: handle for handles, names in pairs for handle, name in zip(handles, names, strict=True)}
     if len(answer.drives) <= MOST_LEGEND:
         figure.legend(
-            named.values(),
-            named.keys(),
-            loc="outside right upper",
-            frameon=False,
-            fontsize="small",
-            title=meaning,
-            title_fontsize="small",
-            alignment="left",
-        )
+            named.values(), named.keys(), loc="outside right upper", frameon=False, fontsize="small",
+            title=meaning, title_fontsize="small", alignment="left",
+        )  # fmt: skip
 
 
 def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> Figure:
@@ -298,7 +305,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
     columns |= answer.motion.path.pose
     columns |= {f"{name} [{load['units']}]": load["values"] for name, load in answer.motion.loads.items()}
     for k, drive in enumerate(answer.drives):
-        length = "m" if drive.slides else "rad"
+        length = motion_unit(not drive.slides)
         rows_of = (
             ("coordinate", length, curves.coordinate),
             ("speed", f"{length}/s", curves.speed),
@@ -423,27 +430,21 @@ DRIVES_QUESTION = Question(
     answer=drives_with_verdicts,
     options=(
         Option(
-            "motion",
-            "file",
+            "motion", "file",
             "a CSV file of a motion: poses with times, poses with a feed rate, or sines (docs/drives.md); forces "
             "may be columns, such as force.x [N]; default: the motion of the file's requirements",
-            metavar="MOTION",
-            first=True,
+            "MOTION", first=True,
         ),
         Option(
-            "speed",
-            "quantity",
-            'without a motion: speed of the platform point in the worst direction, e.g. "0.5 m/s"',
-            metavar="SPEED",
+            "speed", "quantity", 'without a motion: speed of the platform point in the worst direction, e.g. "0.5 m/s"',
+            "SPEED",
         ),
         Option(
-            "acceleration",
-            "quantity",
-            'without a motion: acceleration in the worst direction, e.g. "5 m/s**2"',
-            metavar="ACCELERATION",
+            "acceleration", "quantity", 'without a motion: acceleration in the worst direction, e.g. "5 m/s**2"',
+            "ACCELERATION",
         ),
         Option("points", "count", "number of points of the motion, about (default: 400)", default=400),
     ),
     output="drives.json, drives.csv, drives.nc, curves.csv and the figures",
     full="show the loads of all joints as well",
-)
+)  # fmt: skip

@@ -24,7 +24,7 @@ from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import UNIT_OF_PERCENTS, Sensitivity
 from kinetostat.views.figures import COLOURS, DASHES, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
-from kinetostat.views.map_scales import usual_range
+from kinetostat.views.map_scales import exceeded_ends, usual_range
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import NEGLIGIBLE
 
@@ -94,9 +94,7 @@ def _draw_cells(panel: Axes, cells: Array, colours: str, label: str) -> None:
             colour = "white" if dark else "black"
             cell = panel.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
             cell.set_in_layout(False)  # it lies inside of the panel, so that the layout need not measure it
-    ends = [(cells < -most).any(), (cells > most).any()]
-    extend = ("neither", "min", "max", "both")[int(ends[0]) + 2 * int(ends[1])]
-    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=extend)
+    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=exceeded_ends(cells, -most, most))
     slim_bar(bar)
     bar.set_label(label)
 

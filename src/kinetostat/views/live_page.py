@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.engine.form import drawn_points, objectives_of, step_of
+from kinetostat.engine.form import each_alone, objectives_of, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
@@ -28,6 +28,7 @@ from kinetostat.engine.machine_functions import (
     SHORTEST_SHARE,
     STEPS_FORWARD,
     MachineFunctions,
+    drawn_points,
     functions_of,
     sample_points,
 )
@@ -47,7 +48,7 @@ from kinetostat.tolerances import CLOSED
 from kinetostat.units import KINDS
 from kinetostat.vibration.springwise import ModeCounts
 from kinetostat.views.page import whole_page
-from kinetostat.views.scene.anatomy import anatomy, proportions_of
+from kinetostat.views.scene.anatomy import Anatomy, Proportions, anatomy, proportions_of
 from kinetostat.views.scene.leg_solids import rail_ends
 from kinetostat.views.scene.machine_scene import has_open_frame, plates
 
@@ -67,7 +68,8 @@ INDICES = (
 FORMAT, VIEWER = 1, "viewer.html"
 """Version of what an address holds, and the page that the documentation has for it."""
 LONGEST_ADDRESS = 8000
-"""Characters of a machine as part of an address; what it can do without is left out until it fits."""
+"""Characters of a machine as part of an address: all browsers and most mail programs take so many. What it can do
+without is left out until it fits."""
 SPARE = (("shares", "parts"), ("slopes", "forward"), ("", "file"))
 """Programs that an address can do without, first the first, and the data that go with them."""
 
@@ -172,69 +174,57 @@ def _page(name: str, content: object) -> str:
 
 
 def _bodies(functions: MachineFunctions) -> dict[str, Body]:
-    """The programs of a page, by name."""
+    """Return the programs of a page, by name."""
     kind, form, closed = functions.specimen, functions.form, functions.closed
-    free = [name for name in functions.quantities if not QUANTITIES[name].loaded]
     placement = functions.placement.formula
-    driven = placement.body.results[: len(functions.actuators)]
     bodies = {
         # What is free of loads takes no state; limits of loads judge the program of the state of rest.
-        "answers": objectives_of(kind, form, [((name, 1.0),) for name in ENTRIES], closed=closed, limited=False).body,
+        "answers": objectives_of(kind, form, each_alone(ENTRIES), closed=closed, limited=False).body,
         "places": placement.body,
         "shares": functions.shares.formula.body,
     }
     counts = functions.mode_counts or ModeCounts()
-    if free:
-        wanted, known = [((name, 1.0),) for name in free], ModeCounts(free=counts.free) if counts.free else None
-        bodies["quantities"] = objectives_of(kind, form, wanted, closed=closed, limited=False, mode_counts=known).body
-        if known:
+    if free := [name for name in functions.quantities if not QUANTITIES[name].loaded]:
+        modes = ModeCounts(free=counts.free) if counts.free else None
+        formula = objectives_of(kind, form, each_alone(free), closed=closed, limited=False, mode_counts=modes)
+        bodies["quantities"] = formula.body
+        if modes:
             bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
     if functions.square:
+        driven = placement.body.results[: len(functions.actuators)]
         body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
         bodies["slopes"] = with_gradients(body, placement.inputs)
     if functions.rests:
         loaded = [name for name in functions.quantities if QUANTITIES[name].loaded]
-        wanted = [((name, 1.0),) for name in (*DISPLACEMENTS, *loaded)]
         bodies["first"] = step_of(kind, form, closed, True).body
         bodies["step"] = step_of(kind, form, closed).body
-        known = replace(counts, free=0) if counts.at_rest else None
-        bodies["loaded"] = objectives_of(kind, form, wanted, closed=closed, mode_counts=known).body
-        if known:
+        modes = replace(counts, free=0) if counts.at_rest else None
+        formula = objectives_of(kind, form, each_alone([*DISPLACEMENTS, *loaded]), closed=closed, mode_counts=modes)
+        bodies["loaded"] = formula.body
+        if modes:
             bodies["springsAtRest"] = spring_parts_of(kind, form, closed, at_rest=True).body
     return bodies
 
 
 def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
-    """The data of the page beside its programs."""
+    """Return the data of the page beside its programs."""
     machine = functions.machine
-    known = values(machine)
-    rows = []
-    for path, kind in functions.arguments:
-        home = float(known[path])
-        span = {"length": SPAN * functions.length, "angle": TURN}.get(kind, SHARE * abs(home) or 1.0)
-        label = path.removeprefix(POSE)
-        rows.append({"name": label, "si": KINDS[kind].unit, "home": home, "low": home - span, "high": home + span})
     columns = sample_points(functions)
     points = np.array(list(columns.values())).T
-    shown = [(name, QUANTITIES[name]) for name in functions.quantities]
-    quantities = [
-        {"name": name, "si": row.unit, "loaded": bool(row.loaded), "slow": functions.needs_modes(row)}
-        for name, row in shown
-    ]
     forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
-    rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY} if functions.rests else None
+    rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
     return {
         "name": machine.name,
-        "inputs": rows,
+        "inputs": _sliders(functions),
         "actuators": [{"name": a.name, "si": a.unit} for a in functions.actuators],
         "drawing": _drawing(machine),
         "parts": functions.shares.parts,
-        "quantities": quantities,
+        "quantities": [_quantity(functions, name) for name in functions.quantities],
         "planar": machine.family.planar,
         "components": machine.family.components,
         "length": functions.length,
         "forward": forward if functions.square else None,
-        "rest": rest,
+        "rest": rest if functions.rests else None,
         "springs": asdict(functions.mode_counts) | asdict(functions.springs) if functions.mode_counts else None,
         "samples": [_sample(functions, row.tolist()) for row in points],
         "file": as_toml(machine),
@@ -242,51 +232,82 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
     }
 
 
-def _drawing(machine: Machine) -> dict[str, Any]:
-    """The bodies of a machine by the points that they join, as the scene of the machine has them at its pose.
+def _sliders(functions: MachineFunctions) -> list[dict[str, Any]]:
+    """Return a slider for each argument of the functions: its name, unit, value in the file, and ends, SI."""
+    numbers = values(functions.machine)
+    rows = []
+    for path, kind in functions.arguments:
+        home = float(numbers[path])
+        span = {"length": SPAN * functions.length, "angle": TURN}.get(kind, SHARE * abs(home) or 1.0)
+        label = path.removeprefix(POSE)
+        rows.append({"name": label, "si": KINDS[kind].unit, "home": home, "low": home - span, "high": home + span})
+    return rows
 
-    Points count through the `drawn_points` of all legs. A link is its kind, whether its leg is driven, its length at
-    this pose (m), from which the cylinder of a telescope is drawn, and the points at its ends; of two bars, of both.
+
+def _quantity(functions: MachineFunctions, name: str) -> dict[str, Any]:
+    """Return what the page must know of a quantity: whether it needs a state of rest, and whether it takes long."""
+    row = QUANTITIES[name]
+    return {"name": name, "si": row.unit, "loaded": bool(row.loaded), "slow": functions.needs_modes(row)}
+
+
+def _drawing(machine: Machine) -> dict[str, Any]:
+    """Return the bodies of a machine by the points that they join, as the scene of the machine has them at its pose.
+
+    Points count through the `drawn_points` of all legs.
     """
     configuration = respond(machine).configuration
     sizes = proportions_of(machine, configuration)
+    parts = [anatomy(leg) for leg in configuration.legs]
     legs: list[dict[str, Any]] = []
     count = 0
-    for leg in configuration.legs:
-        points, parts, before = drawn_points(leg), anatomy(leg), count
+    for leg, body in zip(configuration.legs, parts, strict=True):
+        points = drawn_points(leg)
+        legs.append(_leg_drawing(body, points, count, sizes))
         count += len(points)
-
-        def number_of(point: Vector, points: list[Vector] = points, before: int = before) -> int:
-            return before + min(range(len(points)), key=lambda k: (points[k] - point).norm())
-
-        links = []
-        for link in parts.links:
-            sides = [ZERO] if link.side is None else [link.side, -link.side]
-            ends = [(number_of(link.start + side), number_of(link.end + side)) for side in sides]
-            links.append((link.kind, link.driven or parts.actuated, link.span.norm(), *ends))
-        rails = [
-            {"ends": [p.components() for p in rail_ends(r, sizes)], "at": number_of(r.point), "driven": r.driven}
-            for r in parts.rails
-        ]
-        legs.append(
-            {
-                "links": links,
-                "joints": sorted({number_of(joint.point) for joint in parts.joints}),
-                "rails": rails,
-                "stands": not parts.on_rail,
-                "foot": number_of(parts.foot),
-                "second": number_of(parts.second_point),
-                "head": number_of(parts.head),
-                "before": number_of(parts.last_but_one),
-            }
-        )
-    base, platform = plates(configuration, [anatomy(leg) for leg in configuration.legs], sizes.leg)
+    base, platform = plates(configuration, parts, sizes.leg)
     stands = base is not None and base.block is None and not has_open_frame(configuration)
     return {"radius": sizes.leg, "base": stands, "block": platform.block is not None, "points": count, "legs": legs}
 
 
+def _leg_drawing(parts: Anatomy, points: Sequence[Vector], first: int, sizes: Proportions) -> dict[str, Any]:
+    """Return the bodies of a leg by the numbers of the points that they join.
+
+    A link is its kind, whether its leg is driven, its length at this pose (m), from which the cylinder of a telescope
+    is drawn, and the points at its ends; of two bars, of both.
+
+    Args:
+        parts: of the leg.
+        points: that the page computes for the leg, base frame, m.
+        first: number of the first of them.
+        sizes: the proportions of the machine.
+    """
+
+    def number_of(point: Vector) -> int:
+        return first + min(range(len(points)), key=lambda k: (points[k] - point).norm())
+
+    links = []
+    for link in parts.links:
+        sides = [ZERO] if link.side is None else [link.side, -link.side]
+        ends = [(number_of(link.start + side), number_of(link.end + side)) for side in sides]
+        links.append((link.kind, link.driven or parts.actuated, link.span.norm(), *ends))
+    rails = [
+        {"ends": [p.components() for p in rail_ends(r, sizes)], "at": number_of(r.point), "driven": r.driven}
+        for r in parts.rails
+    ]
+    return {
+        "links": links,
+        "joints": sorted({number_of(joint.point) for joint in parts.joints}),
+        "rails": rails,
+        "stands": not parts.on_rail,
+        "foot": number_of(parts.foot),
+        "second": number_of(parts.second_point),
+        "head": number_of(parts.head),
+        "before": number_of(parts.last_but_one),
+    }
+
+
 def _sample(functions: MachineFunctions, point: list[float]) -> dict[str, object]:
-    """A point, and the entries of C and K there as Python computes them; words where JSON has no numbers."""
+    """Return a point, and the entries of C and K there as Python computes them; words where JSON has no numbers."""
     response = respond(with_values(functions.machine, dict(zip(functions.inputs, point, strict=True))))
     numbers = [float(QUANTITIES[name].value(response)) for name in ENTRIES]
     words = [n if math.isfinite(n) else None if math.isnan(n) else "inf" if n > 0.0 else "-inf" for n in numbers]

@@ -4,7 +4,7 @@ Nothing is drawn here. Next to a singularity compliance has no bound: levels fol
 """
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +17,8 @@ from kinetostat.views.lettering import width_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+ExceededEnds: TypeAlias = Literal["neither", "min", "max", "both"]
 
 USUAL_PERCENTILES = (2.0, 98.0)
 """Percentiles between which values are usual: one pose in twenty-five may lie next to a singularity."""
@@ -60,7 +62,7 @@ class Levels:
 
     bounds: Array
     logarithmic: bool
-    extend: Literal["neither", "min", "max", "both"]
+    extend: ExceededEnds
 
 
 def levels_of(values: Array) -> Levels:
@@ -79,11 +81,12 @@ def levels_of(values: Array) -> Levels:
     for end, extreme in ((0, finite.min()), (-1, finite.max())):
         if abs(bounds[end] - extreme) <= SAME_LEVEL * (bounds[-1] - bounds[0]):
             bounds[end] = extreme  # a level that misses an extreme by round-off would leave a hole there
-    return Levels(bounds, logarithmic, _ends(bounds, finite))
+    return Levels(bounds, logarithmic, exceeded_ends(finite, bounds[0], bounds[-1]))
 
 
-def _ends(bounds: Array, finite: Array) -> Literal["neither", "min", "max", "both"]:
-    below, above = bool(finite.min() < bounds[0]), bool(finite.max() > bounds[-1])
+def exceeded_ends(values: Array, low: float, high: float) -> ExceededEnds:
+    """Say at which ends of a colour bar values lie beyond it, in the words of Matplotlib; NaN lies nowhere."""
+    below, above = bool((values < low).any()), bool((values > high).any())
     return "both" if below and above else "min" if below else "max" if above else "neither"
 
 

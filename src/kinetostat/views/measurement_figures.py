@@ -3,15 +3,19 @@
 Nothing is computed here.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kinetostat.arrays import AnyArray, Array, Mask
 from kinetostat.machine.machine import setting_of
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
-from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
+from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
+from kinetostat.units import motion_unit
 from kinetostat.views.figures import COLOURS, new_figure, slim_bar
 from kinetostat.views.lettering import width_of
 from kinetostat.views.measured import SOURCE_WORDS
@@ -25,6 +29,10 @@ LEAST_PATH_WIDTH = 1.4
 """Least room for these paths, inches."""
 LEAST_HEIGHT = 0.3
 """Least height of a panel of places as a share of its width: places on a bed lie on a line, seen from the front."""
+ROOM_ABOVE_RESIDUALS, OUTLIER_PLACE = 1.3, 0.94
+"""Half the height of a panel over its greatest residual, and where an outlier beyond it stands, as a share of that."""
+LEAST_RESIDUAL = 1e-12
+"""Residual that a panel shows at least, in its unit: one whose values fit exactly still has a scale."""
 FIT_CAPTIONS = {
     "residuals": "What is left of every measured value, as drawn and as identified.",
     "correlations": "Correlations of the numbers: which ones were found together.",
@@ -33,39 +41,29 @@ FIT_CAPTIONS = {
 
 
 def identification_figures(answer: Identification) -> dict[str, Drawing]:
-    """Drawings of an identification, by name."""
+    """Return the drawings of an identification, by name."""
     draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
     return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in FIT_CAPTIONS.items()}
 
 
 def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
-    """Residuals of every measured value over the line of the file, as drawn and as identified.
+    """Draw residuals of every measured value over the line of the file, as drawn and as identified.
 
     Each component has a colour. Panels are as high as what was kept asks for; outliers beyond stand at the edge.
     """
-    fit, seen = answer.fit, answer.observed
-    names = np.array([name.removeprefix("deflection.") for name in seen.names])
-    turns = np.isin(names, (*ROTATION, *EULER))
-    parts = [(rows, unit) for rows, unit in ((~turns, "m"), (turns, "rad")) if rows.any()]
-    lines = np.array(seen.data.lines)[seen.pose]
+    fit, observed = answer.fit, answer.observed
+    turns = np.isin(_component_names(answer), (*ROTATION, *EULER))
+    parts = [(rows, turning) for rows, turning in ((~turns, False), (turns, True)) if rows.any()]
     beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
     with new_figure(
         (6.4, 2.3 * len(parts) + 0.7), title.format(answer.machine.name), "measured less computed", beyond
     ) as figure:
         panels = figure.subplots(len(parts), 2, squeeze=False, sharex=True)
-        for row, (rows, unit) in zip(panels, parts, strict=True):
-            scale = answer.machine.display.deflection(unit)
+        for row, (rows, turning) in zip(panels, parts, strict=True):
+            scale = answer.machine.display.deflection(motion_unit(turning))
             for panel, residuals, head in zip(row, (fit.before, fit.after), ("as drawn", "as identified"), strict=True):
-                off = residuals * seen.sigma * scale.factor
-                for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
-                    of_name = rows & fit.kept & (names == name)
-                    panel.plot(lines[of_name], off[of_name], ".", color=colour, ms=3, label=name)
-                edge = 1.3 * np.abs(off[rows & fit.kept]).max(initial=1e-12)
-                aside = rows & ~fit.kept
-                if aside.any():
-                    shown = np.clip(off[aside], -0.94 * edge, 0.94 * edge)
-                    panel.plot(lines[aside], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
-                panel.set(title=head, ylim=(-edge, edge))
+                _draw_residuals(panel, answer, rows, residuals * observed.sigma * scale.factor)
+                panel.set_title(head)
             row[0].set_ylabel(scale.label("residual"))
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.2)
         for panel in panels[-1]:
@@ -73,8 +71,28 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
     return figure
 
 
+def _component_names(answer: Identification) -> AnyArray:
+    """Return for each measured value the component that it is of."""
+    return np.array([name.removeprefix("deflection.") for name in answer.observed.names])
+
+
+def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: Array) -> None:
+    """Draw the residuals of some rows over their lines, a colour for each component; outliers are black crosses."""
+    names, kept = _component_names(answer), answer.fit.kept
+    lines = np.array(answer.observed.data.lines)[answer.observed.pose]
+    for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
+        of_name = rows & kept & (names == name)
+        panel.plot(lines[of_name], residuals[of_name], ".", color=colour, ms=3, label=name)
+    edge = ROOM_ABOVE_RESIDUALS * np.abs(residuals[rows & kept]).max(initial=LEAST_RESIDUAL)
+    aside = rows & ~kept
+    if aside.any():
+        shown = np.clip(residuals[aside], -OUTLIER_PLACE * edge, OUTLIER_PLACE * edge)
+        panel.plot(lines[aside], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
+    panel.set_ylim(-edge, edge)
+
+
 def correlation_figure(answer: Identification, title: str = "{}: numbers that were found together") -> Figure:
-    """The correlations of the unknowns; those that are not seen at all are left white."""
+    """Draw the correlations of the unknowns; those that are not seen at all are left white."""
     matrix = answer.fit.correlations.copy()
     hidden = ~np.isfinite(answer.fit.sure)
     matrix[hidden] = matrix[:, hidden] = np.nan
@@ -94,7 +112,7 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
 
 
 def pose_figure(answer: Identification, title: str = "{}: commanded places of the tool") -> Figure:
-    """The commanded tool points, from above and from the front, and the poses to be measured next."""
+    """Draw the commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
     tool = answer.observed.model.drawn.tool * scale.factor
     with new_figure((6.4, 3.6), title.format(answer.machine.name)) as figure:
@@ -118,10 +136,9 @@ MOST_BARS_OF_ENTRIES = 60
 
 def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and computed stiffness") -> Figure:
     """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
-    size = np.array([row.error / row.u_val for row in answer.rows])
-    order = np.sort(np.argsort(-np.abs(size), kind="stable")[:MOST_BARS_OF_ENTRIES])
+    differences = np.array([row.error / row.u_val for row in answer.rows])
+    order = np.sort(np.argsort(-np.abs(differences), kind="stable")[:MOST_BARS_OF_ENTRIES])
     rows = [answer.rows[n] for n in order]
-    places = np.arange(len(rows))
     with new_figure(
         (6.4, 1.9 + 0.2 * len(rows)),
         title.format(answer.machine.name),
@@ -129,28 +146,37 @@ def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and c
         "grey: explained by uncertainties",
     ) as figure:
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-        left.axvspan(-COVERAGE_FACTOR, COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
-        left.axvline(0.0, color="black", linewidth=0.6)
-        colours = [COLOURS[0] if row.explained else COLOURS[1] for row in rows]
-        left.barh(places, size[order], 0.6, color=colours)
-        left.set(xlabel="computed less measured (standard uncertainties)")
-        reach = 1.1 * max(np.abs(size).max(), 1.5 * COVERAGE_FACTOR)
-        left.set_xlim(-reach, reach)
-        names = [f"{row.entry.name} (line {row.entry.line})" for row in rows]
-        left.set_yticks(places, names)
-        left.set_ylim(len(rows) - 0.4, -0.6)
-        start = np.zeros(len(rows))
-        parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
-        shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
-        for share, colour, words in zip(shares.T, COLOURS[2:], SOURCE_WORDS.values(), strict=False):
-            right.barh(places, share, 0.6, start, color=colour, label=words)
-            start = start + share
-        right.set(xlabel="share of the variance (%)", xlim=(0, 100))
+        _draw_differences(left, rows, differences[order], float(np.abs(differences).max()))
+        _draw_variances(right, rows)
         for panel in (left, right):
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
         right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
     return figure
+
+
+def _draw_differences(panel: Axes, rows: Sequence[MeasuredRow], differences: Array, greatest: float) -> None:
+    """Draw a bar for each row with its difference in standard uncertainties, over the band that these explain."""
+    panel.axvspan(-COVERAGE_FACTOR, COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
+    panel.axvline(0.0, color="black", linewidth=0.6)
+    colours = [COLOURS[0] if row.explained else COLOURS[1] for row in rows]
+    panel.barh(np.arange(len(rows)), differences, 0.6, color=colours)
+    panel.set(xlabel="computed less measured (standard uncertainties)")
+    reach = 1.1 * max(greatest, 1.5 * COVERAGE_FACTOR)
+    panel.set_xlim(-reach, reach)
+    panel.set_yticks(np.arange(len(rows)), [f"{row.entry.name} (line {row.entry.line})" for row in rows])
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+
+
+def _draw_variances(panel: Axes, rows: Sequence[MeasuredRow]) -> None:
+    """Draw the shares of computation, numbers and measurement in the variance of each row, one behind the other."""
+    start = np.zeros(len(rows))
+    parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
+    shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
+    for share, colour, words in zip(shares.T, COLOURS[2:], SOURCE_WORDS.values(), strict=False):
+        panel.barh(np.arange(len(rows)), share, 0.6, start, color=colour, label=words)
+        start = start + share
+    panel.set(xlabel="share of the variance (%)", xlim=(0, 100))
 
 
 def measured_figures(answer: MeasuredComparison) -> dict[str, Drawing]:

@@ -35,22 +35,22 @@ from kinetostat.studies.workspace_verdicts import (
 )
 from kinetostat.views.figures import COLOURS, Drawings, fill_regions, new_figure, slim_bar
 from kinetostat.views.grid import axis_values, display_of
-from kinetostat.views.map_scales import WIDE_RATIO, set_axis_scales, trim_height, usual_range
+from kinetostat.views.map_scales import WIDE_RATIO, exceeded_ends, set_axis_scales, trim_height, usual_range
 from kinetostat.views.question import Drawing
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
-KNOWN = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))
+VERDICT_COLOURS = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))
 """Colours of verdicts that need no limit and no condition."""
-LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
-UNMET = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
-SECTIONS = 9
-"""Greatest number of cuts in a picture."""
+LIMIT_COLOURS = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
+CONDITION_COLOURS = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
+MOST_CUTS = 9
+"""Greatest number of cuts in a picture: three rows of three fit on a page."""
 EDGE = "#1d6b55"
 """Colour of the outline of the inside."""
-FINEST = 64
-"""Nodes along an axis that the picture of a solid shows at most."""
+MOST_NODES = 64
+"""Nodes along an axis that the picture of a solid shows at most: its triangles are then as small as dots."""
 LIGHT = np.array([-0.45, -0.7, 0.55])
-"""Direction from which the light comes."""
+"""Direction towards the light: over the left shoulder of the reader, so that edges are seen."""
 
 
 def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition], title: str) -> Drawings:
@@ -69,14 +69,14 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Po
     fixed = {dim: float(dataset.attrs.get(field_of(dataset[dim]), dataset[dim].values.mean())) for dim in dims[3:]}
     if fixed:
         dataset = dataset.sel(fixed, method="nearest")
-        shown = ", ".join(_at(dataset, dim) for dim in fixed)
+        shown = ", ".join(_coordinate_text(dataset, dim) for dim in fixed)
         title = f"{title}, {shown}"
     if len(dims) == 2:
         return {"": partial(_sections, [dataset], labels, conditions, title=title)}
     cuts = [dataset.isel({dims[2]: int(i)}) for i in _chosen_cuts(dataset, dims)]
     return {
         "-sections": partial(_sections, cuts, labels, conditions, title=title),
-        "-solid": partial(_solid, dataset, dims[:3], _telling(conditions), title=title),
+        "-solid": partial(_solid, dataset, dims[:3], _colouring_quantity(conditions), title=title),
     }
 
 
@@ -86,27 +86,29 @@ def _chosen_cuts(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
     last = dataset.sizes[dims[2]] - 1
     first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
     span = final - first
-    finest = max(1, -(-span // (SECTIONS - 1)))
+    finest = max(1, -(-span // (MOST_CUTS - 1)))
     step = next((candidate for candidate in range(finest, 2 * finest) if span % candidate == 0), finest)
     return np.arange(first + span % step // 2, final + 1, step)
 
 
-def _at(dataset: xr.Dataset, dim: str) -> str:
-    """A coordinate and its value, for titles."""
+def _coordinate_text(dataset: xr.Dataset, dim: str) -> str:
+    """Write a coordinate and its value, for titles."""
     coordinate = dataset[dim]
     value = display_of(dataset).show(float(coordinate), coordinate.attrs["units"])
     return f"{dim.removeprefix('pose.')} = {value}"
 
 
 def _colours(labels: Sequence[str]) -> list[str]:
-    limits, unmet = iter(LIMITED), iter(UNMET * 6)
-    return [KNOWN.get(label) or next(limits if label.startswith(LIMIT_VERDICT) else unmet) for label in labels]
+    limits, unmet = iter(LIMIT_COLOURS), iter(CONDITION_COLOURS * 6)
+    return [
+        VERDICT_COLOURS.get(label) or next(limits if label.startswith(LIMIT_VERDICT) else unmet) for label in labels
+    ]
 
 
 def _sections(
     cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[PoseCondition], title: str
 ) -> Figure:
-    """One panel for each cut, filled by verdict, with the contours of the conditions."""
+    """Draw a panel for each cut, filled by verdict, with the contours of the conditions."""
     columns = min(3, len(cuts))
     rows = -(-len(cuts) // columns)
     wide = 4.6 if len(cuts) == 1 else 2.6
@@ -117,7 +119,7 @@ def _sections(
             edges |= _fill(panel, cut, labels, conditions)
             if len(cuts) > 1:
                 across = str(next(dim for dim in cut.coords if dim not in cut["verdict"].dims and cut[dim].attrs))
-                panel.set_title(_at(cut, _varied_coordinate(cuts, across)))
+                panel.set_title(_coordinate_text(cut, _varied_coordinate(cuts, across)))
         for panel in panels[len(cuts) :]:
             panel.remove()
         trim_height(figure, panels[0], 0.85 * wide * rows)
@@ -130,7 +132,7 @@ def _sections(
 
 
 def _varied_coordinate(cuts: Sequence[xr.Dataset], fallback: str) -> str:
-    """The coordinate that differs between cuts."""
+    """Find the coordinate that differs between cuts."""
     names = [str(n) for n in cuts[0].coords if n not in cuts[0]["verdict"].dims]
     return next((n for n in names if len({float(cut[n]) for cut in cuts}) > 1), fallback)
 
@@ -188,44 +190,49 @@ def _edge(condition: PoseCondition) -> str:
     return condition.text.replace(condition.comparison, "=", 1)
 
 
-def _telling(conditions: Sequence[PoseCondition]) -> str:
+def _colouring_quantity(conditions: Sequence[PoseCondition]) -> str:
     """Choose the quantity that colours a solid: that of the first condition, else the least stiffness."""
     return next((condition.quantity for condition in conditions), COLOURING_QUANTITY)
 
 
 def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> Figure:
-    """The inside as a lit solid in a box with scales, coloured by a quantity on its surface."""
-    thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // FINEST)) for dim in dims})
-    axes = [axis_values(thin, dim) for dim in dims]
-    ends = [axis_values(dataset, dim)[0] for dim in dims]
-    inside = thin["verdict"].transpose(*dims).values == 0
-    # Borders hold for steps of the whole grid; a thinned one has none of its own.
-    shares = (
-        [dataset[f"{BORDER_VARIABLES}{dim}"].transpose(*dims).values for dim in dims]
-        if thin.sizes == dataset.sizes
-        else []
-    )
-    triangles = surface(depth(inside, shares or _halves(inside)), [values for values, _ in axes])
+    """Draw the inside as a lit solid in a box with scales, coloured by a quantity on its surface."""
+    triangles, values = _coloured_surface(dataset, dims, quantity)
+    axes = [axis_values(dataset, dim) for dim in dims]
     scale = display_of(dataset).scale(dataset[quantity].attrs["units"])
-    values = scale.factor * _on(triangles, thin[quantity].transpose(*dims).values, inside, [v for v, _ in axes])
+    values = scale.factor * values
     with new_figure((5.2, 4.8), title) as figure:
         panel = figure.add_subplot(projection="3d")
         norm = _norm_of(values)
         low, high = norm.vmin or 0.0, norm.vmax or 1.0
-        colours = _lit(triangles) * mpl.colormaps["viridis"](norm(values))[:, :3]
+        colours = _brightness(triangles) * mpl.colormaps["viridis"](norm(values))[:, :3]
         solid = Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.2, rasterized=True)
         panel.add_collection3d(solid)
         panel.set(xlabel=axes[0][1], ylabel=axes[1][1], zlabel=axes[2][1])
-        panel.set(xlim=_ends(ends[0]), ylim=_ends(ends[1]), zlim=_ends(ends[2]))
+        panel.set(**{f"{axis}lim": (ends[0], ends[-1]) for axis, (ends, _) in zip("xyz", axes, strict=True)})
         lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
         panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
-        extremes = int((values < low).any()) + 2 * int((values > high).any())
         bar = figure.colorbar(
             ScalarMappable(norm, "viridis"), ax=panel, shrink=0.6, pad=0.12, label=scale.label(plain_name(quantity)),
-            extend=("neither", "min", "max", "both")[extremes],
+            extend=exceeded_ends(values, low, high),
         )  # fmt: skip
         slim_bar(bar)
     return figure
+
+
+def _coloured_surface(dataset: xr.Dataset, dims: Sequence[str], quantity: str) -> tuple[Array, Array]:
+    """Return the triangles of the border of the inside [n x 3 x 3], and a quantity on each, SI.
+
+    A large grid is thinned to `MOST_NODES`.
+    """
+    thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // MOST_NODES)) for dim in dims})
+    axes = [axis_values(thin, dim)[0] for dim in dims]
+    inside = thin["verdict"].transpose(*dims).values == 0
+    # Borders hold for steps of the whole grid; a thinned one has none of its own.
+    is_whole = thin.sizes == dataset.sizes
+    shares = [dataset[f"{BORDER_VARIABLES}{dim}"].transpose(*dims).values for dim in dims] if is_whole else []
+    triangles = surface(depth(inside, shares or _halves(inside)), axes)
+    return triangles, _surface_values(triangles, thin[quantity].transpose(*dims).values, inside, axes)
 
 
 def _norm_of(values: Array) -> Normalize:
@@ -239,7 +246,7 @@ def _halves(inside: np.ndarray) -> list[np.ndarray]:
     return [np.full(inside.shape, 0.5)] * inside.ndim
 
 
-def _on(triangles: Array, values: Array, inside: np.ndarray, axes: Sequence[Array]) -> Array:
+def _surface_values(triangles: Array, values: Array, inside: np.ndarray, axes: Sequence[Array]) -> Array:
     """Interpolate values of nodes at the middle of each triangle; nodes outside have that of the nearest one inside."""
     if not len(triangles):
         return np.zeros(0)
@@ -249,12 +256,8 @@ def _on(triangles: Array, values: Array, inside: np.ndarray, axes: Sequence[Arra
     return np.asarray(ndimage.map_coordinates(values[tuple(nearest)], steps, order=1, mode="nearest"))
 
 
-def _ends(values: Array) -> tuple[float, float]:
-    return float(values[0]), float(values[-1])
-
-
-def _lit(triangles: Array) -> Array:
-    """The brightness of each triangle by how it faces the light, scales made equal [n x 1]."""
+def _brightness(triangles: Array) -> Array:
+    """Compute the brightness of each triangle by how it faces the light, scales made equal [n x 1]."""
     if not len(triangles):
         return np.zeros((0, 1))
     spread = np.ptp(triangles.reshape(-1, 3), axis=0)
