@@ -41,9 +41,10 @@ def truth_of(model, groups=("geometry", "zeros"), size=2e-4, seed=9):
 
 def found(answer, truth):
     """How far identified values lie from the truth, in halves of their 95 % intervals, of those that are seen."""
-    numbers = [n for n, place in enumerate(answer.observed.chosen) if place >= 0 and np.isfinite(answer.fit.sure[n])]
+    halves = answer.fit.half_intervals
+    numbers = [n for n, place in enumerate(answer.observed.chosen) if place >= 0 and np.isfinite(halves[n])]
     true = truth[answer.observed.chosen[numbers]]
-    return (answer.fit.values[numbers] - true) / answer.fit.sure[numbers]
+    return (answer.fit.values[numbers] - true) / halves[numbers]
 
 
 def written(path, data):

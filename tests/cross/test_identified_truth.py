@@ -83,7 +83,7 @@ def test_tilt_of_a_delta_is_seen_only_by_what_turns():
     assert np.mean(np.abs(found(whole, truth)) < 1.0) > 0.7
     tilt = [n for n, unknown in enumerate(position.unknowns) if unknown.path.endswith("difference")]
     # Positions see it by the way it moves the target, which another target may do: hardly or not at all.
-    assert (position.fit.sure[tilt] > 20.0 * whole.fit.sure[tilt]).all()
+    assert (position.fit.half_intervals[tilt] > 20.0 * whole.fit.half_intervals[tilt]).all()
 
 
 def test_gross_outliers_hardly_move_the_result_and_are_named():

@@ -133,7 +133,7 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
         fit = best_fit(Linear(rates, true, noise), base.observed.pose, wishes)
         answer = replace(base, fit=fit)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
-        inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.sure, strict=True)]
+        inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.half_intervals, strict=True)]
         linear = firmware_numbers(replace(answer, fit=replace(fit, values=true)))
         numbers = firmware_numbers(answer)
         for name in ("radius", "rods", "angles", "raised"):
@@ -158,7 +158,7 @@ def test_fourteen_numbers_of_exact_printers_leave_residuals_of_the_noise(machine
         observed = replace(base.observed, value=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
         fit = best_fit(observed, observed.pose, wishes)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
-        inside += (np.abs(fit.values - true_values(base, truth)) <= fit.sure).tolist()
+        inside += (np.abs(fit.values - true_values(base, truth)) <= fit.half_intervals).tolist()
     assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
     assert np.sqrt(np.mean(ratios)) == pytest.approx(1.0, abs=0.1)
 

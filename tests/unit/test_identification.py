@@ -62,7 +62,7 @@ def test_compliances_follow_from_deflections_under_known_loads():
     data = Measurements("data.csv", tuple(range(count)), poses, noisy, sigma, wrenches, np.full((count, 3), np.nan))
     answer = identification_of(model, data, ["compliances"])
     assert answer.fit.rank == 6
-    assert (np.abs(answer.fit.values - truth[soft]) < 1.6 * answer.fit.sure).all()
+    assert (np.abs(answer.fit.values - truth[soft]) < 1.6 * answer.fit.half_intervals).all()
     built = as_built(machine, answer.errors)
     stiffness = [s.stiffness for s in springs(built.configuration)]
     drawn = [s.stiffness for s in springs(machine.configure())]
@@ -88,7 +88,7 @@ def test_what_is_not_seen_is_said_and_a_prior_or_a_bound_settles_it():
     small = np.full(2, 1e-5)
     open_end = best_fit(line, groups, Wishes(np.ones(2), none, none, small))
     assert open_end.rank == 1
-    assert np.isinf(open_end.sure).all()
+    assert np.isinf(open_end.half_intervals).all()
     assert open_end.values == pytest.approx([0.2, 0.2], abs=1e-6)
     known = best_fit(line, groups, Wishes(np.ones(2), np.array([np.inf, 0.01]), none, small))
     assert known.rank == 2

@@ -205,7 +205,7 @@ def _unknowns(answer: Identification) -> list[dict[str, Any]]:
             "half_interval_95": float(half),
             "seen": bool(np.isfinite(half)),
         }
-        for unknown, value, half in zip(answer.unknowns, answer.fit.values, answer.fit.sure, strict=True)
+        for unknown, value, half in zip(answer.unknowns, answer.fit.values, answer.fit.half_intervals, strict=True)
     ]
 
 

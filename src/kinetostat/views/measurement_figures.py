@@ -94,7 +94,7 @@ def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: 
 def correlation_figure(answer: Identification, title: str = "{}: numbers that were found together") -> Figure:
     """Draw the correlations of the unknowns; those that are not seen at all are left white."""
     matrix = answer.fit.correlations.copy()
-    hidden = ~np.isfinite(answer.fit.sure)
+    hidden = ~np.isfinite(answer.fit.half_intervals)
     matrix[hidden] = matrix[:, hidden] = np.nan
     size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
     few = answer.unknowns if len(matrix) <= MOST_PATHS else ()

@@ -15,6 +15,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
+from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED, LEAST_DIVISOR
 
 Tell = Callable[[int, int, str], None]
@@ -32,11 +33,17 @@ UNSEEN = 1e-6
 seen less than it is preferred to be zero counts as unseen too."""
 SURELY = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
+UPPER_QUANTILE = 0.975
+"""Probability below the upper end of a 95 % interval."""
 FOLDS = 5
 """Parts of the poses, each of which is predicted from the others."""
 FULL_PREFERENCE = 50.0
 """The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
 would go where the curvature of the equations explains some of the noise."""
+LEAST_WEIGHT = 1e-12
+"""Weight of an unknown of which nothing is known before: without one, its rates would be divided by zero."""
+LEAST_SPREAD = 1e-9
+"""Least spread that is tried, as a share of the residuals with all unknowns zero: no machine is measured so well."""
 TRIED_SPREADS = 400
 """Standard deviations of measurements that are tried, by a constant factor; as many again between the best ones."""
 LEAST_FREEDOM = 0.5
@@ -85,6 +92,7 @@ class Wishes:
         return self.known or not np.isfinite(self.priors).any()
 
 
+@former_names(sure="half_intervals", seen="strengths", ways="combinations")
 @dataclass(frozen=True)
 class Fit:
     """The most likely values of unknowns.
@@ -92,15 +100,15 @@ class Fit:
     Attributes:
         values: SI [unknowns].
         covariance: SI [unknowns x unknowns], of what is seen.
-        sure: half of the 95 % interval of each, SI, with what combinations that are not seen may add if they are of a
-            plausible size; infinity where it is seen only in such [unknowns].
+        half_intervals: half of the 95 % interval of each, SI, with what combinations that are not seen may add if they
+            are of a plausible size; infinity where it is seen only in such [unknowns].
         kept: rows that are not outliers [rows].
         before, after: residuals with all unknowns zero and with the values, in standard deviations [rows].
         rates: how residuals fall per plausible size of each unknown, with the values [rows x unknowns].
         scatter: standard deviation of the kept residuals over that expected.
-        seen: how strongly each combination is seen, standard deviations per plausible size; those that count as seen
-            come first [unknowns].
-        ways: these combinations as columns, in plausible sizes [unknowns x unknowns].
+        strengths: how strongly each combination is seen, standard deviations per plausible size; those that count as
+            seen come first [unknowns].
+        combinations: these combinations as columns, in plausible sizes [unknowns x unknowns].
         rank: how many are seen.
         interval: covariance of what is seen, widened to squares of halves of 95 % intervals, SI [unknowns x unknowns]:
             by Student's factor for what measurements say whose standard deviation is estimated, not for priors.
@@ -110,14 +118,14 @@ class Fit:
 
     values: Array
     covariance: Array
-    sure: Array
+    half_intervals: Array
     kept: Mask
     before: Array
     after: Array
     rates: Array
     scatter: float
-    seen: Array
-    ways: Array
+    strengths: Array
+    combinations: Array
     rank: int
     interval: Array
     freedom: float
@@ -135,7 +143,7 @@ class Fit:
     @property
     def unseen_combinations(self) -> Array:
         """A basis of the combinations that are not seen, in plausible sizes, as columns [unknowns x k]."""
-        return self.ways[:, self.rank :]
+        return self.combinations[:, self.rank :]
 
 
 def best_fit(question: ResidualEquations, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
@@ -214,25 +222,25 @@ def _own_spread(residuals: Array, rates: Array, values: Array, wishes: Wishes) -
 
     Source: D. MacKay, Neural Computation 4(3), 1992, equations 2.9 and 2.14.
     """
-    units = values / wishes.sizes
-    weights = np.hypot(wishes.sizes / wishes.priors, wishes.preferred)
-    ways, sizes, _ = np.linalg.svd(rates / np.maximum(weights, 1e-12), full_matrices=False)
-    whole = residuals + rates @ units
-    squares, total = (ways.T @ whole) ** 2, float(whole @ whole)
-    rest, others = max(total - float(squares.sum()), 0.0), len(whole) - len(sizes)
+    weights = np.maximum(np.hypot(wishes.sizes / wishes.priors, wishes.preferred), LEAST_WEIGHT)
+    directions, sizes, _ = np.linalg.svd(rates / weights, full_matrices=False)
+    whole = residuals + rates @ (values / wishes.sizes)  # the residuals with all unknowns zero
+    squares, total = (directions.T @ whole) ** 2, float(whole @ whole)
+    unseen_square, unseen_count = max(total - float(squares.sum()), 0.0), len(whole) - len(sizes)
     most = np.sqrt(total / len(whole)) + wishes.resolution
-    least, most = max(wishes.resolution, 1e-9 * most), max(most, LEAST_DIVISOR)
+    least, most = max(wishes.resolution, LEAST_SPREAD * most, LEAST_DIVISOR), max(most, LEAST_DIVISOR)
     for _ in range(2):
-        tried = np.geomspace(max(least, LEAST_DIVISOR), max(most, least, LEAST_DIVISOR), TRIED_SPREADS)
+        tried = np.geomspace(least, max(most, least), TRIED_SPREADS)
         variances = tried**2
-        each = variances[:, None] + sizes**2
-        unlikely = (np.log(each) + squares / each).sum(axis=1) + others * np.log(variances) + rest / variances
+        along_seen = variances[:, None] + sizes**2
+        unlikely = (np.log(along_seen) + squares / along_seen).sum(axis=1)
+        unlikely += unseen_count * np.log(variances) + unseen_square / variances
         best = int(np.argmin(unlikely))
         least, most = float(tried[max(best - 1, 0)]), float(tried[min(best + 1, TRIED_SPREADS - 1)])
     return float(tried[best])
 
 
-def _freedom(rates: Array, seen: "_Combinations") -> float:
+def _freedom(rates: Array, seen: "_SeenCombinations") -> float:
     """Number of residuals less the freedoms that measured values use up, theory (65).
 
     Each combination takes as much of a freedom as the measurements say of what they and the priors say together.
@@ -241,20 +249,20 @@ def _freedom(rates: Array, seen: "_Combinations") -> float:
         rates: how the kept residuals fall per plausible size [rows x unknowns].
         seen: the combinations, with the priors.
     """
-    ways = seen.ways[:, : seen.rank]
-    measured, prior = rates @ ways, seen.prior @ ways
+    basis = seen.columns[:, : seen.rank]
+    measured, prior = rates @ basis, seen.prior @ basis
     both = measured.T @ measured + prior.T @ prior
     used = float(np.trace(np.linalg.solve(both, measured.T @ measured))) if seen.rank else 0.0
     return max(len(rates) - used, LEAST_FREEDOM)
 
 
 @dataclass(frozen=True)
-class _Combinations:
+class _SeenCombinations:
     """Combinations of unknowns, in plausible sizes, ordered by how well measured values see them.
 
     Attributes:
         strengths: of each, standard deviations per plausible size; those that are seen come first [unknowns].
-        ways: the combinations as columns, orthonormal [unknowns x unknowns].
+        columns: the combinations, orthonormal [unknowns x unknowns].
         rank: how many are seen.
         unit: the true standard deviation of measurements in those that residuals are counted in.
         prior: rows that say what was known of the unknowns before [unknowns x unknowns].
@@ -262,14 +270,14 @@ class _Combinations:
     """
 
     strengths: Array
-    ways: Array
+    columns: Array
     rank: int
     unit: float
     prior: Array
     preference: Array
 
 
-def _combinations(rates: Array, wishes: Wishes, spread: float) -> _Combinations:
+def _combinations(rates: Array, wishes: Wishes, spread: float) -> _SeenCombinations:
     """Find which combinations are seen better than round-off and the weak preference for zero.
 
     The preference is weak for these, and full for the others. Both, and what was known before, are in true standard
@@ -282,18 +290,18 @@ def _combinations(rates: Array, wishes: Wishes, spread: float) -> _Combinations:
     """
     unit = 1.0 if wishes.known else spread
     prior = unit * np.diag(wishes.sizes / wishes.priors)
-    _, sizes, ways = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
+    _, sizes, directions = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
     preferred = np.diag(unit * wishes.preferred)
-    least = np.maximum(UNSEEN * sizes[0], np.linalg.norm(ways @ preferred, axis=1))
+    least = np.maximum(UNSEEN * sizes[0], np.linalg.norm(directions @ preferred, axis=1))
     order = np.argsort(sizes <= least, kind="stable")
     rank = int((sizes > least).sum())
-    hidden = np.linalg.qr(preferred @ ways[order[rank:]].T)[0]
+    hidden = np.linalg.qr(preferred @ directions[order[rank:]].T)[0]
     preference = np.concatenate([preferred, FULL_PREFERENCE * hidden.T @ preferred])
-    return _Combinations(sizes[order], ways[order].T, rank, unit, prior, preference)
+    return _SeenCombinations(sizes[order], directions[order].T, rank, unit, prior, preference)
 
 
 def _least_squares(
-    question: ResidualEquations, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float
+    question: ResidualEquations, wishes: Wishes, kept: Mask, start: Array, seen: _SeenCombinations, scale: float
 ) -> Array:
     """Fit values by least squares from a start; `scale` is that of Cauchy's loss, infinite for squares."""
     from scipy.optimize import least_squares  # half a second to import
@@ -314,10 +322,11 @@ def _least_squares(
         plain = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
         return np.where(measured, np.stack([np.log1p(squares), trust, -(trust**2)]), plain)
 
-    form, precision = (loss, FIT_BEGUN) if np.isfinite(scale) else ("linear", FIT_SETTLED)
+    robust = bool(np.isfinite(scale))
+    form, precision = (loss, FIT_BEGUN) if robust else ("linear", FIT_SETTLED)
     answer = least_squares(
-        residuals, start / wishes.sizes, slopes, (-most, most), loss=form, f_scale=min(scale, 1e300), ftol=precision,
-        xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
+        residuals, start / wishes.sizes, slopes, (-most, most), loss=form, f_scale=scale if robust else 1.0,
+        ftol=precision, xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
     )  # fmt: skip
     return np.asarray(answer.x * wishes.sizes)
 
@@ -334,46 +343,62 @@ def _fit_result(
     """Describe the fit at its values: covariance and intervals, theory (65), rank, and poses that took no part."""
     spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after[kept], rates[kept], values, wishes)
     seen = _combinations(rates[kept], wishes, spread)
-    rank, ways = seen.rank, seen.ways
     freedom = _freedom(rates[kept], seen)
     scatter = float(np.sqrt((after[kept] ** 2).sum() / freedom))
-    basis = ways[:, :rank] / seen.strengths[:rank]
+    covariance, interval = _covariance_and_interval(rates[kept], seen, wishes, scatter, freedom)
+    return Fit(
+        values=values,
+        covariance=covariance,
+        half_intervals=_half_intervals(interval, seen, wishes),
+        kept=kept,
+        before=before,
+        after=after,
+        rates=rates,
+        scatter=scatter,
+        strengths=seen.strengths,
+        combinations=seen.columns,
+        rank=seen.rank,
+        interval=interval,
+        freedom=freedom,
+        predicted=_left_out(after, rates, kept, groups, np.concatenate([seen.prior, seen.preference])),
+    )
+
+
+def _covariance_and_interval(
+    rates: Array, seen: _SeenCombinations, wishes: Wishes, scatter: float, freedom: float
+) -> tuple[Array, Array]:
+    """The covariance of what is seen, and `Fit.interval`, SI [unknowns x unknowns each].
+
+    Args:
+        rates: how the kept residuals fall per plausible size [rows x unknowns].
+        seen: the combinations, with the priors.
+        wishes: plausible sizes, and whether standard deviations of measurements are known.
+        scatter, freedom: of the kept residuals.
+    """
+    basis = seen.columns[:, : seen.rank] / seen.strengths[: seen.rank]
     spread = 1.0 if wishes.known else max(scatter, wishes.resolution)
     units = spread**2 * np.outer(wishes.sizes, wishes.sizes)
-    covariance = basis @ basis.T * units
-    measured, before_all = rates[kept] @ basis, seen.prior @ basis
+    measured, known_before = rates @ basis, seen.prior @ basis
     factor = SURELY if wishes.known else _quantile(freedom)
-    widened = factor**2 * measured.T @ measured + SURELY**2 * before_all.T @ before_all
-    interval = basis @ widened @ basis.T * units
-    hidden = ways[:, rank:]
+    widened = factor**2 * measured.T @ measured + SURELY**2 * known_before.T @ known_before
+    return basis @ basis.T * units, basis @ widened @ basis.T * units
+
+
+def _half_intervals(interval: Array, seen: _SeenCombinations, wishes: Wishes) -> Array:
+    """Half of the 95 % interval of each unknown, with what unseen combinations of plausible size may add [unknowns]."""
+    hidden = seen.columns[:, seen.rank :]
     likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * wishes.preferred) ** 2) @ hidden)
     unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * wishes.sizes
-    sure = np.hypot(np.sqrt(np.diag(interval)), SURELY * unseen)
-    sure[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
-    predicted = _left_out(after, rates, kept, groups, np.concatenate([seen.prior, seen.preference]))
-    return Fit(
-        values,
-        covariance,
-        sure,
-        kept,
-        before,
-        after,
-        rates,
-        scatter,
-        seen.strengths,
-        ways,
-        rank,
-        interval,
-        freedom,
-        predicted,
-    )
+    result = np.hypot(np.sqrt(np.diag(interval)), SURELY * unseen)
+    result[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
+    return np.asarray(result)
 
 
 def _quantile(freedom: float) -> float:
     """Half of the 95 % interval over the standard deviation, where that is estimated: Student's t."""
     from scipy.special import stdtrit  # a quarter of a second to import: only where nobody knows standard deviations
 
-    return float(stdtrit(freedom, 0.975))
+    return float(stdtrit(freedom, UPPER_QUANTILE))
 
 
 def _left_out(after: Array, rates: Array, kept: Mask, groups: Integers, known: Array) -> Array:

@@ -5,7 +5,7 @@ actuators have the commanded values; `measured.x` and so on have measured positi
 deflections under a wrench, and `sigma.x` the standard deviations of all of these.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, quantities
-from kinetostat.studies.poses import GivenColumn, columns_of, read_columns
+from kinetostat.studies.poses import GivenColumn, Where, columns_of, read_columns
 from kinetostat.units import UnitError
 
 POSITION, ROTATION, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
@@ -120,35 +120,47 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
         return f"line {lines[row]}, column {name}"
 
     try:
-        sorted_columns = _by_group(columns)
-        commanded = sorted_columns.pop("", [])
-        driven = sorted_columns.pop("actuator", [])
-        pose = dict(read_columns(machine, commanded, where).leaves) if commanded else {}
-        others = [leaf for leaf in pose if not leaf.startswith(POSE)]
-        if others:
-            raise InputError(
-                f"{others[0]} is not a coordinate of the pose; a machine that was measured has one geometry."
-            )
-        if driven:
-            if pose:
-                raise InputError("both poses and actuators are commanded; leave the columns of the ones or others out.")
-            pose = _from_actuators(machine, driven, where)
-        if not pose:
-            names = ", ".join(name.removeprefix(POSE) for name in _pose_names(machine))
-            raise InputError(f"no column says what was commanded; add columns of the pose ({names}) or actuator.NAME.")
+        groups = _by_group(columns)
+        pose = _commanded_pose(machine, groups.pop("", []), groups.pop("actuator", []), where)
         numbers = {
             group: {_name_in_group(column): _numbers(column, COLUMN_GROUPS[group], where) for column in entries}
-            for group, entries in sorted_columns.items()
+            for group, entries in groups.items()
             if group in COLUMN_GROUPS
         }
-        wrench = {
-            column.name: _numbers(column, WRENCH_COLUMNS, where, column.name)
-            for column in sorted_columns.get("wrench", [])
-        }
+        loads = groups.get("wrench", [])
+        wrench = {column.name: _numbers(column, WRENCH_COLUMNS, where, column.name) for column in loads}
         return _measurements(str(path), lines, pose, numbers, wrench, sigmas)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith('"') else f'"{path}": {text}') from None
+
+
+def _commanded_pose(
+    machine: Machine, commanded: Sequence[GivenColumn], driven: Sequence[GivenColumn], where: Where
+) -> dict[str, Array]:
+    """The commanded coordinates of the pose by leaf path, SI [n].
+
+    Args:
+        machine: the machine that was measured.
+        commanded: columns of coordinates of the pose.
+        driven: columns of coordinates of actuators, which give the pose by forward kinematics.
+        where: says where an entry stands.
+
+    Raises:
+        InputError: both or none are given, or a column is about something else.
+    """
+    pose = dict(read_columns(machine, commanded, where).leaves) if commanded else {}
+    others = [leaf for leaf in pose if not leaf.startswith(POSE)]
+    if others:
+        raise InputError(f"{others[0]} is not a coordinate of the pose; a machine that was measured has one geometry.")
+    if driven and pose:
+        raise InputError("both poses and actuators are commanded; leave the columns of the ones or others out.")
+    if driven:
+        return _from_actuators(machine, driven, where)
+    if not pose:
+        names = ", ".join(name.removeprefix(POSE) for name in _pose_names(machine))
+        raise InputError(f"no column says what was commanded; add columns of the pose ({names}) or actuator.NAME.")
+    return pose
 
 
 def _by_group(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
@@ -176,7 +188,7 @@ def _pose_names(machine: Machine) -> list[str]:
     return list(quantities(machine.family.tables["pose"]))
 
 
-def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
+def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Where, name: str = "") -> Array:
     """The values of a column, SI, NaN where a cell is empty; `kinds` has their kinds by name.
 
     An angle of a platform is at most half a turn; an actuator may turn farther.
@@ -234,15 +246,20 @@ def _measurements(
         origins,
         sigmas.known or _have_sigmas(values, numbers.get("sigma", {})),
     )
-    for name, entries in values.items():
-        rows = np.flatnonzero(np.isfinite(entries))
-        if name == "distance" and not np.isfinite(origins[rows]).all():
-            row = int(rows[~np.isfinite(origins[rows]).all(axis=1)][0])
-            raise result.refusal(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
-        if name.startswith("deflection") and not wrenches[rows].any(axis=1).all():
-            row = int(rows[~wrenches[rows].any(axis=1)][0])
-            raise result.refusal(row, "a deflection is measured without a load; add columns such as force.z [N].")
+    _check_origins_and_loads(result)
     return result
+
+
+def _check_origins_and_loads(data: Measurements) -> None:
+    """Refuse distances from nowhere, and deflections under no load."""
+    for name, entries in data.values.items():
+        rows = np.flatnonzero(np.isfinite(entries))
+        if name == "distance" and not np.isfinite(data.origins[rows]).all():
+            row = int(rows[~np.isfinite(data.origins[rows]).all(axis=1)][0])
+            raise data.refusal(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
+        if name.startswith("deflection") and not data.wrenches[rows].any(axis=1).all():
+            row = int(rows[~data.wrenches[rows].any(axis=1)][0])
+            raise data.refusal(row, "a deflection is measured without a load; add columns such as force.z [N].")
 
 
 def _have_sigmas(values: Mapping[str, Array], given: Mapping[str, Array]) -> bool:
@@ -261,9 +278,7 @@ def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigm
     return result
 
 
-def _from_actuators(
-    machine: Machine, columns: Sequence[GivenColumn], where: Callable[[str, int], str]
-) -> dict[str, Array]:
+def _from_actuators(machine: Machine, columns: Sequence[GivenColumn], where: Where) -> dict[str, Array]:
     """The poses of the drawn machine at given coordinates of its actuators."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))

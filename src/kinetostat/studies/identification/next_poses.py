@@ -49,6 +49,8 @@ SINGULAR_SHARE = 0.1
 singularity."""
 
 Poses = Mapping[str, Array]
+LEAST_INFORMATION = 1e-9
+"""Information along every combination, as a share of all that is known: a determinant needs some of it in each."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +89,9 @@ def next_poses(machine: Machine, seen: Observation, fit: Fit, sizes: Array, coun
     if rows < count:
         return None
     _, rates = there.linearisation(fit.values)
-    basis = fit.ways[:, : fit.rank]
+    basis = fit.combinations[:, : fit.rank]
     blocks = (rates * sizes @ basis).reshape(rows, -1, fit.rank)
-    start = np.diag(fit.seen[: fit.rank] ** 2)
+    start = np.diag(fit.strengths[: fit.rank] ** 2)
     chosen = chosen_poses(blocks, start, count)
     gain, usual = (_gain(blocks[which], start) for which in (chosen, rng.permutation(rows)[:count]))
     poses = {path: values[chosen] for path, values in there.data.pose.items()}
@@ -175,7 +177,7 @@ def chosen_poses(blocks: Array, start: Array, count: int) -> list[int]:
         count: how many.
     """
     chosen: list[int] = []
-    information = start + np.eye(len(start)) * 1e-9 * max(float(np.trace(start)), 1.0)
+    information = start + np.eye(len(start)) * LEAST_INFORMATION * max(float(np.trace(start)), 1.0)
     for _ in range(count):
         best = int(np.argmax(_growth(blocks, information, chosen)))
         chosen.append(best)
@@ -236,16 +238,17 @@ def within_limits(
     start, least = places[middle], SINGULAR_SHARE * float(margins[middle])
     axes = np.concatenate([np.diag(scale), -np.diag(scale)])
     reach = _reach(machine, paths, start, axes, least).reshape(2, -1).max(axis=0) * scale
-    ways = rng.normal(size=(count, len(paths)))
-    ways = ways / np.linalg.norm(ways, axis=1)[:, None] * reach
-    share = _reach(machine, paths, start, ways, least) * rng.random(count) ** (1.0 / len(paths))
-    return dict(zip(paths, (start + share[:, None] * ways).T, strict=True))
+    rays = rng.normal(size=(count, len(paths)))
+    rays = rays / np.linalg.norm(rays, axis=1)[:, None] * reach
+    # The root makes poses even in the volume: as many lie in each part of it.
+    share = _reach(machine, paths, start, rays, least) * rng.random(count) ** (1.0 / len(paths))
+    return dict(zip(paths, (start + share[:, None] * rays).T, strict=True))
 
 
-def _reach(machine: Machine, paths: list[str], start: Array, ways: Array, least: float) -> Array:
+def _reach(machine: Machine, paths: list[str], start: Array, rays: Array, least: float) -> Array:
     """Reach of rays [rays x coordinates] from a pose before they end: factors of their length [rays]."""
     steps = np.linspace(0.0, FARTHEST, RAY_STEPS + 1)[1:]
-    places = start + steps[:, None, None] * ways
+    places = start + steps[:, None, None] * rays
     kept = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least
     ended = np.where(kept.all(axis=0), RAY_STEPS, np.argmin(kept, axis=0))
     return np.asarray(np.concatenate([[0.0], steps])[ended])

@@ -103,61 +103,46 @@ class Observation:
         return np.asarray(whole[:, :, used] @ self.members[used])
 
     def _predict(self, values: Array, with_rates: bool) -> tuple[Array, Array]:
-        model, errors = self.model, self.errors(values)
-        moved, whole = (
-            model.linearisation(errors, set(np.flatnonzero(self.members.any(axis=1)).tolist()))
-            if with_rates
-            else (model.displacement(errors)[0], np.zeros(0))
-        )
-        soft = model.deflections(self.data.wrenches)
-        grown = 1.0 + errors[len(errors) - soft.shape[2] :]
-        deflected = soft @ grown
-        moved = moved + deflected
-        turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.drawn.axes
-        tool = model.drawn.tool + moved[:, 3:]
-        frame, target = self._of(values, FRAME_UNKNOWNS), self._of(values, TARGET_UNKNOWNS)
-        arm = np.einsum("nij,j->ni", turned, target[3:])
-        shift = exponential(frame[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
-        axes, origin = (shift.rotation @ self.frame.rotation)[0], self.frame.translation[0] + frame[3:]
-        on_target = exponential(target[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])).rotation[0]
-        seen = Motions(np.swapaxes(axes[None], 1, 2) @ turned @ on_target, (tool + arm - origin) @ axes)
-        predicted = self._values(seen, deflected)
-        if not with_rates:
-            return predicted, np.zeros((0, 0))
-        first = len(errors) - soft.shape[2]
-        twists = self.twists(np.concatenate([whole[:, :, :first], soft], axis=2))
-        rates = self._place_rates(twists, turned, tool + arm - origin, arm, axes, target, frame)
-        return predicted, self._rates(seen, rates, soft)
+        """Predicted values [rows], and their rates by the unknowns [rows x unknowns], empty where these are not wanted.
 
-    def _place_rates(
-        self, twists: Array, turned: Array, at: Array, arm: Array, axes: Array, target: Array, frame: Array
-    ) -> Array:
-        """Twists of the target in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
-        turning, moving = twists[:, :3], twists[:, 3:]
-        moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), arm[:, None]), 1, 2)
-        unit = np.eye(3)
-        paths = [unknown.path for unknown in self.unknowns]
-        for name, path in zip((*ROTATION, *POSITION), FRAME_UNKNOWNS, strict=True):
-            if path in paths:
-                axis = unit["xyz".index(name[-1])]
-                if name in ROTATION:
-                    way = exponential(np.array([[*frame[:3], *axis]])).translation[0]
-                    turning[:, :, paths.index(path)] = -way
-                    moving[:, :, paths.index(path)] = -np.cross(way, at)
-                else:
-                    moving[:, :, paths.index(path)] = -axis
-        for name, path in zip((*ROTATION, *POSITION), TARGET_UNKNOWNS, strict=True):
-            if path in paths:
-                axis = unit["xyz".index(name[-1])]
-                if name in ROTATION:
-                    way = exponential(np.array([[*target[:3], *axis]])).translation[0]
-                    turning[:, :, paths.index(path)] = turned @ way
-                else:
-                    moving[:, :, paths.index(path)] = turned @ axis
-        back = axes.T
-        return np.concatenate([back @ turning, back @ moving], axis=1)
+        The tool of the drawn machine is displaced by errors of geometry, and by springs with their errors of
+        compliance; the target on it is then seen from the measuring frame.
+        """
+        model, errors = self.model, self.errors(values)
+        per_spring = model.deflections(self.data.wrenches)
+        first_spring = len(errors) - per_spring.shape[2]
+        deflection = per_spring @ (1.0 + errors[first_spring:])
+        if not with_rates:
+            target = self._target_of(model.displacement(errors)[0] + deflection, values)
+            return self._values(target.in_frame, deflection), np.zeros((0, 0))
+        wanted = set(np.flatnonzero(self.members.any(axis=1)).tolist())
+        displacement, error_rates = model.linearisation(errors, wanted)
+        target = self._target_of(displacement + deflection, values)
+        twists = self.twists(np.concatenate([error_rates[:, :, :first_spring], per_spring], axis=2))
+        rates = target.rates(twists, [unknown.path for unknown in self.unknowns])
+        return self._values(target.in_frame, deflection), self._rates(target.in_frame, rates, per_spring)
+
+    def _target_of(self, displacement: Array, values: Array) -> "_Target":
+        """The target where the tool is displaced [n x 6], with the unknown places of frame and target at values."""
+        drawn, frame, target = self.model.drawn, self._of(values, FRAME_UNKNOWNS), self._of(values, TARGET_UNKNOWNS)
+        turns = np.concatenate([displacement[:, :3], 0.0 * displacement[:, :3]], axis=1)
+        platform_axes = exponential(turns).rotation @ drawn.axes
+        frame_turn, target_turn = (
+            exponential(place[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])).rotation for place in (frame, target)
+        )
+        return _Target(
+            frame=frame,
+            target=target,
+            platform_axes=platform_axes,
+            frame_axes=(frame_turn @ self.frame.rotation)[0],
+            target_turn=target_turn[0],
+            arm=np.einsum("nij,j->ni", platform_axes, target[3:]),
+            tool=drawn.tool + displacement[:, 3:],
+            origin=self.frame.translation[0] + frame[3:],
+        )
 
     def _values(self, seen: Motions, deflected: Array) -> Array:
+        """The values of all rows by where the target is seen, and by the deflection of the tool [rows]."""
         angles = _angles(seen.rotation)
         away = np.linalg.norm(seen.translation - self.data.origins, axis=1)
         columns = {name: seen.translation[:, i] for i, name in enumerate(POSITION)}
@@ -181,6 +166,67 @@ class Observation:
             by_spring = soft @ self.members[first:]
             columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
         return np.stack([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The target on the platform and the measuring frame at n poses.
+
+    Attributes:
+        frame, target: turns and shifts of the frame and of the target from where they are taken to be, rad and m [6].
+        platform_axes: axes of the platform as columns, base frame [n x 3 x 3].
+        frame_axes: axes of the measuring frame as columns, base frame [3 x 3].
+        target_turn: rotation from the axes of the target to those of the platform [3 x 3].
+        arm: vector from the tool point to the target, base axes, m [n x 3].
+        tool: the tool point, base frame, m [n x 3].
+        origin: origin of the measuring frame, base frame, m [3].
+    """
+
+    frame: Array
+    target: Array
+    platform_axes: Array
+    frame_axes: Array
+    target_turn: Array
+    arm: Array
+    tool: Array
+    origin: Array
+
+    @property
+    def in_frame(self) -> Motions:
+        """Place of the target in the measuring frame."""
+        rotation = np.swapaxes(self.frame_axes[None], 1, 2) @ self.platform_axes @ self.target_turn
+        return Motions(rotation, (self.tool + self.arm - self.origin) @ self.frame_axes)
+
+    def rates(self, twists: Array, paths: Sequence[str]) -> Array:
+        """Twists of the target in the measuring frame per unit of each unknown [n x 6 x unknowns].
+
+        Args:
+            twists: of the tool per unit of each unknown, base axes, 0 by frame and target [n x 6 x unknowns].
+            paths: of the unknowns.
+        """
+        turning, moving = twists[:, :3], twists[:, 3:]
+        moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), self.arm[:, None]), 1, 2)
+        from_frame = self.tool + self.arm - self.origin
+        for place in (number for number, path in enumerate(paths) if path in FRAME_UNKNOWNS):
+            component = FRAME_UNKNOWNS.index(paths[place])
+            if component < 3:
+                axis = _turn_axis(self.frame, component)
+                turning[:, :, place], moving[:, :, place] = -axis, -np.cross(axis, from_frame)
+            else:
+                moving[:, :, place] = -np.eye(3)[component - 3]
+        for place in (number for number, path in enumerate(paths) if path in TARGET_UNKNOWNS):
+            component = TARGET_UNKNOWNS.index(paths[place])
+            if component < 3:
+                turning[:, :, place] = self.platform_axes @ _turn_axis(self.target, component)
+            else:
+                moving[:, :, place] = self.platform_axes @ np.eye(3)[component - 3]
+        back = self.frame_axes.T
+        return np.concatenate([back @ turning, back @ moving], axis=1)
+
+
+def _turn_axis(turn: Array, component: int) -> Array:
+    """Angular velocity per unit rate of a component of a rotation vector, which need not be small [3]."""
+    return np.asarray(exponential(np.array([[*turn[:3], *np.eye(3)[component]]])).translation[0])
 
 
 def _angles(rotation: Array) -> Array:
@@ -226,11 +272,7 @@ def observation(
         InputError: the drawn machine has no place at a commanded pose, or measured positions lie far from it although
             the measuring frame is the base frame.
     """
-    elsewhere = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
-    if elsewhere.size:
-        row = int(elsewhere[0])
-        sentence = Status(int(model.drawn.status[row])).sentence
-        raise data.refusal(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
+    _check_placed(model, data)
     paths = [error.path for error in model.errors]
     chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
     members = np.zeros((len(paths), len(unknowns)))
@@ -238,6 +280,7 @@ def observation(
         for path, share in (ties or {}).get(unknown.path, {unknown.path: 1.0}).items():
             if path in paths:
                 members[paths.index(path), number] = share
+    # The rows of the residuals: pose by pose, so that the values of one pose stand together.
     pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
     pairs.sort(key=lambda pair: pair[1])
     if frame is None:
@@ -259,20 +302,32 @@ def observation(
     )
 
 
+def _check_placed(model: ErrorModel, data: Measurements) -> None:
+    """Refuse a pose at which the drawn machine has no place."""
+    elsewhere = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
+    if elsewhere.size:
+        row = int(elsewhere[0])
+        sentence = Status(int(model.drawn.status[row])).sentence
+        raise data.refusal(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
+
+
 def still_frame() -> Motions:
     """The base frame itself."""
     return Motions(np.eye(3)[None], np.zeros((1, 3)))
 
 
 def _frame(model: ErrorModel, data: Measurements) -> Motions:
-    """The place of the measuring frame with which the drawn machine comes nearest to positions (W. Kabsch, 1976)."""
+    """The place of the measuring frame with which the drawn machine comes nearest to positions (W. Kabsch, 1976).
+
+    Without three measured positions, which fix a frame, it is the base frame.
+    """
     if not all(name in data.values for name in POSITION):
         return still_frame()
-    seen = np.stack([data.values[name] for name in POSITION], axis=1)
-    rows = np.isfinite(seen).all(axis=1)
+    measured = np.stack([data.values[name] for name in POSITION], axis=1)
+    rows = np.isfinite(measured).all(axis=1)
     if rows.sum() < 3:
         return still_frame()
-    start, end = seen[rows], model.drawn.tool[rows]
+    start, end = measured[rows], model.drawn.tool[rows]
     spread = (start - start.mean(axis=0)).T @ (end - end.mean(axis=0))
     left, _, right = np.linalg.svd(spread)
     hand = np.diag([1.0, 1.0, np.sign(np.linalg.det(right.T @ left.T))])
@@ -281,6 +336,7 @@ def _frame(model: ErrorModel, data: Measurements) -> Motions:
 
 
 def _check_far(model: ErrorModel, data: Measurements) -> None:
+    """Refuse positions that are measured far from the drawn machine, as by a wrong unit or in another frame."""
     length = model.length
     for i, name in enumerate(POSITION):
         off = np.abs(data.values.get(name, model.drawn.tool[:, i]) - model.drawn.tool[:, i])

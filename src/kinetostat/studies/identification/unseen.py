@@ -30,11 +30,20 @@ SAME_EFFECT = 1e-5
 NO_ERROR = MachineError("", "", "", "", "")
 ROUND_OFF_OF_MOTION = 1e-7
 """Share of a motion of the tool below which what is left of it is round-off."""
+NEW_SHARE = 0.1
+"""Share of a combination that named ones must leave of it, so that it has a name of its own."""
 SAME_SHARE = 1e-6
 """Relative difference below which two unknowns take part in combinations alike."""
 LEAST_NAMED_PART = 0.05
 """Share of the largest part of a combination below which a part is not named."""
-WAYS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
+COMMON_MOTIONS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
+"""Words for the motions of a body, in the order of the components of twists."""
+HIDDEN_BY_OTHERS = 1e-6
+"""Relative singular value below which other motions hide each other already, and are not taken to hide one more."""
+SAME_AS_FRAMES = 1e-10
+"""Relative singular value below which motions of the base and of the target do the same to the tool."""
+NO_PART = 1e-9
+"""Share of the largest part of a combination below which a part is round-off."""
 
 
 @dataclass(frozen=True)
@@ -72,44 +81,45 @@ def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
         if np.linalg.norm(candidate - inside) < SEEN_SHARE * np.linalg.norm(candidate) and _new(inside, named):
             named.append(inside)
             result.append(_combination(words, candidate, observed, twists, sizes))
-    rest = basis - _projection(basis, named)
-    left, strength, _ = np.linalg.svd(rest, full_matrices=False)
-    ways = sparse(left[:, strength > 0.5]).T
-    return result + [_combination(_sentence(way, observed), way, observed, twists, sizes) for way in ways]
+    unnamed = basis - _projection(basis, named)
+    directions, strength, _ = np.linalg.svd(unnamed, full_matrices=False)  # strengths are near 1, or near 0 if named
+    others = sparse(directions[:, strength > 0.5]).T
+    return result + [_combination(_sentence(each, observed), each, observed, twists, sizes) for each in others]
 
 
-def _new(way: Array, named: list[Array]) -> bool:
-    rest = way - _projection(way[:, None], named)[:, 0]
-    return bool(np.linalg.norm(rest) > 0.1 * np.linalg.norm(way))
+def _new(combination: Array, named: list[Array]) -> bool:
+    """Whether a combination is more than a mix of those that have names."""
+    unnamed = combination - _projection(combination[:, None], named)[:, 0]
+    return bool(np.linalg.norm(unnamed) > NEW_SHARE * np.linalg.norm(combination))
 
 
-def _projection(ways: Array, named: list[Array]) -> Array:
+def _projection(combinations: Array, named: list[Array]) -> Array:
     """The parts of combinations, as columns, that lie in the span of named ones."""
     if not named:
-        return np.zeros_like(ways)
+        return np.zeros_like(combinations)
     basis, _ = np.linalg.qr(np.stack(named, axis=1))
-    return np.asarray(basis @ (basis.T @ ways))
+    return np.asarray(basis @ (basis.T @ combinations))
 
 
-def sparse(ways: Array) -> Array:
+def sparse(combinations: Array) -> Array:
     """The same span with each column 1 where all others are 0: at the unknowns that take most part in it.
 
     Unknowns that do so alike, as those of equal legs, are taken in their order, so that round-off decides nothing.
     """
-    rest, places = ways.copy(), []
-    for _ in range(ways.shape[1]):
-        sizes = np.linalg.norm(rest, axis=1)
-        places.append(int(np.argmax(sizes > (1.0 - SAME_SHARE) * sizes.max())))
-        way = rest[places[-1]] / sizes[places[-1]]
-        rest = rest - np.outer(rest @ way, way)
-    return np.asarray(ways @ np.linalg.inv(ways[places]))
+    remaining, pivots = combinations.copy(), []
+    for _ in range(combinations.shape[1]):
+        sizes = np.linalg.norm(remaining, axis=1)
+        pivots.append(int(np.argmax(sizes > (1.0 - SAME_SHARE) * sizes.max())))
+        row = remaining[pivots[-1]] / sizes[pivots[-1]]
+        remaining = remaining - np.outer(remaining @ row, row)
+    return np.asarray(combinations @ np.linalg.inv(combinations[pivots]))
 
 
 def _common(observed: Observation, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
     """Common motions that may hide each other, with what they are in unknowns, in plausible sizes."""
     base, platform = (_common_motions(observed, sizes, at_end) for at_end in (False, True))
     frame, target = _place_motions(observed, sizes, FRAME_UNKNOWNS), _place_motions(observed, sizes, TARGET_UNKNOWNS)
-    for number, (what, preposition, axis) in enumerate(WAYS):
+    for number, (what, preposition, axis) in enumerate(COMMON_MOTIONS):
         on_base = f"a common {what} of all base joints {preposition} {axis}"
         on_platform = f"a common {what} of all platform joints {preposition} {axis}"
         for group, name, places, other in (
@@ -141,7 +151,7 @@ def _with_best(candidate: Array, others: dict[int, Array], basis: Array) -> Arra
         return candidate
     block = np.stack(list(others.values()), axis=1)
     seen = block - basis @ (basis.T @ block)
-    share, *_ = np.linalg.lstsq(seen, candidate - basis @ (basis.T @ candidate), rcond=1e-6)
+    share, *_ = np.linalg.lstsq(seen, candidate - basis @ (basis.T @ candidate), rcond=HIDDEN_BY_OTHERS)
     return np.asarray(candidate - block @ share)
 
 
@@ -151,16 +161,15 @@ def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[i
     for number, unit in enumerate(np.eye(6)):
         centre = observed.model.rows.point if at_end else np.zeros(3)
         twist = unit + np.concatenate([np.zeros(3), np.cross(centre, unit[:3])])
-        moved: Array | None = np.zeros(len(sizes))
-        for leg in range(len(observed.model.rows.legs)):
-            share = _of_leg(observed, leg, -twist if at_end else twist, at_end)
-            moved = None if moved is None or share is None else moved + share
-        if moved is not None and moved.any():
-            result[number] = moved / sizes
+        legs = range(len(observed.model.rows.legs))
+        amounts = [_unknowns_of_leg(observed, leg, -twist if at_end else twist, at_end) for leg in legs]
+        together = sum((each for each in amounts if each is not None), np.zeros(len(sizes)))
+        if together.any() and not any(each is None for each in amounts):
+            result[number] = together / sizes
     return result
 
 
-def _of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
+def _unknowns_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
     """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
     rows, sources = observed.model.rows, observed.model.sources
     row, result = rows.legs[leg], np.zeros(len(observed.chosen))
@@ -188,44 +197,44 @@ def _place_motions(observed: Observation, sizes: Array, paths: tuple[str, ...]) 
     result = {}
     for number, path in enumerate(paths):
         if path in known:
-            way = np.zeros(len(sizes))
-            way[known.index(path)] = 1.0 / sizes[known.index(path)]
-            result[number] = way
+            result[number] = np.zeros(len(sizes))
+            result[number][known.index(path)] = 1.0 / sizes[known.index(path)]
     return result
 
 
-def _sentence(way: Array, observed: Observation) -> str:
+def _sentence(combination: Array, observed: Observation) -> str:
     """Name the largest parts of a combination."""
-    order = [int(i) for i in np.argsort(-np.abs(way)) if abs(way[i]) > LEAST_NAMED_PART * np.abs(way).max()]
-    parts = [f"{way[i] / np.abs(way).max():+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
+    shares = combination / np.abs(combination).max()
+    order = [int(i) for i in np.argsort(-np.abs(combination)) if abs(shares[i]) > LEAST_NAMED_PART]
+    parts = [f"{shares[i]:+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
     more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
     if len(order) == 1:
         return f"The {observed.unknowns[order[0]].words} changes nothing that was measured."
     return f"Only other combinations than this one are seen: {', '.join(parts)}{more}."
 
 
-def _combination(words: str, way: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
-    values = way / np.abs(way).max() * sizes
-    moved = twists @ values
-    parts = {
-        u.path: float(v) for u, v in zip(observed.unknowns, values, strict=True) if abs(v) > 1e-9 * np.abs(values).max()
-    }
-    left = moved - _undone_by_frames(moved, observed)
-    tool, inside = (float(np.linalg.norm(each[:, 3:], axis=1).max()) for each in (moved, left))
+def _combination(words: str, combination: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
+    """Describe a combination, scaled so that its largest part is a plausible size."""
+    values = combination / np.abs(combination).max() * sizes
+    least = NO_PART * np.abs(values).max()
+    parts = {u.path: float(v) for u, v in zip(observed.unknowns, values, strict=True) if abs(v) > least}
+    motions = twists @ values
+    remaining = motions - _undone_by_frames(motions, observed)
+    tool, inside = (float(np.linalg.norm(each[:, 3:], axis=1).max()) for each in (motions, remaining))
     return Unseen(words, parts, tool, inside if inside > ROUND_OFF_OF_MOTION * tool else 0.0)
 
 
 def _undone_by_frames(moved: Array, observed: Observation) -> Array:
     """The part of motions of the tool that motions of the base and of the target can make [n x 6]."""
     count, tool = len(moved), observed.model.drawn.tool
-    ways = []
+    columns = []
     for turning, moving in product((0.0, 1.0), np.eye(3)):
         axis = np.broadcast_to(moving, (count, 3))
         still = np.zeros((count, 3))
-        ways.append(np.concatenate([axis, cross(axis, tool)] if turning else [still, axis], axis=1).ravel())
+        columns.append(np.concatenate([axis, cross(axis, tool)] if turning else [still, axis], axis=1).ravel())
         arm = np.einsum("nij,j->ni", observed.model.drawn.axes, moving)
-        ways.append(np.concatenate([arm, still] if turning else [still, arm], axis=1).ravel())
+        columns.append(np.concatenate([arm, still] if turning else [still, arm], axis=1).ravel())
     unit = np.tile([observed.model.length] * 3 + [1.0] * 3, count)
-    columns = np.stack(ways, axis=1) * unit[:, None]
-    share = np.linalg.lstsq(columns, moved.ravel() * unit, rcond=1e-10)[0]
-    return np.asarray((columns @ share / unit).reshape(count, 6))
+    matrix = np.stack(columns, axis=1) * unit[:, None]
+    share = np.linalg.lstsq(matrix, moved.ravel() * unit, rcond=SAME_AS_FRAMES)[0]
+    return np.asarray((matrix @ share / unit).reshape(count, 6))
