@@ -96,6 +96,8 @@ LEAST_LENGTH = 1e-15
 """The same, m, where that point is the origin itself, as far as the machine knows: smaller than an atom."""
 NO_LINK = 1e-9
 """Length of a link, m, below which it has no direction."""
+SAME_RAY = 1e-9
+"""Sine of the angle between two rays below which an arc from one to the other is straight, and turns about no axis."""
 
 # Errors of the tool by tolerances
 
@@ -116,6 +118,8 @@ of their length, and the screws of redundant legs then differ by some of that.""
 AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
+ROUND_OFF_AT_REST = 1e-13
+"""The same for the step that Newton's method foresees: one that would be smaller is not taken."""
 
 NEARLY_AT_REST = 1e-6
 """Step of a descent, in the same units, from which Newton's steps take over: half of the digits, as far as differences
@@ -127,6 +131,8 @@ BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
 HANGING = 1e-13
 """Share of a cable's length below which a step towards its shape is round-off; as level a cable hangs straight down."""
+SURELY_HANGING = 1e-10
+"""The same below which the shape is good after the last step that was allowed, with three digits less."""
 SAME_DIRECTION = 1e-13
 """Change of a cable's direction, or of where it leaves its pulley, m, below which it is round-off."""
 DEGENERATE_FACE = 1e-10
@@ -176,6 +182,8 @@ NO_TURN = 1e-12
 
 # Studies
 
+ROUND_OFF_OF_SHARE = 1e-12
+"""Difference of a share from the one that is asked for, or size of an entry of a unit vector, that is round-off."""
 NO_ROLE = 1e-9
 """Share of an entry of C or K below which an element has no part in it: its contribution is then round-off."""
 NO_INFLUENCE = 1e-9

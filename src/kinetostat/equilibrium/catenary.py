@@ -12,7 +12,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import HANGING, UNRESISTED
+from kinetostat.tolerances import HANGING, SURELY_HANGING, UNRESISTED
 
 MOST_STEPS = 30
 """Most steps of Newton's method for slope and length of a cable: three or four unless it hangs like a chain."""
@@ -131,7 +131,7 @@ def hanging_cables(level: Array, rise: Array, tension: Array, weight: Array, rig
             slope, length = slope + step[..., 0], np.abs(length + step[..., 1])
             if not (np.abs(step).max(axis=-1) > HANGING * np.hypot(level, rise)).any():
                 break
-    good = np.abs(step).max(axis=-1) <= HANGING * 1e3 * np.hypot(level, rise)
+    good = np.abs(step).max(axis=-1) <= SURELY_HANGING * np.hypot(level, rise)
     length = np.where(good, length, np.nan)
     return Hanging(tension * np.cos(slope), tension * np.sin(slope), weight, rigidity, length)
 

@@ -8,7 +8,7 @@ Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -83,27 +83,18 @@ def cut(mechanism: Mechanism) -> Cut | None:
     for leg in mechanism.legs:
         if leg.rod is None:
             continue
-        slides = [
-            n for n in range(leg.chain.twists.shape[1]) if all(is_zero(c) for c in leg.chain.twists[0, n, :3].tolist())
-        ]
+        twists = leg.chain.twists[0]
+        slides = [n for n in range(len(twists)) if all(is_zero(c) for c in twists[n, :3].tolist())]
         springs = [leg.chain.coordinate[n] for n in slides if leg.chain.coordinate[n] >= 0]
         if not springs:
             return None  # nothing of it deflects
+        # What the rod carries beyond its slide goes with the platform.
         heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
         masses.append(leg.masses.of(heavy))
         if all(leg.springs[number] is not None for number in springs):
-            soft = [1.0 / leg.stiffness[0, number] for number in springs]
-            given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
-            given += [
-                -mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.chain.given) if n >= 0
-            ]
-            signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
-            rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
-            if rotors and len(springs) > 1:
+            if len(springs) > 1 and not all(is_zero(rotor) for rotor in leg.rotors[0].tolist()):
                 return None  # a rotor between two springs has a motion of its own
-            driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
-            sign = signs[0] if signs else 0.0
-            rods.append(ElasticRod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
+            rods.append(_elastic_rod(mechanism, leg, springs))
     wrenches = len(rods) + sum(mechanism.ways.shape[1] - leg.springs.count(None) for leg in legs)
     if legs and (
         any(rod.sign for rod in rods)
@@ -112,6 +103,21 @@ def cut(mechanism: Mechanism) -> Cut | None:
     ):
         return None
     return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods), tuple(legs))
+
+
+def _elastic_rod(mechanism: Mechanism, leg: ElasticLeg, springs: Sequence[int]) -> ElasticRod:
+    """A leg that is a rod with its springs in a row as one; `springs` are the numbers of their coordinates."""
+    if leg.rod is None:
+        raise ValueError(f"{leg.name} is not a rod")
+    softness = [1.0 / leg.stiffness[0, number] for number in springs]
+    given = [soft * leg.preload[0, number] for soft, number in zip(softness, springs, strict=True)]
+    links = [number - len(mechanism.actuators) for number in leg.chain.given]
+    given += [-mechanism.growth[0, link] for link in links if link >= 0]
+    signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
+    rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
+    driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
+    sign = signs[0] if signs else 0.0
+    return ElasticRod(*leg.rod, total(softness), total(given), sign, driven, total(rotors))
 
 
 def _without_spin(leg: ElasticLeg) -> ElasticLeg:

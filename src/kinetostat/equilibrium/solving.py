@@ -18,7 +18,7 @@ from kinetostat.equilibrium.tangent import solve, stabilities
 from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
-from kinetostat.tolerances import AT_REST, ZERO_PIVOT
+from kinetostat.tolerances import AT_REST, ROUND_OFF_AT_REST, ZERO_PIVOT
 
 MOST_STEPS_OF_LOAD = 25
 """Number of Newton's steps for one step of the load."""
@@ -215,7 +215,7 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
         move=partial(state_after, mechanism),
         most_steps=most_steps,
         settled=AT_REST,
-        round_off=1e-3 * AT_REST,
+        round_off=ROUND_OFF_AT_REST,
         longest=LONGEST_STEP,
         size=partial(motion_of, mechanism),
     )

@@ -27,7 +27,7 @@ from kinetostat.machine.column import column, plain
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Step
-from kinetostat.tolerances import SURELY_APART
+from kinetostat.tolerances import SAME_RAY, SURELY_APART
 
 Way = Callable[[Array], Coordinates]
 """From the share of the way that is done in each problem [problems] to coordinates of the platform there."""
@@ -117,9 +117,10 @@ def around_the_base(problems: Problems, goal: Coordinates) -> Way:
     angle = np.arctan2(np.linalg.norm(across, axis=1), (start * end).sum(axis=1))
 
     def way(share: Array) -> Coordinates:
-        slender = np.where(np.sin(angle) > 1e-9, np.sin(angle), 1.0)
-        first = np.where(np.sin(angle) > 1e-9, np.sin((1.0 - share) * angle) / slender, 1.0 - share)
-        last = np.where(np.sin(angle) > 1e-9, np.sin(share * angle) / slender, share)
+        curved = np.sin(angle) > SAME_RAY
+        sine = np.where(curved, np.sin(angle), 1.0)
+        first = np.where(curved, np.sin((1.0 - share) * angle) / sine, 1.0 - share)
+        last = np.where(curved, np.sin(share * angle) / sine, share)
         size = sizes[0] + (sizes[1] - sizes[0]) * share
         return frame.at(share, (start * first[:, None] + end * last[:, None]) * size[:, None])
 

@@ -20,7 +20,7 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import INFINITE, combine, free_springs_as_joints
-from kinetostat.machine.leg import Spring
+from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration
@@ -72,36 +72,39 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
     if len(columns) < SIZE:
         return Transmission((), (), False, None, (), configuration.length, 0.0)
     balance, null, margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
-    shares, internal, pairs, constraints = [], [], [], list(guide)
-    at, decided, doubtful = 0, True, False
+    shares, internal, driving, constraints = [], [], [], list(guide)
+    first, each_drive_moves, doubtful = 0, True, False
     for leg, screws in zip(configuration.legs, rigid, strict=True):
-        size = len(screws.wrenches)
-        rows = [
-            row
-            for spring, row in zip(leg.springs, screws.loads, strict=True)
-            if spring.actuated and not is_zero(spring.stiffness)
-        ]
+        rows = _loads_of_drives(leg, screws)
         for row in rows:
-            amounts = [total([c * balance[at + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
+            # The load of the drive by the amounts of the leg's wrenches that balance a unit wrench, or each other.
+            amounts = [total([c * balance[first + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
             shares.append(Twist(Vector(*amounts[:3]) * shrink, Vector(*amounts[3:])))
-            internal.append(tuple(total([c * column[at + i] for i, c in enumerate(row)]) for column in null))
-        driving, passive = _by_drives(screws.wrenches, rows)
-        decided, doubtful = decided and driving is not None, doubtful or bool(passive)
-        pairs += driving or []
-        constraints += passive
-        at += size
+            internal.append(tuple(total([c * column[first + i] for i, c in enumerate(row)]) for column in null))
+        of_drives, undriven = _by_drives(screws.wrenches, rows)
+        each_drive_moves, doubtful = each_drive_moves and of_drives is not None, doubtful or bool(undriven)
+        driving += of_drives or []
+        constraints += undriven
+        first += len(screws.wrenches)
     return Transmission(
-        tuple(shares),
-        tuple(internal),
-        doubtful,
-        tuple(pairs) if decided else None,
-        tuple(wrench * _reciprocal_size(_components_in_newtons(wrench, shrink)) for wrench in constraints),
-        configuration.length,
-        margin,
+        shares=tuple(shares),
+        internal=tuple(internal),
+        doubtful=doubtful,
+        wrenches=tuple(driving) if each_drive_moves else None,
+        constraints=tuple(wrench * _reciprocal_size(_components_in_newtons(wrench, shrink)) for wrench in constraints),
+        length=configuration.length,
+        margin=margin,
     )
 
 
+def _loads_of_drives(leg: Leg, screws: LegScrews) -> list[tuple[Scalar, ...]]:
+    """For each drive of a leg that holds something, its load per unit of each wrench of the leg."""
+    pairs = zip(leg.springs, screws.loads, strict=True)
+    return [row for spring, row in pairs if spring.actuated and not is_zero(spring.stiffness)]
+
+
 def _components_in_newtons(wrench: Wrench, shrink: Scalar) -> tuple[Scalar, ...]:
+    """The components of a wrench with its moment over the characteristic length, N; `shrink` is 1 over that, 1/m."""
     return (*(wrench.rotational * shrink).components(), *wrench.translational.components())
 
 
@@ -356,7 +359,7 @@ def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: sli
         needed = size if turning else size * reciprocal(grow)
         radius = smaller(where(felt, face.room * reciprocal(where(felt, needed, 1.0)), _reach_if_unfelt(face)), radius)
     stopped = total([where(inverse > 0.0, 1.0, 0.0) for inverse in structure.inverses]) if structure else 0.0
-    return where(stopped < 2.5, radius, math.nan)
+    return where(stopped < SIZE // 2 - 0.5, radius, math.nan)  # of three motions in a block, one is left
 
 
 def greatest_acceleration_along(faces: Sequence[Face], given: Transmission, row: int) -> Scalar:

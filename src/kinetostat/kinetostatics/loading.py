@@ -227,7 +227,7 @@ def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twi
         return []
     scale = np.repeat([length, 1.0], 3)
     columns = np.array([twist.components() for twist in passive], dtype=float).T * scale[:, None]
-    amounts = np.linalg.lstsq(columns, np.array(left.components(), dtype=float) * scale, rcond=1e-9)[0]
+    amounts = np.linalg.lstsq(columns, np.array(left.components(), dtype=float) * scale, rcond=DEPENDENT_WRENCHES)[0]
     return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
 
 

@@ -66,6 +66,8 @@ STATISTICS = {
 }
 """The statistics of a measure, and what people call them."""
 SHARE_KEYS = ("line", "leg", "group", "path")
+LEAST_NAMED_SHARE = 0.005
+"""Share of the variance below which a line of [tolerances] is not named: it would be written as 0 %."""
 ROUND_OFF_SHARE = 1e-9
 """Share of an error below which a part of it is round-off."""
 DRAWN_DIGITS = 3
@@ -416,7 +418,11 @@ def _message(answer: Budget) -> str:
     first = f"95 % of all machines are off by at most {size} {where}{many} (worst case {most})."
     if not worst:
         return f"The tolerances do not move the tool {where}. {answer.loads_left_out}".strip()
-    ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in answer.shares_by("line").items() if share > 0.005]
+    ranked = [
+        f"{name} ({100.0 * share:.0f} %)"
+        for name, share in answer.shares_by("line").items()
+        if share > LEAST_NAMED_SHARE
+    ]
     sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
     if answer.freedoms < len(answer.machine.family.components):
         sentences.append(_parasitic_sentence(answer, pose))

@@ -221,16 +221,12 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     if status is not Status.OK:
         why = FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal
         return Sensitivity(machine, status, why, loads_left_out=uncounted)
-    length = float(response.configuration.length)
     pairs = zip(names, answer.values[:, 0].tolist(), strict=True)
     indices = np.array([_without_round_off(machine, name, value, response) for name, value in pairs])
     slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
-    known = [p for p in candidates if not reasons[p.path]]
-    influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
-    ranked = tuple(strongest_first([item for item in influences if item.greatest > NO_INFLUENCE]))
-    without_influence = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
-    without_derivative = tuple((path, reason) for path, reason in reasons.items() if reason)
+    length = float(response.configuration.length)
+    influences = [_influence(p, here, indices, slopes[p.path], length) for p in candidates if not reasons[p.path]]
     return Sensitivity(
         machine=machine,
         status=status,
@@ -238,9 +234,9 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
         quantities=names,
         indices=indices,
         characteristic_length=length,
-        parameters=ranked,
-        without_influence=without_influence,
-        without_derivative=without_derivative,
+        parameters=tuple(strongest_first([item for item in influences if item.greatest > NO_INFLUENCE])),
+        without_influence=tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE),
+        without_derivative=tuple((path, reason) for path, reason in reasons.items() if reason),
         loads_left_out=uncounted,
     )
 
@@ -264,26 +260,24 @@ def _without_round_off(machine: Machine, name: str, value: float, response: Resp
 def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
     """Whether any of the quantities may depend on a parameter."""
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
-    loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
-    accelerated = needs_masses(names)
+    inertial = any(quantity.modal for quantity in wanted) or needs_masses(names)
     if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in wanted):
         return here[path] != 0.0
-    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(VIBRATION_FIELDS) and not (modal or accelerated)):
+    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(VIBRATION_FIELDS) and not inertial):
         return False
-    modal = modal or accelerated
     if parameter.quantity.kind == "inertia":
-        return modal
-    massive = KINDS[parameter.quantity.kind].heavy or path.startswith("drives.")
-    if modal and massive and not path.startswith("tool."):
+        return inertial
+    of_mass = KINDS[parameter.quantity.kind].heavy or path.startswith("drives.")
+    if inertial and of_mass and not path.startswith("tool."):
         return here[path] != 0.0  # a link or rotor without mass has no motion of its own
-    if loaded:
+    if rest_numbers(machine, names, limited=False):
         return not path.startswith(TENSION_BOUNDS)
     driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
     if driven and path.startswith(("load.", "tool.")):
         return not path.startswith(TENSION_BOUNDS)  # to first order, actuators carry the loads and the platform
-    if ".centre_of_mass." in path or (modal and path.startswith("tool.")):
-        return modal
-    return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not massive)
+    if ".centre_of_mass." in path or (inertial and path.startswith("tool.")):
+        return inertial
+    return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not of_mass)
 
 
 def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[str, list[float]]) -> str:
@@ -306,15 +300,7 @@ def _influence(
     else:
         size, measure = measure_of(kind, here[path], length)
     percents = relative_sensitivity(np.array(slopes), size, indices)
-    return Influence(
-        path,
-        kind,
-        here[path],
-        size,
-        measure,
-        np.array(slopes, dtype=float),
-        percents,
-    )
+    return Influence(path, kind, here[path], size, measure, np.array(slopes, dtype=float), percents)
 
 
 def notes(answer: Sensitivity) -> Iterator[str]:

@@ -48,6 +48,8 @@ BORDER_VARIABLES = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
+HALF_STEP = 0.5001
+"""Distance from a node, in steps of the grid, within which a pose belongs to it, with some room for round-off."""
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
@@ -291,7 +293,7 @@ def _home(question: GridQuestion) -> tuple[int, ...] | None:
     here, node = values(question.machine), _nearest(question)
     for axis, place in zip(question.grid.axes, node, strict=True):
         apart = abs(axis.values[place] - float(here[axis.paths[0]]))
-        if apart > 0.5001 * float(axis.values[1] - axis.values[0]):
+        if apart > HALF_STEP * float(axis.values[1] - axis.values[0]):
             return None
     return tuple(node)
 

@@ -48,6 +48,8 @@ MOST_LEGS, MOST_JOINTS = 24, 24
 CABLE_KEYS = ("from", "to", "stiffness", "preload")
 """Fields of a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""
 
+LARGEST_NUMBER = 1e100
+"""Size of numbers in a matrix beyond which they are a slip: their products would overflow."""
 SYMMETRIC = 1e-9
 """Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
 
@@ -400,5 +402,5 @@ def _numbers(value: object, count: int) -> bool:
     return (
         isinstance(value, list)
         and len(value) == count
-        and all(isinstance(c, int | float) and not isinstance(c, bool) and abs(c) < 1e100 for c in value)
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and abs(c) < LARGEST_NUMBER for c in value)
     )

@@ -17,6 +17,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.tolerances import ROUND_OFF_OF_SHARE
 
 POINTS_AT_ONCE = 1 << 20
 """Points that are evaluated before they are summed up: a few quantities of them fit in a hundred megabytes."""
@@ -157,7 +158,7 @@ def _outcome(problem: Problem, objectives: Array, constraints: Array, status: Co
     verdict[infinite], violation[infinite] = DesignVerdict.NOT_FINITE, most + 1.0
     counts = np.stack([(status == code).sum(axis=1) for code in Status])
     missing = problem.poses.required - counts[0] / status.shape[1]
-    lacking = (missing > 1e-12) | (counts[0] == 0)
+    lacking = (missing > ROUND_OFF_OF_SHARE) | (counts[0] == 0)
     verdict[lacking] = VERDICT_BY_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
     violation[lacking] = most + 2.0 + missing[lacking]
     known = np.where(lacking[:, None], np.nan, objectives)

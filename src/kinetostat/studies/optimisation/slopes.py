@@ -19,6 +19,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.assessment import deviations
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.terms import PoseTerm, Term
+from kinetostat.tolerances import ROUND_OFF_OF_SHARE
 
 BOUND_DISTANCE = 1e-6
 """A variable is at its bound if its gene is within this distance of it."""
@@ -58,7 +59,7 @@ class Local:
     def sound(self) -> bool:
         """Whether enough poses are reached, and all numbers at them are finite."""
         share = self.reached.mean() if self.reached.size else 0.0
-        enough = bool(share >= self.problem.poses.required - 1e-12 and self.reached.any(axis=-1).all())
+        enough = bool(share >= self.problem.poses.required - ROUND_OFF_OF_SHARE and self.reached.any(axis=-1).all())
         arrays = [*self.values.values(), *self.slopes.values()]
         return enough and all(bool(np.isfinite(np.where(self.reached, array, 0.0)).all()) for array in arrays)
 
@@ -225,7 +226,8 @@ def _aligned_basis(flat: Array) -> Array:
     """Return a basis of the same directions in which each changes few variables, by reduction of columns."""
     directions = flat.copy()
     for k in range(directions.shape[1]):
-        pivot = int(np.argmax(np.abs(directions[:, k:]).max(axis=1) * (np.abs(directions[:, :k]).sum(axis=1) < 1e-12)))
+        unused = np.abs(directions[:, :k]).sum(axis=1) < ROUND_OFF_OF_SHARE
+        pivot = int(np.argmax(np.abs(directions[:, k:]).max(axis=1) * unused))
         column = k + int(np.argmax(np.abs(directions[pivot, k:])))
         directions[:, [k, column]] = directions[:, [column, k]]
         directions[:, k] /= directions[pivot, k]

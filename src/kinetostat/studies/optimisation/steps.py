@@ -181,7 +181,7 @@ def _new(fresh: Array, known: Array) -> Integers:
 
 ITERATIONS = 100
 """Of one descent."""
-PRECISION = {False: 1e-13, True: 1e-9}
+PRECISION, PRECISION_WITH_KINKS = 1e-13, 1e-9
 """Relative change of the objective at which a descent ends, without and with kinks: along the bottom of a curved one
 it would creep for thousands of steps."""
 WORST_POSES = 24
@@ -305,35 +305,33 @@ class _Descent:
         return sign * value, sign * slope
 
     def _minimise(self, genes: Array, scale: float, kinked: bool) -> Array:
-        """One call of the solver; in the epigraph the last unknown is the bound t."""
-        count = len(genes)
-        sign = self.problem.objectives[0].sign
+        """Minimise the objective from some genes, in units of `scale`; by its epigraph where it has kinks."""
+        bounds = [(0.0, 1.0)] * len(genes)
         conditions = [self._condition(c.term, c.sign, c.bound, c.scale) for c in self.problem.constraints]
+        if not kinked:
+            return self._solution(lambda x: self._scaled_objective(x, scale), genes, bounds, conditions, PRECISION)
+        # The least t that no value at the worst poses passes: t is one more unknown, and what is minimised.
+        worst = self._at(genes).worst(self._term, WORST_POSES)
+        unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
+        conditions.append(
+            {
+                "type": "ineq",
+                "fun": lambda x: self._below_bound(x, worst, scale)[0],
+                "jac": lambda x: self._below_bound(x, worst, scale)[1],
+            }
+        )
+        bounds = [*bounds, (-BLOCKED, BLOCKED)]
+        return self._solution(_last_unknown, unknowns, bounds, conditions, PRECISION_WITH_KINKS)
 
-        def plain(x: Array) -> tuple[float, Array]:
-            here = self._at(x)
-            if not here.sound:
-                return BLOCKED, np.zeros(count)
-            value, slope = self._objective(here)
-            return value / scale, slope / scale
-
-        worst = self._at(genes).worst(self._term, WORST_POSES) if kinked else np.empty(0, dtype=np.int64)
-
-        def pieces(x: Array) -> tuple[Array, Array]:
-            here, rows = self._at(x[:count]), np.zeros((len(worst), count + 1))
-            rows[:, count] = 1.0
-            if not here.sound:
-                return np.full(len(worst), x[count] - BLOCKED), rows
-            values, slopes = here.pieces(self._term, worst)
-            rows[:, :count] = -sign * slopes / scale
-            return x[count] - sign * values / scale, rows
-
-        unknowns, bounds, function = genes, [(0.0, 1.0)] * count, plain
-        if kinked:
-            unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
-            bounds = [*bounds, (-BLOCKED, BLOCKED)]
-            conditions.append({"type": "ineq", "fun": lambda x: pieces(x)[0], "jac": lambda x: pieces(x)[1]})
-            function = _last_unknown
+    def _solution(
+        self,
+        function: Callable[[Array], tuple[float, Array]],
+        unknowns: Array,
+        bounds: list[tuple[float, float]],
+        conditions: list[dict[str, Any]],
+        precision: float,
+    ) -> Array:
+        """The genes of the least value that the solver (sequential quadratic programming) comes to."""
         solution = optimize.minimize(
             function,
             unknowns,
@@ -341,9 +339,28 @@ class _Descent:
             bounds=bounds,
             constraints=conditions,
             method="SLSQP",
-            options={"maxiter": ITERATIONS, "ftol": PRECISION[kinked]},
+            options={"maxiter": ITERATIONS, "ftol": precision},
         )
-        return np.clip(solution.x[:count], 0.0, 1.0)
+        return np.clip(solution.x[: len(self.survey.free)], 0.0, 1.0)
+
+    def _scaled_objective(self, genes: Array, scale: float) -> tuple[float, Array]:
+        """The objective and its derivatives, in units of its size at the start."""
+        here = self._at(genes)
+        if not here.sound:
+            return BLOCKED, np.zeros(len(genes))
+        value, slope = self._objective(here)
+        return value / scale, slope / scale
+
+    def _below_bound(self, unknowns: Array, worst: Integers, scale: float) -> tuple[Array, Array]:
+        """By how much the values at the worst poses are below the bound t, the last unknown, and the derivatives."""
+        count, sign = len(unknowns) - 1, self.problem.objectives[0].sign
+        here, rows = self._at(unknowns[:count]), np.zeros((len(worst), count + 1))
+        rows[:, count] = 1.0
+        if not here.sound:
+            return np.full(len(worst), unknowns[count] - BLOCKED), rows
+        values, slopes = here.pieces(self._term, worst)
+        rows[:, :count] = -sign * slopes / scale
+        return unknowns[count] - sign * values / scale, rows
 
     def _condition(self, term: Any, sign: float, bound: float, scale: float) -> dict[str, Any]:
         """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""
