@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.toleranced_parts import RandomInputs, TolerancedPart, random_inputs, toleranced_parts
 from kinetostat.accuracy.tool_error import (
@@ -180,27 +179,6 @@ class Budget(ImmutableAnswer):
         return [place for place, _ in ranking_of(dict(enumerate(row.tolist())))]
 
 
-@dataclass(frozen=True)
-class PossibleErrors:
-    """Every number of a machine that may be off, with the machine and its tolerances."""
-
-    machine: Machine
-    errors: tuple[MachineError, ...]
-
-
-def possible_errors(machine: Machine | MachineState) -> PossibleErrors:
-    """List every number of a machine that may be off.
-
-    Args:
-        machine: as drawn, with or without tolerances; or its state, as `state_of` returns it.
-
-    Raises:
-        InputError: it has no place at its pose.
-    """
-    state = state_of(machine)
-    return PossibleErrors(state.machine, error_model(state, {}, 1).errors)
-
-
 @checked
 def budget(
     machine: Machine | MachineState,
@@ -250,14 +228,14 @@ def budget(
     if count > MOST_BUDGET_POSES:
         raise InputError(f"there are {count:,} poses; at most {MOST_BUDGET_POSES:,} are computed: lower their number.")
     direction = np.array(unit_direction(along, "along")) if len(along) else None
-    work = _Work(state, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1)
+    sums = _Sums(state, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1)
     status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
-    step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
+    step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // sums.samples))
     for start in range(0, count, step):
         rows = slice(start, min(start + step, count))
-        status[rows] = work.add({path: column[rows] for path, column in leaves.items()}, rows.stop - start)
+        status[rows] = sums.add({path: column[rows] for path, column in leaves.items()}, rows.stop - start)
         progress(rows.stop, count)
-    return _answer(work, status, question, columns, exact, allocate, by)
+    return _answer(sums, status, question, columns, exact, allocate, by)
 
 
 def _check(poses: Any, ranges: Sequence[str], samples: int, exact: int, by: str, seed: int) -> None:
@@ -284,8 +262,16 @@ def _points(question: GridQuestion | None, columns: PoseColumns | None) -> tuple
     return ({}, 1) if columns is None else (columns.leaves, columns.count)
 
 
-class _Work:
-    """Adds up the answer, some poses at a time; every pose has the same machines."""
+class _Sums:
+    """Adds up the answer, some poses at a time; every pose has the same machines.
+
+    Attributes:
+        pressed: at which poses the load presses each part, a table for each addition [poses x parts].
+        spreads: where an addition has results [poses], and these.
+        reach: what each part does to the leading measure, see `allocation.reach_of`.
+        largest: of each drawn machine the largest error over all poses [machines x measures].
+        squares: variances of the measures by part, all poses together [measures x parts].
+    """
 
     def __init__(
         self,
@@ -296,6 +282,7 @@ class _Work:
         seed: int,
         many: bool,
     ) -> None:
+        """Begin; arguments are those of `budget`, and whether there are many poses."""
         self.state, self.lines, self.along, self.samples, self.seed = state, lines, along, samples, seed
         self.parts: tuple[TolerancedPart, ...] = ()
         self.many, self.pressed = many, list[Mask]()
@@ -348,7 +335,7 @@ def _clean(rates: Array, length: float) -> Array:
 
 
 def _answer(
-    work: _Work,
+    sums: _Sums,
     status: Integers,
     question: GridQuestion | None,
     columns: PoseColumns | None,
@@ -356,21 +343,21 @@ def _answer(
     allocate: float | str | None,
     by: str,
 ) -> Budget:
-    inputs, measures = work.inputs, work.measures
+    inputs, measures = sums.inputs, sums.measures
     if inputs is None or measures is None:
         first = Status(int(status[0]))
         where = "the pose" if len(status) == 1 else "all poses"
         raise InputError(
-            f"{work.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence} "
+            f"{sums.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence} "
             f"{columns.unit_doubt if columns else ''}".rstrip()
         )
-    bearing = np.concatenate(work.pressed)
-    at_any = [part.path for number, part in enumerate(work.parts) if bearing[:, number].any()]
-    at_all = [part.path for number, part in enumerate(work.parts) if bearing[:, number].all()]
+    bearing = np.concatenate(sums.pressed)
+    at_any = [part.path for number, part in enumerate(sums.parts) if bearing[:, number].any()]
+    at_all = [part.path for number, part in enumerate(sums.parts) if bearing[:, number].all()]
     answer = Budget(
-        machine=work.machine,
-        tolerances=tuple(work.lines.values()),
-        parts=work.parts,
+        machine=sums.machine,
+        tolerances=tuple(sums.lines.values()),
+        parts=sums.parts,
         pressed=tuple(at_any),
         sometimes=tuple(path for path in at_any if path not in at_all),
         poses=columns,
@@ -378,33 +365,33 @@ def _answer(
         status=status,
         measures=measures.names,
         units=tuple(measures.units[name] for name in measures.names),
-        spread=_whole(work, len(measures.names)),
-        shares=shares(np.asarray(work.squares)),
-        freedoms=work.freedoms,
-        parasitic=work.parasitic,
-        samples=work.samples,
-        exact=exact_sample(work.machine, inputs, measures, _power(exact), work.seed) if exact else None,
+        spread=_whole(sums, len(measures.names)),
+        shares=shares(np.asarray(sums.squares)),
+        freedoms=sums.freedoms,
+        parasitic=sums.parasitic,
+        samples=sums.samples,
+        exact=exact_sample(sums.machine, inputs, measures, _power(exact), sums.seed) if exact else None,
         allocation=None,
         message="",
-        loads_left_out=work.state.left_out,
+        loads_left_out=sums.state.left_out,
     )
     if allocate is not None:
         wanted = positive(allocate, "length", "allocate, the wanted error,")
-        allocation = allocation_for(work.parts, work.reach, wanted, by, answer.leading)
+        allocation = allocation_for(sums.parts, sums.reach, wanted, by, answer.leading)
         answer = replace(answer, allocation=allocation)
     return replace(answer, message=_message(answer))
 
 
-def _whole(work: _Work, size: int) -> Spread:
+def _whole(sums: _Sums, size: int) -> Spread:
     """The spreads of all slabs of poses as one, NaN where there is no result."""
     parts: dict[str, list[Array]] = {name: [] for name in ("mean", "rms", "rss", "worst", "usual")}
-    for settled, spread in work.spreads:
+    for settled, spread in sums.spreads:
         for name, tables in parts.items():
             table = np.full((len(settled), size), np.nan)
             if spread is not None:
                 table[settled] = getattr(spread, name)
             tables.append(table)
-    everywhere = np.percentile(np.asarray(work.largest), USUAL_PERCENT, axis=0)
+    everywhere = np.percentile(np.asarray(sums.largest), USUAL_PERCENT, axis=0)
     return Spread(**{name: np.concatenate(tables) for name, tables in parts.items()}, everywhere=everywhere)
 
 
@@ -418,11 +405,8 @@ def _message(answer: Budget) -> str:
     first = f"95 % of all machines are off by at most {size} {where}{many} (worst case {most})."
     if not worst:
         return f"The tolerances do not move the tool {where}. {answer.loads_left_out}".strip()
-    ranked = [
-        f"{name} ({100.0 * share:.0f} %)"
-        for name, share in answer.shares_by("line").items()
-        if share > LEAST_NAMED_SHARE
-    ]
+    shares_of_lines = answer.shares_by("line").items()
+    ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in shares_of_lines if share > LEAST_NAMED_SHARE]
     sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
     if answer.freedoms < len(answer.machine.family.components):
         sentences.append(_parasitic_sentence(answer, pose))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from kinetostat.accuracy.model import PossibleErrors, possible_errors
 from kinetostat.accuracy.toleranced_parts import is_about
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
@@ -21,9 +22,7 @@ from kinetostat.studies.budget import (
     ROUND_OFF_SHARE,
     STATISTICS,
     Budget,
-    PossibleErrors,
     budget,
-    possible_errors,
 )
 from kinetostat.tolerances import LEAST_DIVISOR
 from kinetostat.units import KINDS
