@@ -20,7 +20,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL, Matrix, finite
-from kinetostat.spec.answer import ImmutableAnswer
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.tolerances import NO_UNIQUE_CENTRE, PURE_COUPLE, ZERO_EIGENSCREW
 
 ROTATION, TRANSLATION = slice(0, 3), slice(3, 6)

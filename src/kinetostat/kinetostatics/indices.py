@@ -23,7 +23,7 @@ from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.spec.answer import ImmutableAnswer
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike

@@ -15,7 +15,7 @@ from kinetostat.accuracy.toleranced_parts import RandomInputs, TolerancedPart
 from kinetostat.accuracy.tool_error import Measures
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.spec.answer import ImmutableAnswer
+from kinetostat.spec.immutable import ImmutableAnswer
 
 MOST_DECIDING_POSES = 40
 """Greatest number of poses that decide an allocation together: each is added because it exceeds the wanted error."""

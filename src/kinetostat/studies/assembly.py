@@ -18,10 +18,10 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.units import UnitError
 
 MOST_STARTS = 10_000

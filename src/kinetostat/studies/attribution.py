@@ -16,7 +16,7 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffn
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.machine.leg import Spring
-from kinetostat.spec.answer import ImmutableAnswer
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import EQUAL_STIFFNESSES
 

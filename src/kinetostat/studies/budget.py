@@ -34,10 +34,10 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
 from kinetostat.studies.allocation import Allocation, allocation_for, reach_of
 from kinetostat.studies.attribution import ranking_of

@@ -26,8 +26,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.motion.response import response_in_motion
 from kinetostat.motion.rigid import plan_of
 from kinetostat.numerics.polytopes import reach_along, vertices
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT

@@ -18,9 +18,9 @@ from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine, springs
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.datasets import ABOUT_STATUS
 from kinetostat.studies.grid import grid_question
 

@@ -30,9 +30,9 @@ from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.poses import PoseColumns, given_poses

@@ -21,10 +21,10 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import parse_range
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.design_numbers import DesignRow, rows_at_poses, rows_over
 from kinetostat.studies.requirements import Verdict, requirements

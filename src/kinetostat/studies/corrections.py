@@ -21,10 +21,10 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.commanding import (
     ActuatorTargets,
     Command,

@@ -28,10 +28,10 @@ from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS
 from kinetostat.motion.numbers import joints_of
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion

@@ -23,9 +23,9 @@ from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import PARTS, drive_forces
 from kinetostat.motion.operators import MachineAtPose, Operators, forces_along, operators
 from kinetostat.motion.rates import PoseRates
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,9 +31,9 @@ from kinetostat.kinetostatics.elements import (
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.poses import chosen_axes, grid_of

@@ -33,8 +33,8 @@ from kinetostat.kinetostatics.indices import (
     principal_compliances,
     stiffness_condition,
 )
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 
 LARGEST_COMPONENT = 1e100

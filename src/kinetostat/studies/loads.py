@@ -19,7 +19,7 @@ from kinetostat.kinetostatics.loading import deflection, held_compliance, joint_
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import springs
-from kinetostat.spec.answer import ImmutableAnswer
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.rounding import clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 

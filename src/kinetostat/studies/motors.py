@@ -22,10 +22,10 @@ from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity, quantities, table
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.drives import DriveLoads, drive_loads, root_mean_square
 from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.motions import Motion, read_motion, required_motion

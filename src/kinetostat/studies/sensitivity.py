@@ -29,9 +29,9 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import VIBRATION_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, data_name, parameters, values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
 from kinetostat.studies.quantities import (

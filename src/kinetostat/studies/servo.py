@@ -17,9 +17,9 @@ from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT

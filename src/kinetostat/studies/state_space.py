@@ -11,9 +11,9 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.vibration import modes
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.state_space import Equations

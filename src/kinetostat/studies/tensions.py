@@ -17,9 +17,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
 from kinetostat.numerics.polytopes import wrench_closure
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.poses import given_poses
 from kinetostat.studies.under_load import why_no_tensions
 

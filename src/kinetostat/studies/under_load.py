@@ -31,8 +31,8 @@ from kinetostat.kinetostatics.loading import DeflectedLink
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine, springs
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.attribution import Softest, softest
 from kinetostat.studies.rounding import clean_matrix, clean_screw, clean_statics
 from kinetostat.tolerances import LEAST_DIVISOR, ROUND_OFF_OF_ENTRY, UNMOVED_TOOL

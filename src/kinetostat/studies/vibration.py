@@ -20,10 +20,10 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import positive
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass

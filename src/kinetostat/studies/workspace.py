@@ -22,9 +22,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.datasets import LOADS_LEFT_OUT
 from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question

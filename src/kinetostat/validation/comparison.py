@@ -21,9 +21,9 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.installation import extra_command
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, RIGID_BLOCK_OF_ENGINE, ROUND_OFF_OF_ENTRY

@@ -22,6 +22,7 @@ from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, look_of, new_figure
+from kinetostat.views.loaded_tables import KINDS_OF_LOADS
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LAW_TOLERANCE,
@@ -36,8 +37,6 @@ from kinetostat.views.question import (
 )
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
-KINDS_OF_LOADS = ((False, "force"), (True, "moment"))
-"""Whether an actuator turns, and the kind of its load."""
 ROOM_ABOVE_CURVE = 1.15
 """Height of a panel with a single curve over its greatest value; it begins at zero, so that heights can be compared."""
 

@@ -14,6 +14,8 @@ from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiff
 from kinetostat.views.question import Lines
 from kinetostat.views.tables import FittedTable, numeric_table
 
+KINDS_OF_LOADS = ((False, "force"), (True, "moment"))
+"""Whether an actuator turns, and the kind of its load."""
 MOST_LISTED_SPRINGS = 12
 """Springs that have a row each: a machine with more has many alike, which are told by kind."""
 NOTHING_LOADS = "[load] has no force, no moment and no preload, and no mass under gravity"
@@ -63,23 +65,30 @@ def loaded_lines(state: LoadedState) -> Lines:
         yield "Stability", stability_of(state)
 
 
+def tool_motion(state: LoadedState) -> tuple[float, float]:
+    """Return how far the loads move the tool point, m, and turn the platform, rad."""
+    pairs = [*zip(state.components, state.displacement, strict=True)]
+    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
+    return moved, turned
+
+
 def sag_sentence(state: LoadedState) -> str:
     """Say how far the loads move and turn the tool."""
     show = state.machine.display.show_deflection
-    pairs = [*zip(state.components, state.displacement, strict=True)]
-    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
+    moved, turned = tool_motion(state)
     return f"The loads move the {state.machine.reference} by {show(moved, 'm')} and turn it by {show(turned, 'rad')}."
 
 
 def actuator_sentence(state: LoadedState) -> str:
     """Say which actuators carry most, and how much of their limits they use."""
     show, parts = state.machine.display.show, []
-    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
+    for turns, kind in KINDS_OF_LOADS:
         driven = [(name, load) for name, turning, load in actuator_loads(state) if turning is turns]
         if driven:
             name, load = max(driven, key=lambda pair: abs(pair[1]))
             way = "" if turns or not load else ", which pulls" if load > 0.0 else ", which pushes"
-            parts.append(f"the greatest {what} of an actuator is {show(abs(load), unit)} ({name}{way})")
+            size = show(abs(load), load_unit(turns))
+            parts.append(f"the greatest {kind} of an actuator is {size} ({name}{way})")
     if not parts:
         return ""
     text, use = "; ".join(parts), state.limit_use

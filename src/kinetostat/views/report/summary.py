@@ -6,6 +6,7 @@ Nothing is computed here but sums of shares.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,10 +23,11 @@ from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
+from kinetostat.units import load_unit
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.analysis_tables import first_lines, margin_sentence
 from kinetostat.views.drawing import three_views
-from kinetostat.views.loaded_tables import actuator_loads, loaded_lines
+from kinetostat.views.loaded_tables import KINDS_OF_LOADS, actuator_loads, loaded_lines, tool_motion
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
@@ -54,34 +56,36 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
 
 
 def _demands(answers: Answers, state: LoadedState) -> Table:
-    """A table of the displacements and errors of a loaded machine beside the requirements of its file."""
+    """Return a table of the displacements and errors of a loaded machine beside the requirements of its file."""
     display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
-    pairs = [*zip(state.components, state.displacement, strict=True)]
-    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
+    moved, turned = tool_motion(state)
+    across, about = (_verdicts(answers, prefix, "xyz") for prefix in ("displacement_", "displacement_r"))
     rows = [
-        (what, display.show_deflection(size, unit), _verdicts(answers, quantity, "xyz"))
-        for what, size, unit, quantity in (
-            ("displacement of the tool", moved, "m", "displacement_"),
-            ("rotation of the platform", turned, "rad", "displacement_r"),
-        )
+        ("displacement of the tool", display.show_deflection(moved, "m"), across),
+        ("rotation of the platform", display.show_deflection(turned, "rad"), about),
+        *_actuator_demands(answers, state),
     ]
-    for turns, unit, what in ((False, "N", "force"), (True, "N·m", "moment")):
-        loads = [abs(load) for _, turning, load in actuator_loads(state) if turning is turns]
-        if loads:
-            judged = _verdicts(answers, f"actuator_{what}", ("",))
-            bound = getattr(answers.machine.tables["limits"], f"actuator_{what}")
-            limit = [f"at most {display.show(bound, unit)}: {number(100.0 * max(loads) / bound, digits=3)} % used"]
-            shown = [*(limit if math.isfinite(bound) else []), *([judged] if judged else [])]
-            rows.append((f"greatest {what} of an actuator", display.show(max(loads), unit), "; ".join(shown)))
     if vibration and vibration.modes:
         first = display.show(vibration.modes[0].frequency, "Hz")
         rows.append(("first natural frequency", first, _verdicts(answers, "", ("frequency_1", "loaded_frequency_1"))))
     if error:
         usual = display.show_deflection(float(error.size("usual", "position")[0]), "m")
         rows.append(("error of the tool by tolerances, 95 %", usual, ""))
-    cells = tuple((what, typeset(size), typeset(demand or "no requirement")) for what, size, demand in rows)
+    cells = tuple((name, typeset(size), typeset(demand or "no requirement")) for name, size, demand in rows)
     caption = "The machine under its loads, and what its file demands."
     return Table(caption, ("", "at the pose", "demanded"), cells, (False, True, False))
+
+
+def _actuator_demands(answers: Answers, state: LoadedState) -> Iterator[tuple[str, str, str]]:
+    """Give the greatest load of the actuators of each kind, beside the limit and the requirements on it."""
+    for turns, kind in KINDS_OF_LOADS:
+        loads = [abs(load) for _, turning, load in actuator_loads(state) if turning is turns]
+        if loads:
+            shown = partial(answers.machine.display.show, unit=load_unit(turns))
+            bound = getattr(answers.machine.tables["limits"], f"actuator_{kind}")
+            used = f"at most {shown(bound)}: {number(100.0 * max(loads) / bound, digits=3)} % used"
+            demands = [used if math.isfinite(bound) else "", _verdicts(answers, f"actuator_{kind}", ("",))]
+            yield f"greatest {kind} of an actuator", shown(max(loads)), "; ".join(filter(None, demands))
 
 
 def _verdicts(answers: Answers, prefix: str, names: Iterable[str]) -> str:
