@@ -205,7 +205,7 @@ def _advance(update: "Callable[[int, int, str], None]", done: int, total: int, w
 
 
 def _in_words(question: Question, message: str) -> str:
-    """A message that begins with an argument of Python, in the words of the command line."""
+    """Return a message that begins with an argument of Python, in the words of the command line."""
     first, space, rest = message.partition(" ")
     flags = {option.name: option.flag for option in question.options if not option.first}
     return f"{flags.get(first, first)}{space}{rest}"

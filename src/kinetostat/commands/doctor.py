@@ -62,7 +62,7 @@ def _checks() -> "Iterator[InstallationCheck]":
 
 
 def _known_numbers() -> "Iterator[InstallationCheck]":
-    """The self-test, whose module needs every library: where one is broken, it does not load."""
+    """Return the self-test, whose module needs every library: where one is broken, it does not load."""
     from kinetostat.studies.self_test import checks
 
     yield from checks()

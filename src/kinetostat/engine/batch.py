@@ -324,7 +324,7 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
 
 
 def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
-    """The comparisons of points with their limits, slab by slab, with the part of the points that each slab is."""
+    """Give the comparisons of points with their limits, slab by slab, with the part of the points that each slab is."""
     size, judged_at_rest = len(next(iter(columns.values()))), "actuators" in rest_numbers(machine, ())
     slab = loaded.Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
     for start in range(0, size, slab):

@@ -50,7 +50,7 @@ class Work:
         return -(-self.points.size // self.chunk)
 
     def part(self, number: int) -> range:
-        """The points of a chunk; chunks are numbered from 0."""
+        """Return the points of a chunk; chunks are numbered from 0."""
         return range(number * self.chunk, min((number + 1) * self.chunk, self.points.size))
 
     def compute(self, number: int, threads: int | None = None) -> Evaluation:
@@ -213,7 +213,7 @@ def _on_cluster(distributed: Any, client: Any, work: Work, numbers: Sequence[int
 
 
 def _places(client: Any) -> int:
-    """Number of chunks that the cluster should hold; workers come and go."""
+    """Return the number of chunks that the cluster should hold; workers come and go."""
     return CHUNKS_AHEAD * max(1, sum(client.nthreads().values()))
 
 
@@ -226,5 +226,5 @@ def _on_worker(
 
 @lru_cache(8)
 def _machine(text: str) -> Machine:
-    """The machine of a file's text, made once for each process, so that its programs are compiled once."""
+    """Return the machine of a file's text, made once for each process, so that its programs are compiled once."""
     return build(parse(text, "the machine sent to this worker"), "the machine sent to this worker")

@@ -110,7 +110,7 @@ def evaluate_gradient(
 def _function(
     machine: Identical, varying: tuple[str, ...], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
 ) -> Function:
-    """The objectives and then their derivatives by each path as a function of what varies."""
+    """Return the objectives and then their derivatives by each path as a function of what varies."""
     modes = _modes_to_know(machine.value, weights, (*varying, *paths))
     native = native and not modes
 
@@ -287,7 +287,7 @@ class _Routes:
         return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 
     def _state(self, given: Sequence[Array], count: int, closed: bool) -> list[Array]:
-        """Coordinates of the states of rest, if any objective is about the machine under load."""
+        """Return the coordinates of the states of rest, if any objective is about the machine under load."""
         if not self._loaded:
             return []
         states = StatePrograms(self._machine, self._form, closed, self._native).rest_coordinates(
@@ -301,7 +301,7 @@ class _Routes:
         ]
 
     def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
-        """The modes that programs cannot find themselves, if any objective is about them."""
+        """Return the modes that programs cannot find themselves, if any objective is about them."""
         return mode_columns(with_values(self._machine, columns), count, self._modes) if self._modes else []
 
     def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:

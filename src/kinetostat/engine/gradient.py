@@ -32,7 +32,7 @@ def with_gradients(body: Body, inputs: Sequence[Traced]) -> Body:
 
 
 def gradient(result: Operand, inputs: Sequence[Traced]) -> list[Operand]:
-    """The derivative of a result by each of some inputs.
+    """Return the derivative of a result by each of some inputs.
 
     Args:
         result: a node, or a float that depends on nothing.
@@ -74,7 +74,7 @@ def active_nodes(results: Iterable[Node], inputs: Iterable[Traced]) -> list[Node
 
 
 def rule(node: Node) -> tuple[str, tuple[Operand, ...]]:
-    """The operation of a node and its operands, as derivatives see them."""
+    """Return the operation of a node and its operands, as derivatives see them."""
     turn = node.graph.turns.get(node)
     return (node.operation, node.operands) if turn is None else (TURN_OPERATION, turn)
 
@@ -191,7 +191,7 @@ class Interpreted:
                     slopes[operand.number] = slopes[operand.number] + share if operand.number in slopes else share
 
     def _seeds(self, points: int) -> dict[int, Array]:
-        """The slope of each result by itself: 1 [results x points]."""
+        """Return the slope of each result by itself: 1 [results x points]."""
         seeds: dict[int, Array] = {}
         for k, result in enumerate(self._body.results):
             if isinstance(result, Node):

@@ -48,7 +48,7 @@ class MachineCode:
     rows: int
 
     def pack(self) -> bytes:
-        """All of it in a row."""
+        """Return all of it in a row."""
         return HEAD.pack(self.entry, self.lanes, self.rows) + self.image
 
 

@@ -205,7 +205,7 @@ class MachineFunctions:
         return sizes_over_springs(self.machine)
 
     def needs_modes(self, quantity: MapQuantity) -> bool:
-        """Whether the program of a quantity needs modes over springs."""
+        """Return whether the program of a quantity needs modes over springs."""
         return self.mode_counts is not None and self.mode_counts.needed_by(quantity)
 
     @cached_property
@@ -272,7 +272,7 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
 
 
 def _has_program(machine: Machine, paths: tuple[str, ...], name: str, rests: bool) -> bool:
-    """Whether a quantity has a program, alone or with modes over springs that a loop finds."""
+    """Return whether a quantity has a program, alone or with modes over springs that a loop finds."""
     if QUANTITIES[name].loaded and not rests:
         return False
     return have_programs(machine, paths, [name]) or mode_counts_of(machine, [name], paths) is not None
@@ -285,7 +285,7 @@ def quantities_at(functions: MachineFunctions, columns: Mapping[str, Array], nam
 
 
 def sample_points(functions: MachineFunctions) -> dict[str, Array]:
-    """The pose of the file and some near it, those at which the machine has an answer: values by leaf path."""
+    """Return the pose of the file and some near it, those at which the machine has an answer: values by leaf path."""
     known = values(functions.machine)
     drawn = np.random.default_rng(0).uniform(-AROUND, AROUND, (SAMPLES, len(functions.inputs)))
     drawn[0], drawn[:, functions.coordinates :] = 0.0, 0.0

@@ -69,7 +69,7 @@ class Path:
         return len(next(iter(self.pose.values())))
 
     def at(self, rows: Integers) -> "Path":
-        """Some of its points, by number."""
+        """Return some of its points, by number."""
         parts = (self.pose, self.rates, self.accelerations, self.loads)
         return Path(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
 

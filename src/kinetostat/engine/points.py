@@ -26,7 +26,7 @@ class Points(Protocol):
         """Leaf paths of the parameters that vary."""
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Grid:
         return tuple(path for axis in self.axes for path in axis.paths)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         result: dict[str, Array] = {}
         # The value of an axis stays the same while all later axes run through theirs.
         run = self.size
@@ -110,7 +110,7 @@ class PointTable:
         return tuple(self.values)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         return {path: column[start:stop] for path, column in self.values.items()}
 
 
@@ -133,7 +133,7 @@ class ConsecutivePoints:
         return self.whole.paths
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1 of this part, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1 of this part, SI."""
         return self.whole.columns(self.start + start, self.start + stop)
 
 
@@ -165,7 +165,7 @@ class Population:
         return *self.designs, *self.poses
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         design, pose = np.divmod(np.arange(start, stop), self.shape[1])
         return {path: column[design] for path, column in self.designs.items()} | {
             path: column[pose] for path, column in self.poses.items()
@@ -208,7 +208,7 @@ class Cells:
         return tuple(path for axis in self.axes for path in axis.paths)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         indices = np.unravel_index(np.arange(start, stop) // PER_CELL, self.shape)
         result: dict[str, Array] = {}
         for number, (axis, index) in enumerate(zip(self.axes, indices, strict=True)):
@@ -218,7 +218,7 @@ class Cells:
         return result
 
     def _shares(self, axis: int, start: int, stop: int) -> Array:
-        """Random numbers, uniform from 0 to 1: where in its cell each point lies along an axis."""
+        """Return random numbers, uniform from 0 to 1: where in its cell each point lies along an axis."""
         # Philox can start anywhere in its sequence; each axis has a key, and so a sequence, of its own.
         block = start // PHILOX_WORDS
         source = np.random.Philox(key=self.seed * 64 + axis, counter=block)

@@ -145,7 +145,7 @@ def _folder(make: bool = False) -> Iterator[int]:
 
 
 def _is_private(descriptor: int) -> bool:
-    """Whether what has been opened belongs to this user, and nobody else may use it."""
+    """Return whether what has been opened belongs to this user, and nobody else may use it."""
     status = os.fstat(descriptor)
     return status.st_uid == os.geteuid() and not status.st_mode & PRIVATE
 
@@ -230,7 +230,7 @@ def _drop_oldest(folder: int) -> None:
 
 
 def _name(text: str) -> str | None:
-    """The name of a program's file: a digest of all that decides about its bytes; None if that is not known."""
+    """Return the name of a program's file: a digest of all that decides about its bytes; None if that is not known."""
     surroundings = _surroundings()
     if surroundings is None:
         return None
@@ -246,7 +246,7 @@ ROOMS = (
 
 @cache
 def _surroundings() -> str | None:
-    """All that decides about a program's bytes beside what it is made of.
+    """Return all that decides about a program's bytes beside what it is made of.
 
     None where that is not known: sources have been changed since this process began, and so may not be those that run.
     """
@@ -285,7 +285,7 @@ FEATURES = (
 
 
 def _processor() -> str:
-    """The processor that code is made for, on Linux as the system says it, because LLVM takes long to load."""
+    """Return the processor that code is made for, on Linux as the system says it, because LLVM takes long to load."""
     if sys.platform != "linux":
         from kinetostat.engine.native import host_description  # LLVM has to load the code there in any case
 

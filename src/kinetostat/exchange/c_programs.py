@@ -94,7 +94,7 @@ def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def _axes(functions: MachineFunctions) -> list[str]:
-    """The axis of LinuxCNC that each coordinate of the pose has."""
+    """Return the axis of LinuxCNC that each coordinate of the pose has."""
     names = [path.removeprefix(POSE) for path in functions.inputs]
     taken = {AXES[name] for name in names if name in AXES}
     axes = []
@@ -178,7 +178,7 @@ def write_fmu(
 
 
 def _variables(functions: MachineFunctions) -> list[ModelVariable]:
-    """The variables of the model, in the order in which they lie in memory."""
+    """Return the variables of the model, in the order in which they lie in memory."""
     known, driven = values(functions.machine), stand(functions.machine)
     si = {"length": "m", "angle": "rad"}
 
@@ -206,7 +206,7 @@ def _variables(functions: MachineFunctions) -> list[ModelVariable]:
 
 
 def _fmi_source(functions: MachineFunctions, variables: Sequence[ModelVariable], statuses: int, token: str) -> str:
-    """The adapter between the functions of the machine and those of FMI."""
+    """Return the adapter between the functions of the machine and those of FMI."""
     places: dict[str, int] = {}
     first, table = 0, []
     start: list[float] = []
@@ -283,7 +283,7 @@ def _build_description(stem: str) -> str:
 
 
 def _library(texts: dict[str, str], stem: str) -> dict[str, bytes]:
-    """The compiled model for this system, by its name in the archive; nothing where there is no C compiler."""
+    """Return the compiled model for this system, by its name in the archive; nothing where there is no C compiler."""
     system, suffix = SYSTEMS.get(sys.platform, ("", ""))
     processor = PROCESSORS.get(platform.machine().lower(), "")
     compiler = next((program for name in ("cc", "gcc", "clang") if (program := shutil.which(name))), None)

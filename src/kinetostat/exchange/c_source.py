@@ -311,7 +311,7 @@ def _operations_before(functions: MachineFunctions, work: Mapping[str, int]) -> 
 
 
 def _operations_of_modes(sizes: SpringSizes, count: int) -> int:
-    """Operations at most of `modes_of` in source.c, loop by loop."""
+    """Return the operations at most of `modes_of` in source.c, loop by loop."""
     n, entries = sizes.springs, sizes.springs * (sizes.springs + 1) // 2
     closed = 4 * sizes.ways * entries + 8 * sizes.conditions * n * n
     rotations = SWEEPS * n * (n - 1) // 2 * (17 + 18 * n) + 2 * n * n
@@ -388,6 +388,6 @@ def _targets(functions: MachineFunctions, columns: dict[str, Array], count: int)
 
 
 def _array(name: str, rows: Array) -> str:
-    """A table of numbers as a constant of C."""
+    """Return a table of numbers as a constant of C."""
     lines = ",\n".join(f"    {{{', '.join(literal(float(number)) for number in row)}}}" for row in rows)
     return f"static const double {name}[{rows.shape[0]}][{rows.shape[1]}] = {{\n{lines}\n}};"

@@ -78,13 +78,13 @@ def tool_stiffness(analysis: Analysis) -> ToolStiffness:
 
 
 def _without_round_off(matrix: Array) -> Array:
-    """The symmetric matrix with exact zeros where an entry is only round-off."""
+    """Return the symmetric matrix with exact zeros where an entry is only round-off."""
     sizes = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
     return np.where(np.abs(matrix) > ROUND_OFF_OF_COUPLING * sizes, (matrix + matrix.T) / 2.0, 0.0)
 
 
 def _comments(stiffness: ToolStiffness, mark: str) -> str:
-    """The notes as lines that begin with a mark."""
+    """Return the notes as lines that begin with a mark."""
     return "".join(f"{mark} {note}\n" for note in stiffness.notes)
 
 
@@ -114,7 +114,7 @@ def _card(name: str, *fields: str) -> str:
 
 
 def _nastran_number(value: float) -> str:
-    """A double-precision number with as many digits as a field has room for."""
+    """Return a double-precision number with as many digits as a field has room for."""
     for digits in count(10, -1):
         text = f"{value:.{digits}E}".replace("E", "D")
         if len(text) <= FIELD_WIDTH:

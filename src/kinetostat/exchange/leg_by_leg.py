@@ -37,7 +37,7 @@ from kinetostat.studies.rounding import clean_screw
 
 
 def legs_of(name: str) -> str:
-    """The text of a machine file leg by leg that is the same machine as a bundled one or one from a file.
+    """Return the text of a machine file leg by leg that is the same machine as a bundled one or one from a file.
 
     Args:
         name: the name of a bundled machine, or path of a machine file.
@@ -57,7 +57,7 @@ def _limits_lost(limits: Iterable[str], document: Document) -> str:
 
 
 def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> str:
-    """The text of a machine file leg by leg of a machine as built.
+    """Return the text of a machine file leg by leg of a machine as built.
 
     Args:
         machine: the machine as drawn.
@@ -72,7 +72,7 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
 
 
 def fitted_text(answer: Identification) -> str | None:
-    """The text of a machine file of a machine as measurements say it is built.
+    """Return the text of a machine file of a machine as measurements say it is built.
 
     Where the numbers of the machine's own file say all that was found, it is that file with these numbers as
     identified; comments, units and names stay. Otherwise it is a file leg by leg.
@@ -97,7 +97,7 @@ def fitted_text(answer: Identification) -> str | None:
 
 
 def document_of(machine: Machine, built: Configuration | None = None) -> Document:
-    """A machine as what its file leg by leg would say.
+    """Return a machine as what its file leg by leg would say.
 
     Args:
         machine: the machine whose tables the file takes over.
@@ -158,7 +158,7 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
 
 
 def _is_parted(leg: Leg) -> bool:
-    """Whether the axes of a joint of several axes do not meet in a point."""
+    """Return whether the axes of a joint of several axes do not meet in a point."""
     points: dict[str, set[Vector]] = {}
     for element in leg.chain:
         for joint in element.freedoms:
@@ -168,7 +168,7 @@ def _is_parted(leg: Leg) -> bool:
 
 
 def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
-    """The table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
+    """Return the table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
     table = machine.tables["tool"]
     given: dict[str, Any] = {name: getattr(table, name) for name in quantities(Tool)}
     for name, value in given.items():
@@ -180,7 +180,7 @@ def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
 
 
 def _load(machine: Machine, turn: Rotation) -> dict[str, Any]:
-    """The table [load], with the loads that have names."""
+    """Return the table [load], with the loads that have names."""
     table, usual = machine.tables["load"], Load()
     given = {name: getattr(table, name) for name in quantities(Load) if getattr(table, name) != getattr(usual, name)}
     given = {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
@@ -209,7 +209,7 @@ class _Chain:
     pending: list[Spring] = field(default_factory=list)
 
     def document(self) -> dict[str, Any]:
-        """The leg as its entry in the file."""
+        """Return the leg as its entry in the file."""
         elements = list(_free_where_zero(self.leg.chain))
         for (passive, _), run in groupby(elements, key=_run):
             row = list(run)
@@ -263,7 +263,7 @@ class _Chain:
         return {"type": "helical" if pitch else "revolute", "point": _numbers(joint.point), **axis, **pitch}
 
     def _near(self) -> list[float]:
-        """A point for a slide that has none: that of the joint before it."""
+        """Return a point for a slide that has none: that of the joint before it."""
         return list(self.joints[-1]["point"]) if self.joints else _numbers(next(iter(self.leg.path), self.tip))
 
     def _add(self, joint: dict[str, Any], title: str = "") -> None:
@@ -283,7 +283,7 @@ class _Chain:
         self.joints.append({"name": name, "type": kind, "joins": list(bodies), "point": point, **joint})
 
     def _name(self, title: str) -> str:
-        """The name of a part without that of its leg and without dots."""
+        """Return the name of a part without that of its leg and without dots."""
         title = title.kind if isinstance(title, PartName) else title.removeprefix(f"{self.leg.name} ")
         return title.replace(".", " ").strip()[:30]
 
@@ -299,7 +299,7 @@ def _run(element: Element) -> tuple[bool, Vector | None]:
 
 
 def _free_where_zero(chain: Iterable[Element]) -> Iterable[Element]:
-    """The chain with a joint in the place of each spring that is free and not an actuator."""
+    """Give the chain with a joint in the place of each spring that is free and not an actuator."""
     for element in chain:
         free = isinstance(element, Spring) and not element.actuated and element.stiffness == 0.0
         yield element.joint if free else element  # type: ignore[attr-defined]
@@ -345,7 +345,7 @@ def _numbers(vector: Vector) -> list[float]:
 
 
 def _text(document: Document, machine: Machine) -> str:
-    """The document as a file that people can read: a line for each joint."""
+    """Return the document as a file that people can read: a line for each joint."""
     lines = [
         f"# {machine.name}, leg by leg at the pose of its file, which is the home pose here. Numbers are in SI.",
         "# Links as a 6x6 are those of this pose; masses of links are not carried over.",

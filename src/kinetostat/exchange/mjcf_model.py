@@ -268,14 +268,14 @@ class _Chain:
 
 
 def _start(piece: Piece) -> Vector | None:
-    """The point where a piece begins; None if it has no place."""
+    """Return the point where a piece begins; None if it has no place."""
     if isinstance(piece, Joint | Spring):
         return joint_of(piece).point
     return piece.near if isinstance(piece, Parallelogram) else piece.start
 
 
 def _across(along: Array) -> Sequence[Array]:
-    """Two unit vectors across a unit vector and each other."""
+    """Return two unit vectors across a unit vector and each other."""
     first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
     first = first / np.linalg.norm(first)
     return first, np.cross(along, first)

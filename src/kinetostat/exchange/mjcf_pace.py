@@ -89,7 +89,7 @@ class Pace:
     carried: tuple[Heavy, ...] = ()
 
     def damping(self, stiffness: float) -> float:
-        """Damping of a joint with a spring, N·s/m or N·m·s/rad."""
+        """Return the damping of a joint with a spring, N·s/m or N·m·s/rad."""
         return stiffness * self.retardation
 
     def armature(self, freedom: Freedom) -> float:
@@ -182,12 +182,12 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
 
 
 def _moving_bodies(model: Model) -> list[Body]:
-    """The bodies of the legs."""
+    """Return the bodies of the legs."""
     return [body for body in model.world.every() if body is not model.world]
 
 
 def _rotors(machine: Machine, model: Model) -> dict[str, float]:
-    """Inertia that rotors add to the joints of their actuators, by the names of these."""
+    """Return the inertia that rotors add to the joints of their actuators, by the names of these."""
     if not has_rotors(machine):
         return {}
     freedoms = [freedom for body in _moving_bodies(model) for freedom in body.freedoms]
@@ -253,7 +253,7 @@ def _halves(
 
 
 def _turns_at(piece: Piece, point: Array) -> bool:
-    """Whether a piece leaves a point where it is, so that the bodies on both sides of it carry the point."""
+    """Return whether a piece leaves a point where it is, so that the bodies on both sides of it carry the point."""
     if not isinstance(piece, Joint | Spring):
         return False
     joint = joint_of(piece)
@@ -281,7 +281,7 @@ def _steps_for_springs(bodies: list[Body], inertias: dict[str, Heavy], armatures
 
 
 def _moved_inertia(freedom: Freedom, part: Heavy) -> float:
-    """The inertia of a body that a freedom moves, kg or kg·m²."""
+    """Return the inertia of a body that a freedom moves, kg or kg·m²."""
     if freedom.point is None:
         return part.mass
     arm = np.cross(part.centre - freedom.point, freedom.axis)

@@ -45,7 +45,7 @@ def reference_point(analysis: Analysis) -> list[float]:
 
 
 def _platform_of(analysis: Analysis) -> tuple[Array, Array]:
-    """Position and rotation of the platform, without which nothing can be exported."""
+    """Return the position and rotation of the platform, without which nothing can be exported."""
     if analysis.platform is None:
         raise ValueError("an analysis without a result cannot be exported")
     return analysis.platform
@@ -182,7 +182,7 @@ def write_csv(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def _numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, str, float]]:
-    """Every number of a dataset: quantity, label of its row, label of its column, value."""
+    """Give every number of a dataset: quantity, label of its row, label of its column, value."""
     for name, variable in dataset.data_vars.items():
         sizes = variable.sizes
         for place in product(*(range(size) for size in sizes.values())):
@@ -192,7 +192,7 @@ def _numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, str, float]]:
 
 
 def _label(dataset: xr.Dataset, dim: str, i: int) -> str:
-    """The label of a place along a dimension, or its number."""
+    """Return the label of a place along a dimension, or its number."""
     return str(dataset[dim].values[i]) if dim in dataset.coords else str(i + 1)
 
 
@@ -245,5 +245,5 @@ def _matrix(matrix: Array | None) -> Array:
 
 
 def _matlab_name(text: str) -> str:
-    """A name that MATLAB takes for a field: letters, digits and underscores, a letter first, at most 63."""
+    """Return a name that MATLAB takes for a field: letters, digits and underscores, a letter first, at most 63."""
     return re.sub(r"\W", "_", text if text[:1].isalpha() else f"x{text}", flags=re.ASCII)[:63]

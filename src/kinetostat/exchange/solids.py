@@ -76,7 +76,7 @@ class _Buffer:
         self.accessors: list[dict[str, Any]] = []
 
     def primitive(self, shape: Shape) -> dict[str, Any]:
-        """The triangles of a shape, without a material."""
+        """Return the triangles of a shape, without a material."""
         mesh = mesh_of(shape)
         points, indices = mesh.points.astype("<f4"), mesh.triangles.ravel()
         small = len(points) <= np.iinfo(np.uint16).max
@@ -103,7 +103,7 @@ class _Buffer:
 
 
 def _node(solid: Solid, mesh: int) -> dict[str, Any]:
-    """A solid at its place: the columns of its 4 x 4 matrix."""
+    """Return a solid at its place: the columns of its 4 x 4 matrix."""
     *axes, origin = (list(map(float, column.components())) for column in columns_of(solid))
     matrix = [number for axis in axes for number in (*axis, 0.0)]
     return {"name": solid.name, "mesh": mesh, "matrix": [*matrix, *origin, 1.0]}

@@ -221,7 +221,7 @@ def texts_of(analysis: Analysis) -> tuple[str, str]:
 
 
 def _word(name: str) -> str:
-    """A name without blanks and signs, which not every reader of URDF takes."""
+    """Return a name without blanks and signs, which not every reader of URDF takes."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "unnamed"
 
 
@@ -249,7 +249,7 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def _whole(link: Member, carriers: Sequence[tuple[int, UrdfJoint, str]]) -> tuple[str, Heavy]:
-    """The URDF link that carries a link of the machine, or an empty name, and the link as a rigid mass.
+    """Return the URDF link that carries a link of the machine, or an empty name, and the link as a rigid mass.
 
     A hinge through the end of a uniform rod moves that end with what is on either side of it.
     """
@@ -272,7 +272,7 @@ def _whole(link: Member, carriers: Sequence[tuple[int, UrdfJoint, str]]) -> tupl
 
 
 def _hinged_at(joint: UrdfJoint, point: Array) -> bool:
-    """Whether a joint turns about a line through a point, and nothing else."""
+    """Return whether a joint turns about a line through a point, and nothing else."""
     if joint.kind != "continuous" or joint.axis is None or "pitch" in joint.extension:
         return False
     return float(np.linalg.norm(np.cross(joint.at - point, joint.axis))) < COINCIDENT_HINGES
@@ -294,7 +294,7 @@ def joints_of(leg: Leg) -> Iterator[tuple[int, UrdfJoint]]:
 
 
 def _places(element: Element) -> Sequence[Vector]:
-    """Points at which an element lies; none for a slide."""
+    """Return the points at which an element lies; none for a slide."""
     point = element.mover.point if isinstance(element, Joint | Spring) else None
     return element.path or (() if point is None else (point,))
 
@@ -314,7 +314,7 @@ def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iter
 
 
 def _moving(name: str, joint: Joint, after: Array, extension: dict[str, str]) -> UrdfJoint:
-    """A joint that moves; a slide, which has no place, is put where the next element is."""
+    """Return a joint that moves; a slide, which has no place, is put where the next element is."""
     if joint.pitch != 0.0:
         extension = {**extension, "pitch": repr(float(joint.pitch))}
     if joint.point is None:

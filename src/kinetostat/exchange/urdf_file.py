@@ -289,7 +289,7 @@ class _Reader:
         return axis / (size or 1.0)
 
     def _placement(self, element: Element | None, where: str) -> Array:
-        """The frame that xyz (m) and rpy (rad, fixed axes) describe [4 x 4]."""
+        """Return the frame that xyz (m) and rpy (rad, fixed axes) describe [4 x 4]."""
         frame = np.eye(4)
         if element is not None:
             frame[:3, 3] = numbers(element.get("xyz", "0 0 0"), 3, f"{where}: xyz")

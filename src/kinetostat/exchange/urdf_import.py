@@ -162,7 +162,7 @@ def _tool_offset(file: UrdfFile, tool: str, rigid: set[str], point: Array) -> li
 
 
 def _path(file: UrdfFile, link: str) -> list[FileJoint]:
-    """The joints from the root to a link."""
+    """Return the joints from the root to a link."""
     path = []
     while link != file.root:
         path.append(file.joints[link])
@@ -171,7 +171,7 @@ def _path(file: UrdfFile, link: str) -> list[FileJoint]:
 
 
 def _rigid_with(file: UrdfFile, platform: str) -> set[str]:
-    """The links that are fixed to the platform, itself among them."""
+    """Return the links that are fixed to the platform, itself among them."""
     links = {platform}
     growing = True
     while growing:
@@ -183,7 +183,7 @@ def _rigid_with(file: UrdfFile, platform: str) -> set[str]:
 
 
 def _tip(file: UrdfFile, loop: FileLoop, rigid: set[str]) -> str:
-    """The link at the end of the leg that a loop holds to the platform."""
+    """Return the link at the end of the leg that a loop holds to the platform."""
     where = f'"{file.origin}": loop {shorten(loop.name)}'
     tips = [link for link in loop.links if link not in rigid]
     if len(tips) != 1:
@@ -222,13 +222,13 @@ def _check_apart(file: UrdfFile, paths: Sequence[Sequence[FileJoint]]) -> None:
 
 
 def _leg_name(path: Sequence[FileJoint], number: int) -> str:
-    """The name that `urdf_export` gave the tip of a leg, or the number of the leg."""
+    """Return the name that `urdf_export` gave the tip of a leg, or the number of the leg."""
     links = [joint.child for joint in path if joint.child.endswith(TIP)]
     return links[-1].removesuffix(TIP).replace(".", "-")[:LONGEST_PART_NAME] if links else f"leg {number}"
 
 
 def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bodies, origin: str) -> Document:
-    """A leg from base to platform, as a machine file lists its joints and the links that weigh something.
+    """Return a leg from base to platform, as a machine file lists its joints and the links that weigh something.
 
     Args:
         leg: its name, which is taken off the names of joints.
@@ -262,17 +262,17 @@ def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bod
 
 
 def _as_joint(loop: FileLoop) -> FileJoint:
-    """The joint that closes a loop, as the last one of its leg."""
+    """Return the joint that closes a loop, as the last one of its leg."""
     return FileJoint(loop.name, loop.kind, *loop.links, loop.frames[0], loop.axis, False, None, {})
 
 
 def _name(text: str, leg: str) -> str:
-    """A name as a machine file takes it."""
+    """Return a name as a machine file takes it."""
     return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_PART_NAME]
 
 
 def _first_joint(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Document]:
-    """Number of the first joints of a row that make one joint of a leg, and the table of that joint."""
+    """Return the number of the first joints of a row that make one joint of a leg, and the table of that joint."""
     first = row[0]
     if len(row) > 1 and row[1].mimics is not None:
         return 2, _parallelogram(first, row[1], where)
@@ -294,7 +294,7 @@ def _first_joint(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[
 
 
 def _hinges(row: Sequence[FileJoint], bodies: Bodies) -> int:
-    """Number of the first joints that are free hinges about one point with independent axes: 1, 2 or 3.
+    """Return the number of the first joints that are free hinges about one point with independent axes: 1, 2 or 3.
 
     Hinges with something heavy between them stay apart, since a joint of a leg has no bodies inside.
     """
@@ -315,7 +315,7 @@ def _hinges(row: Sequence[FileJoint], bodies: Bodies) -> int:
 
 
 def _single(joint: FileJoint) -> Document:
-    """A joint with one freedom; an actuator without a stiffness is rigid."""
+    """Return a joint with one freedom; an actuator without a stiffness is rigid."""
     table: Document = {"type": ONE_FREEDOM[joint.kind], "axis": joint.axis.tolist()}
     if "pitch" in joint.extension:
         table |= {"type": "helical", "pitch": _number(joint, "pitch")}
@@ -327,7 +327,7 @@ def _single(joint: FileJoint) -> Document:
 
 
 def _parallelogram(near: FileJoint, far: FileJoint, where: str) -> Document:
-    """Two revolutes of which the second turns back what the first turned."""
+    """Return two revolutes of which the second turns back what the first turned."""
     together = far.mimics == (near.name, MIMIC_RATIO)
     if not together or float(np.linalg.norm(np.cross(near.axis, far.axis))) > INDEPENDENT_AXES:
         raise InputError(
@@ -348,7 +348,7 @@ def _parallelogram(near: FileJoint, far: FileJoint, where: str) -> Document:
 
 
 def _compliance(joint: FileJoint, where: str) -> list[list[float]]:
-    """The 6x6 of a fixed joint, turned from the axes of the joint to those of the base."""
+    """Return the 6x6 of a fixed joint, turned from the axes of the joint to those of the base."""
     entries = np.array(numbers(joint.extension["compliance"], 36, f"{where}: compliance")).reshape(6, 6)
     turn = np.kron(np.eye(2), joint.frame[:3, :3])
     turned: Array = turn @ entries @ turn.T

@@ -249,7 +249,7 @@ def toml_key(name: str) -> str:
 
 
 def toml_pairs(table: Mapping[str, Any]) -> Iterator[str]:
-    """The lines "key = value" of a table."""
+    """Give the lines "key = value" of a table."""
     for key, value in table.items():
         yield f"{toml_key(key)} = {toml_value(value)}"
 

@@ -28,7 +28,7 @@ class InputError(ValueError):
 
 
 def shorten(value: object, longest: int = 60) -> str:
-    """A value as people wrote it, cut to a bounded length."""
+    """Return a value as people wrote it, cut to a bounded length."""
     try:
         text = f'"{value}"' if isinstance(value, str) else repr(value)
     except ValueError:  # Python refuses to write integers of thousands of digits
@@ -39,17 +39,17 @@ def shorten(value: object, longest: int = 60) -> str:
 
 
 def cut(text: str, longest: int = 60) -> str:
-    """A text, with an ellipsis in the place of what exceeds a length."""
+    """Return a text, with an ellipsis in the place of what exceeds a length."""
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
 def several(given: str | Iterable[str]) -> list[str]:
-    """Texts as a list; one text alone stands for a list of it."""
+    """Return texts as a list; one text alone stands for a list of it."""
     return [given] if isinstance(given, str) else list(given)
 
 
 def choice(value: object, known: Iterable[str], what: str) -> str:
-    """The value, if it is one of the known names.
+    """Return the value, if it is one of the known names.
 
     Raises:
         InputError: "what is ..." with the name that was probably meant, or all of them.
@@ -63,7 +63,7 @@ def choice(value: object, known: Iterable[str], what: str) -> str:
 
 
 def _list_of(names: Sequence[str]) -> str:
-    """All names with commas; those that count on by the first and the last: frequency_1 to frequency_6."""
+    """Return all names with commas; those that count on by the first and the last: frequency_1 to frequency_6."""
     runs: list[list[str]] = []
     for name in names:
         if runs and _next(runs[-1][-1]) == name:
@@ -74,7 +74,7 @@ def _list_of(names: Sequence[str]) -> str:
 
 
 def _next(name: str) -> str | None:
-    """The name that counts on: leg_2 after leg_1; None after a name without a number."""
+    """Return the name that counts on: leg_2 after leg_1; None after a name without a number."""
     stem = name.rstrip("0123456789")
     return f"{stem}{int(name[len(stem) :]) + 1}" if stem != name else None
 

@@ -149,11 +149,11 @@ class Quantity:
             raise UnitError(f"it must not exceed {largest:g} {kind.unit}{advice}")
 
     def show(self, value: float) -> str:
-        """An SI value of it as text that a file may hold."""
+        """Return an SI value of it as text that a file may hold."""
         return NO_LIMIT if value == self.unset else write(value, self.kind)
 
     def in_file(self, value: float, like: object = None) -> str | float:
-        """An SI value of it as people write it in a file, in the unit of what stood there before."""
+        """Return an SI value of it as people write it in a file, in the unit of what stood there before."""
         return NO_LIMIT if value == self.unset else written_value(value, self.kind, like)
 
     def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
@@ -210,18 +210,18 @@ def made_table(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = 
 
 @lru_cache(1024)
 def quantities(table_type: type) -> Mapping[str, Quantity]:
-    """The fields of a table by name."""
+    """Return the fields of a table by name."""
     hints = get_type_hints(table_type, include_extras=True)
     return MappingProxyType({field.name: hints[field.name].__metadata__[0] for field in fields(table_type)})
 
 
 def optional(table_type: type) -> set[str]:
-    """Names of the fields of a table that may be left out."""
+    """Return the names of the fields of a table that may be left out."""
     return {field.name for field in fields(table_type) if field.default is not MISSING}
 
 
 def leaves(name: str, quantity: Quantity) -> Iterator[str]:
-    """Names of the scalars of a field: itself, or one for each entry."""
+    """Give the names of the scalars of a field: itself, or one for each entry."""
     if quantity.count is None:
         yield name
     else:
@@ -252,7 +252,7 @@ class Range:
     logarithmic: bool
 
     def values(self, quantity: Quantity) -> Array:
-        """The values in SI.
+        """Return the values in SI.
 
         Raises:
             InputError: an end that the field does not allow, or one that is infinite or, for :log, not positive.
@@ -281,7 +281,7 @@ class Range:
 
 
 def parse_range(text: str) -> Range:
-    """A range from "FIELD=from:to:count[:log]".
+    """Return a range from "FIELD=from:to:count[:log]".
 
     Raises:
         InputError: not of that form, or a count out of bounds.

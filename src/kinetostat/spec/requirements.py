@@ -231,7 +231,7 @@ def _table_schema(description: str, properties: dict[str, Any], required: list[s
 
 
 def requirement_lines(requirements: Mapping[str, Requirement]) -> Iterator[str]:
-    """The lines of the table as TOML that reads back as the same requirements; none without a requirement."""
+    """Give the lines of the table as TOML that reads back as the same requirements; none without a requirement."""
     if not requirements:
         return
     yield from ("", f"[{TABLE}]")

@@ -158,7 +158,7 @@ class StudyFile(Table):
 
 
 def read_study(document: Document, origin: str, settings: Sequence[str] = ()) -> StudyFile:
-    """The study that a document describes.
+    """Return the study that a document describes.
 
     Args:
         document: the document as written.
@@ -178,7 +178,7 @@ def read_study(document: Document, origin: str, settings: Sequence[str] = ()) ->
 
 
 def study_schema() -> dict[str, Any]:
-    """The JSON Schema of study files."""
+    """Return the JSON Schema of study files."""
     schema = StudyFile.model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "kinetostat study file"}
 
@@ -201,7 +201,7 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
 
 
 def _place(location: Sequence[Any], document: Document) -> tuple[list[str], Any]:
-    """The path of a mistake as people write it, without the names of alternatives, and what stands there."""
+    """Return the path of a mistake as people write it, without the names of alternatives, and what stands there."""
     path: list[str] = []
     at: Any = document
     for i, part in enumerate(location):
@@ -213,7 +213,7 @@ def _place(location: Sequence[Any], document: Document) -> tuple[list[str], Any]
 
 
 def _model(path: Sequence[str]) -> type[BaseModel] | None:
-    """The model of the table at a path."""
+    """Return the model of the table at a path."""
     if not path:
         return StudyFile
     tables: dict[str, type[BaseModel]] = {
@@ -249,7 +249,7 @@ LISTS = ("variables", "objectives", "constraints")
 
 
 def study_toml(study: StudyFile) -> str:
-    """The TOML text of a study; what is as it would be without being written is left out."""
+    """Return the TOML text of a study; what is as it would be without being written is left out."""
     content = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     lines = ["schema = 1", *toml_pairs({key: content[key] for key in ("name", "machine")})]
     lines += _table("[set]", content.get("set", {}))

@@ -60,7 +60,7 @@ ANGLE_LIMITS = {
 
 
 def within_class(name: int | str, size: float, kind: str) -> float:
-    """The greatest distance of a length (m) or an angle (rad) of a class from its nominal value either way.
+    """Return the greatest distance of a length (m) or an angle (rad) of a class from its nominal value either way.
 
     Args:
         name: a grade of ISO 286-1, 1 to 14, of which half of the zone counts; or "f", "m", "c" or "v" of ISO 2768-1.
@@ -83,7 +83,7 @@ def within_class(name: int | str, size: float, kind: str) -> float:
 
 
 def _range_of(size: float, ends: Sequence[float], name: str) -> int:
-    """The number of the range to which a nominal size belongs, rounded so that 400 mm is not above 400 mm."""
+    """Return the number of the range to which a nominal size belongs, rounded so that 400 mm is not above 400 mm."""
     millimetres = round(size / MM, 9)
     if not 0.0 < millimetres <= ends[-1]:
         reach = f"up to {ends[-1]:g} mm" if math.isfinite(ends[-1]) else "above 0"
@@ -137,11 +137,11 @@ class PlusMinus:
     limit: float
 
     def fits(self, kind: str) -> bool:
-        """Whether it can be the tolerance of a number of a kind."""
+        """Return whether it can be the tolerance of a number of a kind."""
         return kind == self.kind
 
     def within(self, _kind: str, _size: float) -> float:
-        """The plus and minus of a number, SI, which does not depend on its size."""
+        """Return the plus and minus of a number, SI, which does not depend on its size."""
         return self.limit
 
 
@@ -161,11 +161,11 @@ class StandardClass:
     size: float
 
     def fits(self, kind: str) -> bool:
-        """Whether it can be the tolerance of a number of a kind."""
+        """Return whether it can be the tolerance of a number of a kind."""
         return kind == "length" or (kind == "angle" and isinstance(self.name, str))
 
     def within(self, kind: str, size: float) -> float:
-        """The plus and minus of a number, SI.
+        """Return the plus and minus of a number, SI.
 
         Args:
             kind: "length" or "angle".
@@ -203,7 +203,7 @@ class Tolerance:
         return ", ".join(deviation.text for deviation in self.deviations)
 
     def of(self, kind: str) -> Deviation | None:
-        """The deviation of numbers of a kind; None if it says nothing about them."""
+        """Return the deviation of numbers of a kind; None if it says nothing about them."""
         return next((deviation for deviation in self.deviations if deviation.fits(kind)), None)
 
 
@@ -263,7 +263,7 @@ def read_tolerances(written: object, origin: str = "") -> Tolerances:
 
 
 def _lines(table: Mapping[Any, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """The lines of a table, and of tables in it: `geometry.base_radius` need not stand in quotes."""
+    """Give the lines of a table, and of tables in it: `geometry.base_radius` need not stand in quotes."""
     for key, value in table.items():
         about = f"{before}{key}"
         if isinstance(value, Mapping) and not {*LINE_KEYS} & value.keys():
@@ -330,7 +330,7 @@ def _size(text: str, place: str) -> float:
 
 
 def _amount(text: str, written: object, place: str) -> tuple[str, float]:
-    """The kind and the SI value of a number with its unit, whose unit alone says the kind."""
+    """Return the kind and the SI value of a number with its unit, whose unit alone says the kind."""
     for kind, largest in LARGEST_TOLERANCE.items():
         try:
             value = parse(text, kind) if re.search(r"[^\d\s.eE+-]", text) else math.nan
@@ -347,7 +347,7 @@ def _amount(text: str, written: object, place: str) -> tuple[str, float]:
 
 
 def tolerances_schema() -> dict[str, Any]:
-    """The JSON Schema of the table."""
+    """Return the JSON Schema of the table."""
     text: dict[str, Any] = {"type": "string", "examples": ["0.05 mm", "sigma 0.02 mm", "IT7 at 300 mm", "20 um/m"]}
     value = {"anyOf": [text, {"type": "array", "items": text, "minItems": 1, "maxItems": MOST_VALUES}]}
     cost = {"type": "number", "minimum": COSTS[0], "maximum": COSTS[1], "description": "relative cost of making it so"}
@@ -360,7 +360,7 @@ def tolerances_schema() -> dict[str, Any]:
 
 
 def tolerance_lines(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
-    """The lines of the table as TOML that reads back as the same tolerances; none without a tolerance."""
+    """Give the lines of the table as TOML that reads back as the same tolerances; none without a tolerance."""
     if not tolerances:
         return
     yield from ("", f"[{TABLE}]")

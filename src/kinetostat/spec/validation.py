@@ -145,7 +145,7 @@ class _Reader:
             self.instances[".".join(place)] = table(**values)
 
     def _may_miss(self, path: str) -> bool:
-        """Whether a table may be left out; it is then as if it were empty."""
+        """Return whether a table may be left out; it is then as if it were empty."""
         table = self.tables.get(path)
         may_miss = table is not None and path not in self.within and optional(table) == set(quantities(table))
         if table and may_miss:

@@ -159,7 +159,7 @@ def report(request: ReportRequest) -> Report:
 
 
 def _at_rest(state: MachineState) -> tuple[LoadedState | None, str]:
-    """The machine under its loads, or why these are refused."""
+    """Return the machine under its loads, or why these are refused."""
     try:
         return under_load(state), ""
     except InputError as error:
@@ -288,14 +288,14 @@ def _linear_quantities(machine: Machine) -> dict[str, str]:
 
 
 def weighs(machine: Machine) -> bool:
-    """Whether any number of a machine says a mass or an inertia."""
+    """Return whether any number of a machine says a mass or an inertia."""
     present = values(machine)
     weighing = [p for p in parameters(machine.family) if KINDS[p.quantity.kind].heavy or p.quantity.kind == "inertia"]
     return any(present[leaf] for parameter in weighing for leaf in parameter.leaves)
 
 
 def _frequencies(machine: Machine) -> dict[str, str]:
-    """The lowest natural frequencies: as many as a platform has whose file gives a mass and no more."""
+    """Return the lowest natural frequencies: as many as a platform has whose file gives a mass and no more."""
     if not weighs(machine):
         return {}
     group = "loaded_frequency" if machine.loaded else "frequency"
@@ -350,7 +350,7 @@ class SwingRequest:
 
 
 def swing(request: SwingRequest) -> list[dict[str, Any]]:
-    """Both ends of a mode's swing, for the browser to move the machine between them."""
+    """Return both ends of a mode's swing, for the browser to move the machine between them."""
     shape, machine = request.answer.modes[request.number].shape, request.answer.machine
     if shape is None:
         return []

@@ -111,7 +111,7 @@ class Control:
         return self.low < self.high
 
     def value_at(self, position: int) -> float:
-        """The SI value at a position from 0 to `STEPS`."""
+        """Return the SI value at a position from 0 to `STEPS`."""
         share = min(max(position, 0), STEPS) / STEPS
         if not self.logarithmic:
             return self.low + (self.high - self.low) * share
@@ -121,7 +121,7 @@ class Control:
         return float(f"{self.low * (self.high / self.low) ** share:.4g}")
 
     def position_of(self, value: float) -> int:
-        """The position nearest to a value."""
+        """Return the position nearest to a value."""
         if not self.slides:
             return 0
         if not self.logarithmic:

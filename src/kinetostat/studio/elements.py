@@ -170,19 +170,19 @@ def choice(
     options: dict[Any, str] | list[str], label: str, on_change: Callable[..., None], mark: str,
     value: Any = None, searchable: bool = False,
 ) -> ui.select:  # fmt: skip
-    """A list to choose from, if `searchable` by typing; `mark` is the name by which tests know it."""
+    """Return a list to choose from, if `searchable` by typing; `mark` is the name by which tests know it."""
     select = ui.select(options, label=label, value=value, on_change=on_change, with_input=searchable).mark(mark)
     return select.props("dense options-dense outlined").classes("field")
 
 
 def toggle(options: Sequence[str], value: str, on_change: Callable[[], None], mark: str) -> ui.toggle:
-    """A row of buttons of which one is pressed."""
+    """Return a row of buttons of which one is pressed."""
     buttons = ui.toggle(list(options), value=value, on_change=on_change).mark(mark)
     return buttons.props("dense no-caps unelevated toggle-text-color=accent-ink").classes("choice")
 
 
 def icon_button(icon: str, text: str, action: Callable[[], object], mark: str) -> ui.button:
-    """A button that shows an icon; `text` is its tooltip and what a screen reader says."""
+    """Return a button that shows an icon; `text` is its tooltip and what a screen reader says."""
     button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{in_quotes(text)}"')
     return button.tooltip(text).mark(mark)
 

@@ -135,7 +135,7 @@ class StudioPage:
         self._offer_history()
 
     def _is_drawing(self) -> bool:
-        """Whether the last change is still being drawn, by the server or in the browser."""
+        """Return whether the last change is still being drawn, by the server or in the browser."""
         return self._pictures.busy or self.scene.view.is_behind
 
     def _show_machine(self) -> None:

@@ -97,7 +97,7 @@ def free_axes(machine: Machine) -> tuple[str, ...]:
 
 
 def _follows(slopes: Array, k: int, weights: Array) -> bool:
-    """Whether the pose can follow a unit pull along or about the axis `k`, without running away aside."""
+    """Return whether the pose can follow a unit pull along or about the axis `k`, without running away aside."""
     wish = np.eye(6)[k]
     motion = slopes @ np.linalg.lstsq(weights[:, None] * slopes, weights * wish, rcond=RANK)[0]
     return bool(motion[k] > LEAST and np.abs(motion - wish).max() < ASIDE)

@@ -178,7 +178,7 @@ class ScenePanel:
 
 
 def _verdict(report: Report) -> tuple[str, str]:
-    """The status of a pose in a word or two, and the message about it."""
+    """Return the status of a pose in a word or two, and the message about it."""
     if report.refused:
         return "no answer", report.refused
     if report.loaded is not None:

@@ -128,11 +128,11 @@ class Session:
         return alike
 
     def value(self, path: str) -> float:
-        """The SI value of a control; the first one if it moves several entries."""
+        """Return the SI value of a control; the first one if it moves several entries."""
         return float(values(self.machine)[self.controls[path].parameter.leaves[0]])
 
     def values(self) -> dict[str, float]:
-        """The SI values of all controls."""
+        """Return the SI values of all controls."""
         present = values(self.machine)
         return {path: float(present[control.parameter.leaves[0]]) for path, control in self.controls.items()}
 
@@ -230,7 +230,7 @@ class Session:
             self.machine, self._dragged = self.origin, ()
 
     def as_file(self) -> tuple[str, bytes]:
-        """A file name and the machine as TOML."""
+        """Return a file name and the machine as TOML."""
         return f"{file_stem(self.machine.name)}.toml", as_file(self.machine).encode()
 
 

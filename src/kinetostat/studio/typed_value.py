@@ -69,7 +69,7 @@ class _Reader:
         self._kind, self._shown_unit = KINDS[kind], shown_unit
 
     def value(self) -> float:
-        """The SI value of the whole text."""
+        """Return the SI value of the whole text."""
         term = self._sum()
         if self._tokens[self._place][0]:
             raise _UnreadableError

@@ -99,7 +99,7 @@ def drawing(machine: Machine, response: Response, joints: Joints | None) -> Draw
 
 
 def closed_placements(leg: MovingLeg, start: Sequence[float], target: Array, length: float) -> list[Array]:
-    """Placements along a leg whose platform end is displaced as a pose says, by Newton's method.
+    """Return the placements along a leg whose platform end is displaced as a pose says, by Newton's method.
 
     Args:
         leg: at the home pose.
@@ -124,13 +124,13 @@ def closed_placements(leg: MovingLeg, start: Sequence[float], target: Array, len
 
 
 def _twist(error: Array) -> Array:
-    """A small displacement as a twist about the origin, rotation first [6]."""
+    """Return a small displacement as a twist about the origin, rotation first [6]."""
     skew = 0.5 * (error[:3, :3] - error[:3, :3].T)
     return np.array([skew[2, 1], skew[0, 2], skew[1, 0], *error[:3, 3]])
 
 
 def _motion_size(gap: Array, target: Array, length: float) -> float:
-    """Size of the motion of the platform by a twist: rad, or share of the machine's length."""
+    """Return the size of the motion of the platform by a twist: rad, or share of the machine's length."""
     moved = gap[3:] + np.cross(gap[:3], target[:3, 3])
     return max(float(np.linalg.norm(gap[:3])), float(np.linalg.norm(moved)) / length)
 
@@ -153,12 +153,12 @@ def _platform(machine: Machine, ours: Displacement) -> Array:
 
 
 def _coordinate(amount: object) -> float:
-    """A joint coordinate as a number, rad or m."""
+    """Return a joint coordinate as a number, rad or m."""
     return math.atan2(float(amount.sine), float(amount.cosine)) if isinstance(amount, Turn) else float(amount)  # type: ignore[arg-type]
 
 
 def with_legs_of_file(machine: Machine, ours: Configuration) -> Configuration:
-    """The machine with its actuated legs where the file puts them; other families are left as they are.
+    """Return the machine with its actuated legs where the file puts them; other families are left as they are.
 
     Args:
         machine: of any family, at its pose.
@@ -182,7 +182,7 @@ def with_legs_of_file(machine: Machine, ours: Configuration) -> Configuration:
 
 
 def _rings(machine: Machine, place: Array) -> tuple[list[Array], list[Array]]:
-    """Base and platform joints of the actuated legs, in order."""
+    """Return the base and platform joints of the actuated legs, in order."""
     geometry = machine.tables["geometry"]
     rings = []
     for name in ("base", "platform"):
@@ -194,19 +194,19 @@ def _rings(machine: Machine, place: Array) -> tuple[list[Array], list[Array]]:
 
 
 def _drive(machine: Machine, number: int, freedom: Joint) -> list[Spring]:
-    """The springs of an actuator: one, or those of its parts in a row."""
+    """Return the springs of an actuator: one, or those of its parts in a row."""
     series = machine.tables.get("stiffness.actuator")
     rows = [machine.tables["stiffness"].actuator] if series is None else list(vars(series).values())
     return [Spring("actuator", freedom, row[number], actuated=i == 0) for i, row in enumerate(rows)]
 
 
 def _elastic(freedom: Joint, rigidity: float, length: float, factor: float = 1.0) -> list[Spring]:
-    """A spring of a link over its whole length; none if it is rigid."""
+    """Return a spring of a link over its whole length; none if it is rigid."""
     return [] if math.isinf(rigidity) else [Spring("link", freedom, factor * rigidity / length)]
 
 
 def _strut(machine: Machine, number: int, ends: tuple[Array, Array], _ours: Leg) -> Sequence[Element]:
-    """A slide between two spherical joints; of a planar machine, between two revolutes."""
+    """Return a slide between two spherical joints; of a planar machine, between two revolutes."""
     low, high = ends
     axes = (AXES[2],) if machine.family.planar else AXES
     along, length = Joint(vector(unit(high - low))), float(np.linalg.norm(high - low))
@@ -215,7 +215,7 @@ def _strut(machine: Machine, number: int, ends: tuple[Array, Array], _ours: Leg)
 
 
 def _crank(machine: Machine, number: int, ends: tuple[Array, Array], ours: Leg) -> Sequence[Element]:
-    """A crank in a vertical plane and a rod, with its elbow on the side where kinetostat has it."""
+    """Return a crank in a vertical plane and a rod, with its elbow on the side where kinetostat has it."""
     (low, high), geometry, stiffness = ends, machine.tables["geometry"], machine.tables["stiffness"]
     side = turn(Z, geometry.crank_turn[number]) @ unit([low[0], low[1], 0.0])
     crank, rod, span = float(geometry.crank_length), float(geometry.rod_length), high - low

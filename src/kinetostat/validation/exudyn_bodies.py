@@ -66,7 +66,7 @@ class Multibody:
             self._rigid(body.node, mass, centre - body.at, inertia)
 
     def _rigid(self, node: int, mass: float, arm: Array, inertia: Array) -> int:
-        """A rigid body on a node, which several may share, with its centre of mass at an arm (m)."""
+        """Return a rigid body on a node, which several may share, with its centre of mass at an arm (m)."""
         about_node = (inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))) / self.unit
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = about_node
         return int(

@@ -129,7 +129,7 @@ def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
 
 
 def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> Array:
-    """Displacements of the platform (rad, m) under wrenches [n x 6] in the engine's unit of force.
+    """Return the displacements of the platform (rad, m) under wrenches [n x 6] in the engine's unit of force.
 
     The wrenches are steps of one run, from no load on, so that all of them can share the factors of one matrix. Where a
     step does not converge the run ends, and there are fewer displacements than wrenches.
@@ -200,7 +200,7 @@ def build(
 
 
 def _body(model: Multibody, at: Array, plane: Plane | None) -> EngineBody:
-    """A new body; in a planar machine it is constrained to the plane."""
+    """Return a new body; in a planar machine it is constrained to the plane."""
     body = model.body(at)
     if plane is not None:
         frame = array(plane.frame.translation), columns(plane.frame.rotation)
@@ -209,7 +209,7 @@ def _body(model: Multibody, at: Array, plane: Plane | None) -> EngineBody:
 
 
 def _leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: Plane | None) -> list[EngineBody]:
-    """The bodies of one leg from ground to platform, with their connectors."""
+    """Return the bodies of one leg from ground to platform, with their connectors."""
     bodies = [model.ground]
     for piece in chain[:-1]:
         bodies.append(_body(model, _far_point(piece, bodies[-1].at), plane))
@@ -222,7 +222,7 @@ def _leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: 
 
 
 def _far_point(piece: Piece, before: Array) -> Array:
-    """A point of the body after a piece (m); a frame near its joints loses fewer digits to cancellation."""
+    """Return a point of the body after a piece (m); a frame near its joints loses fewer digits to cancellation."""
     if isinstance(piece, Joint | Spring):
         point = joint_of(piece).point
         return before if point is None else array(point)
@@ -268,7 +268,7 @@ def _joint(
 
 
 def _axes_around(axis: Array, normal: Array | None = None) -> Array:
-    """Right-handed axes, the third along `axis`, the first along `normal` if that is across it."""
+    """Return right-handed axes, the third along `axis`, the first along `normal` if that is across it."""
     if normal is None or abs(float(normal @ axis)) > 0.5:
         normal = np.eye(3)[np.argmin(abs(axis))]
     x = normal - (normal @ axis) * axis
@@ -360,7 +360,7 @@ def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration
 
 
 def modal_frequencies(model: Multibody) -> Array:
-    """Frequencies (Hz) of the engine's linearised equations about where its system is, ascending.
+    """Return the frequencies (Hz) of the engine's linearised equations about where its system is, ascending.
 
     Motions that have no stiffness are idle, of frequency 0, and the others have no momentum with them; motions without
     mass have no frequency. So K is made a unit matrix by its eigenvectors without the idle ones, each with as much idle

@@ -68,7 +68,7 @@ class LegPart:
         return np.concatenate([axis, np.cross(point, axis) + float(joint.pitch) * axis])
 
     def at_pose(self, before: Array, after: Array) -> Element:
-        """The part where it is at the pose.
+        """Return the part where it is at the pose.
 
         Args:
             before, after: placements of the bodies that it joins.
@@ -111,7 +111,7 @@ class LegBody:
     inertia: Array | None = None
 
     def member(self, leg: str, placements: Sequence[Array]) -> Member:
-        """The link at the pose.
+        """Return the link at the pose.
 
         Args:
             leg: name of its leg.
@@ -157,7 +157,7 @@ class MovingLeg:
         return sum(part.moves for part in self.parts)
 
     def placements(self, coordinates: Sequence[float]) -> list[Array]:
-        """Placements of what is before each part, and of the platform end, at coordinates in rad and m."""
+        """Return the placements of what is before each part, and of the platform end, at coordinates in rad and m."""
         given = iter(coordinates)
         rows = [np.eye(4)]
         for part in self.parts:
@@ -171,7 +171,7 @@ class MovingLeg:
         return np.array([part.rate(before, next(given)) for part, before in pairs if part.moves]).reshape(-1, 6).T
 
     def at_pose(self, placements: Sequence[Array]) -> Leg:
-        """The leg at the pose, its rods as long as the pose makes them."""
+        """Return the leg at the pose, its rods as long as the pose makes them."""
         pairs = list(zip(self.parts, placements, placements[1:], strict=False))
         chain = [part.at_pose(before, after) for part, before, after in pairs]
         for i, part in enumerate(self.parts):
@@ -202,24 +202,24 @@ def turn(axis: Array, angle: float) -> Array:
 
 
 def placement(rotation: Array, translation: Array) -> Array:
-    """A rotation [3 x 3] and a translation (m) in one matrix [4 x 4]."""
+    """Return a rotation [3 x 3] and a translation (m) in one matrix [4 x 4]."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
     return matrix
 
 
 def apply(place: Array, point: Array) -> Array:
-    """A point (m) under a placement."""
+    """Return a point (m) under a placement."""
     return np.asarray(place[:3, :3] @ point + place[:3, 3])
 
 
 def moved_point(place: Array, point: Vector) -> Vector:
-    """A point (m) under a placement, as a vector."""
+    """Return a point (m) under a placement, as a vector."""
     return vector(apply(place, array(point)))
 
 
 def turned_direction(place: Array, direction: Vector) -> Vector:
-    """A direction under a placement."""
+    """Return a direction under a placement."""
     return vector(place[:3, :3] @ array(direction))
 
 
@@ -229,13 +229,13 @@ def vector(numbers: Any) -> Vector:
 
 
 def unit(direction: Any) -> Array:
-    """A direction at unit length."""
+    """Return a direction at unit length."""
     row = np.asarray(direction, dtype=float)
     return np.asarray(row / np.linalg.norm(row))
 
 
 def joint_in(element: Any) -> Any:
-    """The freedom of a joint, or of a spring."""
+    """Return the freedom of a joint, or of a spring."""
     return element.joint if isinstance(element, Spring) else element
 
 
@@ -246,13 +246,13 @@ def _joint_at(joint: Joint, place: Array) -> Joint:
 
 
 def _bars(bars: Parallelogram) -> tuple[Array, Array]:
-    """The way along the bars at the home pose, m, and the unit normal about which they swing."""
+    """Return the way along the bars at the home pose, m, and the unit normal about which they swing."""
     span = array(bars.far) - array(bars.near)
     return span, unit(np.cross(array(bars.side), span))
 
 
 def _centre(element: Any, far: bool) -> Array:
-    """Centre of a joint that turns, or of the near or far side of a parallelogram, m."""
+    """Return the centre of a joint that turns, or of the near or far side of a parallelogram, m."""
     if isinstance(element, Parallelogram):
         return array(element.far if far else element.near)
     return array(joint_in(element).point)

@@ -119,7 +119,7 @@ def _plain(leg: Leg, element: Element) -> list[Piece]:
 
 
 def _extent(leg: Leg) -> float:
-    """Largest distance of two points of a leg, m; 1 if it has only one."""
+    """Return the largest distance of two points of a leg, m; 1 if it has only one."""
     points = [array(p) for element in leg.chain for p in element.path]
     return max((float(np.linalg.norm(p - q)) for p in points for q in points), default=0.0) or 1.0
 
@@ -149,7 +149,7 @@ def moves_in(plane: Plane, piece: Piece) -> bool:
 
 
 def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece, ...]:
-    """The chain with every strut in it as one piece."""
+    """Return the chain with every strut in it as one piece."""
     result: list[Piece] = []
     at = 0
     while at < len(chain):
@@ -160,7 +160,7 @@ def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece,
 
 
 def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[StrutPiece | None, int]:
-    """The strut that begins at a position of the chain, if there is one, and the position after it."""
+    """Return the strut that begins at a position of the chain, if there is one, and the position after it."""
     first, inside = _ball(chain, at, near)
     if first is None:
         return None, at
@@ -214,7 +214,7 @@ def _spans(beam: Beam, ends: tuple[Vector, Vector], near: float) -> bool:
 
 
 def _turns_about(joint: Joint, centres: Sequence[Vector], near: float) -> bool:
-    """Whether a revolute's axis passes through a spherical joint, so that it carries no load."""
+    """Return whether a revolute's axis passes through a spherical joint, so that it carries no load."""
     if joint.point is None or joint.pitch != 0.0:
         return False
     axis, point = array(joint.axis), joint.point
@@ -362,7 +362,7 @@ def one_body(parts: Sequence[Heavy]) -> Heavy:
 
 
 def has_rotors(machine: Machine) -> bool:
-    """Whether rotors of actuators have an inertia."""
+    """Return whether rotors of actuators have an inertia."""
     return any(values_of_drives(machine, "drives.rotor_inertia"))
 
 

@@ -82,7 +82,7 @@ def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) 
 
 
 def _extremes(configuration: Configuration) -> tuple[float, float]:
-    """Least and greatest stiffness of its parts, N/m; those in N·m/rad through the machine's length."""
+    """Return the least and greatest stiffness of its parts, N/m; those in N·m/rad through the machine's length."""
     length = float(configuration.length)
     stiffnesses: list[float] = []
     for leg in configuration.legs:

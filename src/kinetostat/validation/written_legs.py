@@ -52,7 +52,7 @@ def written_legs(machine: Machine) -> list[MovingLeg]:
 
 
 def _document(machine: Machine) -> dict[str, dict[str, Any]]:
-    """The tables of the machine's file, SI: what it says in words, and its numbers."""
+    """Return the tables of the machine's file, SI: what it says in words, and its numbers."""
     literals, tables = machine.family.literals, machine.family_tables
     names = [name for name in dict.fromkeys([*literals, *tables]) if name.startswith(("legs.", "sections."))]
     return {name: {**literals.get(name, {}), **(vars(tables[name]) if name in tables else {})} for name in names}
@@ -73,7 +73,7 @@ def _by_leg(document: Mapping[str, Numbers]) -> dict[str, dict[str, dict[str, An
 
 
 def _copies(name: str, entry: Numbers) -> Iterator[tuple[str, Array]]:
-    """Names of the legs that a written leg stands for, and what turns (and mirrors) it into each [3 x 3]."""
+    """Give the names of the legs that a written leg stands for, and what turns (and mirrors) it into each [3 x 3]."""
     if "copies" not in entry:
         yield name, np.eye(3)
         return
@@ -119,7 +119,7 @@ def _leg(name: str, joints: Sequence[Numbers], links: Mapping[str, Numbers], doc
 
 
 def _joint(leg: str, joint: Numbers, document: Numbers) -> list[LegPart]:
-    """The parts of a joint: its freedoms, of which one may have springs in a row and a rod, and its bearings."""
+    """Return the parts of a joint: its freedoms, of which one may have springs in a row and a rod, and its bearings."""
     name, kind = PartName(leg, joint["name"]), joint["type"]
     moving = [LegPart(element, moves=True) for element in _elements(name, joint)]
     if "stiffness" in joint:
@@ -139,7 +139,7 @@ def _joint(leg: str, joint: Numbers, document: Numbers) -> list[LegPart]:
 
 
 def _elements(name: PartName, joint: Numbers) -> Sequence[Element]:
-    """The elements of a joint that move, from the base side to the platform side."""
+    """Return the elements of a joint that move, from the base side to the platform side."""
     kind = joint["type"]
     if kind == "parallelogram":
         ends = vector(joint["point"]), vector(joint["far"])
@@ -152,7 +152,7 @@ def _elements(name: PartName, joint: Numbers) -> Sequence[Element]:
 
 
 def _freedoms(joint: Numbers) -> list[Joint]:
-    """The freedoms of a joint of a known type, from the base side to the platform side."""
+    """Return the freedoms of a joint of a known type, from the base side to the platform side."""
     kind, point = joint["type"], vector(joint["point"])
     if kind == "fixed":
         return []
@@ -170,7 +170,7 @@ def _freedoms(joint: Numbers) -> list[Joint]:
 
 
 def _row(name: PartName, freedom: Joint, joint: Numbers, actuated: bool) -> list[LegPart]:
-    """The springs on a freedom, one or several in a row, of which the first one moves."""
+    """Return the springs on a freedom, one or several in a row, of which the first one moves."""
     given = joint["stiffness"]
     stiffnesses = list(given.values()) if isinstance(given, dict) else [given]
     first = Spring(name, freedom, stiffnesses[0], name, actuated, not actuated, acts=joint.get("acts", ""))
@@ -190,7 +190,7 @@ def _rigidity(section: Numbers, shear: bool = False) -> Any:
 
 
 def _bearings(name: str, joint: Numbers) -> Sequence[Spring]:
-    """Springs of the bearings of a joint, from a matrix or in the directions of its axis."""
+    """Return the springs of the bearings of a joint, from a matrix or in the directions of its axis."""
     point = vector(joint["point"])
     if "compliance" in joint:
         return matrix_springs(name, joint["compliance"], point)
@@ -209,7 +209,7 @@ def _bearings(name: str, joint: Numbers) -> Sequence[Spring]:
 
 
 def _link(name: PartName, link: Numbers, ends: tuple[Array, Array], document: Numbers) -> list[LegPart]:
-    """The parts that stand for a link that deflects."""
+    """Return the parts that stand for a link that deflects."""
     model = link.get("model", "rigid")
     if model == "rigid":
         return []

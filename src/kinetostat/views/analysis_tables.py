@@ -186,7 +186,7 @@ def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
 
 
 def principal_table(analysis: Analysis) -> FittedTable:
-    """Least and largest stiffness of each block, free to follow and held; empty where there is none."""
+    """Return the least and largest stiffness of each block, free to follow and held; empty where there is none."""
     display = analysis.machine.display
     columns = ["least", "largest", "softest direction", "stiffest direction"]
     table = numeric_table(f"Principal stiffnesses ({display.names(['N/m', 'N·m/rad'])})", "", columns)
@@ -204,7 +204,7 @@ def principal_table(analysis: Analysis) -> FittedTable:
 
 
 def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> FittedTable:
-    """Stiffness along and about directions."""
+    """Return the stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
     title = f"Stiffness along and about directions ({display.names(['N/m', 'N·m/rad'])})"
     table = numeric_table(title, "direction", columns)
@@ -216,7 +216,7 @@ def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> Fitte
 
 
 def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[str]:
-    """The least and the largest stiffness and their directions; a block of one stiffness has two empty cells."""
+    """Return the least and the largest stiffness and their directions; a block of one stiffness has two empty cells."""
     ends = block.stiffnesses[0], block.stiffnesses[-1]
     values = [display.number(stiffness, unit, "rigid") for stiffness in ends]
     directions = [_directions(block, stiffness) for stiffness in ends]
@@ -224,7 +224,7 @@ def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[s
 
 
 def _directions(block: PrincipalStiffness, stiffness: float) -> str:
-    """The direction of a principal stiffness; where several are alike, all that have it."""
+    """Return the direction of a principal stiffness; where several are alike, all that have it."""
     alike: list[Sequence[float]] = []
     others: list[Sequence[float]] = []
     for k, direction in zip(block.stiffnesses, block.directions, strict=True):
@@ -235,7 +235,7 @@ def _directions(block: PrincipalStiffness, stiffness: float) -> str:
 
 
 def direction_words(vector: Sequence[float] | Array) -> str:
-    """A direction by its three numbers, "+0.71 +0.00 -0.71"."""
+    """Return a direction by its three numbers, "+0.71 +0.00 -0.71"."""
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
@@ -257,12 +257,12 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
 
 
 def _point_text(point: Array, display: Display) -> str:
-    """The coordinates of a point in m, with 0 for those that are round-off."""
+    """Return the coordinates of a point in m, with 0 for those that are round-off."""
     return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
 
 def load_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
-    """The load and the deflection of the reference point."""
+    """Return the load and the deflection of the reference point."""
     units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in load.components]
     motions = ", ".join(dict.fromkeys(display.deflection(motion).unit for _, motion in units))
     title = f"Load ({display.names([loaded for loaded, _ in units])}) and the deflection under it ({motions})"
@@ -275,7 +275,7 @@ def load_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
 
 
 def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
-    """Load and deformation of each actuator."""
+    """Return the load and deformation of each actuator."""
     table = numeric_table("Actuators under this load", "", ["load", "deformation"])
     for spring in load.springs:
         if spring.actuated:
@@ -287,7 +287,7 @@ def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTabl
 
 
 def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) -> FittedTable:
-    """The wrench in each joint, in base or platform axes."""
+    """Return the wrench in each joint, in base or platform axes."""
     units = display.names(["N·m", "N"])
     title = f"Joint reactions: load that each joint passes on towards the base ({units}; {axes} axes)"
     turns = [name in ROTATION_NAMES for name in load.components]

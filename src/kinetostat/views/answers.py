@@ -79,7 +79,7 @@ def description_of(answer: object) -> Description:
 
 
 def _is(answer: object, path: str) -> bool:
-    """Whether an object is of a class; its module has been imported if there is an object of it."""
+    """Return whether an object is of a class; its module has been imported if there is an object of it."""
     module, _, name = path.rpartition(".")
     home = sys.modules.get(f"kinetostat.{module}") or sys.modules.get(module)
     return home is not None and isinstance(answer, getattr(home, name))

@@ -87,7 +87,7 @@ def _tables(answer: Budget, full: bool) -> Iterator[FittedTable]:
 
 
 def shown_measures(answer: Budget, full: bool = False) -> list[str]:
-    """Names of the measures that are worth a row: parasitic parts where they are not simply a component.
+    """Return the names of the measures that are worth a row: parasitic parts where they are not simply a component.
 
     Args:
         answer: an answer with measures.
@@ -106,7 +106,7 @@ def shown_measures(answer: Budget, full: bool = False) -> list[str]:
 
 
 def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
-    """A row for each measure: at the pose, or the largest over all poses with the number of its pose.
+    """Return a row for each measure: at the pose, or the largest over all poses with the number of its pose.
 
     Args:
         answer: an answer with sizes.
@@ -132,13 +132,13 @@ def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
 
 
 def ranked_by(answer: Budget) -> list[str]:
-    """The measures whose shares are listed, the leading one first."""
+    """Return the measures whose shares are listed, the leading one first."""
     turned = "rotation" if "rotation" in answer.measures else "rz"
     return [name for name in ("along", "position", turned) if name in answer.measures]
 
 
 def _shares_table(answer: Budget, what: str, *heads: str) -> FittedTable:
-    """A table of contributions without rows yet."""
+    """Return a table of contributions without rows yet."""
     table = text_table(f"Contributions to the variance: {what}", *heads)
     for name in ranked_by(answer):
         table.add_column(f"{name}\n%", justify="right", no_wrap=True)
@@ -146,7 +146,7 @@ def _shares_table(answer: Budget, what: str, *heads: str) -> FittedTable:
 
 
 def _sums_table(answer: Budget, key: str, what: str, notes: dict[str, dict[str, str]]) -> FittedTable:
-    """The shares of lines or legs, the largest first; notes by name stand in columns between."""
+    """Return the shares of lines or legs, the largest first; notes by name stand in columns between."""
     table = _shares_table(answer, what, key, *notes)
     by_measure = [answer.shares_by(key, name) for name in ranked_by(answer)]
     for name in answer.shares_by(key):
@@ -155,7 +155,7 @@ def _sums_table(answer: Budget, key: str, what: str, notes: dict[str, dict[str, 
 
 
 def _parts_table(answer: Budget, full: bool) -> FittedTable:
-    """The shares of single tolerances, the largest first."""
+    """Return the shares of single tolerances, the largest first."""
     rows = answer.shares[[answer.measures.index(name) for name in ranked_by(answer)]]
     order = answer.ranking
     shown = order if full else order[:MOST_LISTED_PARTS]
@@ -176,7 +176,7 @@ def _percent(share: float) -> str:
 
 
 def limit_of(kind: str, limit: float, display: Display) -> str:
-    """A tolerance with its unit, "0.05 mm"."""
+    """Return a tolerance with its unit, "0.05 mm"."""
     if kind == "share":
         return f"{number(limit / PER_METRE, digits=display.digits)} µm/m"
     return display.show(limit, "m" if kind == "length" else "rad")
@@ -208,7 +208,7 @@ def _advice(factor: float) -> str:
 
 
 def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
-    """The new tolerances of a line by kind, from the least to the largest where sizes differ."""
+    """Return the new tolerances of a line by kind, from the least to the largest where sizes differ."""
     if math.isinf(factor):
         return "any"
     texts = []
@@ -221,7 +221,7 @@ def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
 
 
 def _by_measure(answer: Budget, table: Any) -> dict[str, Any]:
-    """A statistic [poses x measures] by measure: a number at a single pose, else a list."""
+    """Return a statistic [poses x measures] by measure: a number at a single pose, else a list."""
     columns = dict(zip(answer.measures, table.T, strict=True))
     return {name: float(column[0]) if len(column) == 1 else column for name, column in columns.items()}
 
@@ -253,7 +253,7 @@ PART = (
 
 
 def _contributions(answer: Budget) -> list[dict[str, Any]]:
-    """The parts with their shares by measure."""
+    """Return the parts with their shares by measure."""
     rows = zip(answer.parts, answer.shares.T.tolist(), strict=True)
     return [vars(part) | {"shares": dict(zip(answer.measures, row, strict=True))} for part, row in rows]
 
@@ -297,7 +297,7 @@ BUDGET = Description(
 
 
 def _errors_table(answer: PossibleErrors, _full: bool) -> Iterator[FittedTable]:
-    """Every number of a machine that may be off, with the line of [tolerances] that is about it."""
+    """Give every number of a machine that may be off, with the line of [tolerances] that is about it."""
     table = text_table("Numbers that may be off", "path", "meaning", "kind", "line of [tolerances]")
     for error in answer.errors:
         table.add_row(error.path, error.words, error.kind, _line_about(answer, error) or "exact")

@@ -13,7 +13,7 @@ from kinetostat.views.data_forms import columns_csv
 
 
 def varied_fields(answer: Budget) -> dict[str, tuple[Any, str]]:
-    """The coordinates that vary over the poses, by path: values at each pose, and their unit."""
+    """Return the coordinates that vary over the poses, by path: values at each pose, and their unit."""
     if answer.question is not None:
         columns, labels = answer.question.grid.columns(0, answer.question.grid.size), answer.question.labels
         paths = zip(answer.question.fields, answer.question.grid.axes, labels.coords, strict=True)
@@ -72,7 +72,7 @@ def budget_dataset(answer: Budget) -> xr.Dataset:
 
 
 def _labels(answer: Budget) -> xr.Dataset:
-    """Coordinates and attributes of a list of poses."""
+    """Return the coordinates and attributes of a list of poses."""
     coordinates: dict[str, Any] = {"pose": ("pose", np.arange(1, len(answer.status) + 1), ABOUT_POSES)}
     varied = [] if answer.poses is None else list(answer.poses.leaves)
     pairs = [] if answer.poses is None else zip(answer.poses.fields, answer.poses.values, strict=True)

@@ -24,7 +24,7 @@ BAR_HEIGHT = 0.8
 
 
 def budget_figures(budget: Budget) -> dict[str, Drawing]:
-    """Drawings of a budget by name: contributions, and the error over the poses if there are many."""
+    """Return the drawings of a budget by name: contributions, and the error over the poses if there are many."""
     drawings = {}
     if budget.shares.any():
         caption = "What the variance of the error is made of."
@@ -74,7 +74,7 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
 
 
 def _sums(budget: Budget, key: str, names: list[str]) -> dict[str, list[float]]:
-    """Shares of the variance of each measure in `names`, added up by "line" or "leg"."""
+    """Return the shares of the variance of each measure in `names`, added up by "line" or "leg"."""
     sums = [budget.shares_by(key, name) for name in names]
     return {label: [each[label] for each in sums] for label in sums[0]}
 

@@ -53,7 +53,7 @@ def _names(names: tuple[str, ...]) -> str:
 
 
 def _along(answer: Capability) -> str:
-    """The greatest amounts both ways of the direction that was asked for."""
+    """Return the greatest amounts both ways of the direction that was asked for."""
     phrases = []
     for part in (part for part in answer.sets if part.least >= 0.0):
         ways = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
@@ -89,7 +89,7 @@ def _tables(answer: Capability, _full: bool) -> Iterator[FittedTable]:
 
 
 def _finite(value: float) -> float | None:
-    """A number for JSON; None where there is no limit."""
+    """Return a number for JSON; None where there is no limit."""
     return value if math.isfinite(value) else None
 
 

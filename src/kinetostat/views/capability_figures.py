@@ -29,7 +29,7 @@ CAPTION = "Cuts of what the drives allow through zero, each with the largest cir
 
 
 def capability_figures(answer: Capability) -> dict[str, Drawing]:
-    """The drawing of the sets; none where the loads are not held or every set is a line."""
+    """Return the drawing of the sets; none where the loads are not held or every set is a line."""
     drawings = {}
     for name, sets in FIGURES.items():
         if _sets_with_planes(answer, sets):
@@ -38,7 +38,7 @@ def capability_figures(answer: Capability) -> dict[str, Drawing]:
 
 
 def _sets_with_planes(answer: Capability, names: Sequence[str]) -> list[tuple[CapabilitySet, list[tuple[int, int]]]]:
-    """The sets that can be drawn, each with the planes in which it is more than a line."""
+    """Return the sets that can be drawn, each with the planes in which it is more than a line."""
     rows = []
     for part in answer.sets:
         if part.name not in names:
@@ -50,7 +50,7 @@ def _sets_with_planes(answer: Capability, names: Sequence[str]) -> list[tuple[Ca
 
 
 def _lies_in(part: CapabilitySet, plane: tuple[int, int]) -> bool:
-    """Whether both axes of a plane are among the directions that a set has."""
+    """Return whether both axes of a plane are among the directions that a set has."""
     kept = part.directions @ part.directions.T
     return all(abs(kept[axis, axis] - 1.0) < DEPENDENT for axis in plane)
 

@@ -33,7 +33,7 @@ RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
-    """A row for each actuator at a single pose, else a row for each pose."""
+    """Give a row for each actuator at a single pose, else a row for each pose."""
     display = answer.machine.display
     if len(answer.coordinates) == 1:
         heads = ["commanded", "without loads", "difference"]
@@ -129,7 +129,7 @@ def correction_lines(answer: CorrectionTable) -> Lines:
 
 
 def correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTable]:
-    """Least and largest correction of each actuator, and the coefficients of the law."""
+    """Give the least and largest correction of each actuator, and the coefficients of the law."""
     if not answer.before:
         return
     commands, display = answer.command, answer.machine.display
@@ -150,7 +150,7 @@ def correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTa
 
 
 def _name(field: Parameter) -> str:
-    """The field by its path, without a table that says nothing."""
+    """Return the field by its path, without a table that says nothing."""
     return field.path.split(".", 1)[1] if field.path.startswith(UNNAMED_TABLES) else field.shown
 
 
@@ -166,7 +166,7 @@ def _term_text(term: Term, fields: Sequence[Parameter]) -> str:
 
 
 def law_fields(answer: CorrectionTable) -> dict[str, Any]:
-    """The law as plain data."""
+    """Return the law as plain data."""
     law = answer.law
     return {
         "terms": [

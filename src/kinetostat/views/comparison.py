@@ -22,7 +22,7 @@ SAME_PERCENT = 0.05
 
 
 def letters_of(comparison: Comparison) -> str:
-    """The letters by which designs are called: A for the first."""
+    """Return the letters by which designs are called: A for the first."""
     return string.ascii_uppercase[: len(comparison.designs)]
 
 
@@ -51,7 +51,7 @@ def _lines(comparison: Comparison) -> Lines:
 
 
 def _verdict_sentences(comparison: Comparison) -> Iterator[str]:
-    """A sentence on each design: the requirements that it misses, and those on quantities that it lacks."""
+    """Give a sentence on each design: the requirements that it misses, and those on quantities that it lacks."""
     names = [condition_of(row)[0] for row in comparison.verdicts]
     for column in zip(*comparison.verdicts, strict=True):
         missed = dict.fromkeys(name for name, each in zip(names, column, strict=True) if each and not each.met)
@@ -61,13 +61,13 @@ def _verdict_sentences(comparison: Comparison) -> Iterator[str]:
 
 
 def condition_of(row: Sequence[Verdict | None]) -> tuple[str, str]:
-    """The name of a requirement and its condition: that of the first design for which it could be judged."""
+    """Return the name of a requirement and its condition: that of the first design for which it could be judged."""
     verdict = next(verdict for verdict in row if verdict)
     return verdict.name, verdict.condition
 
 
 def verdict_text(verdict: Verdict | None, display: Display) -> str:
-    """Whether a requirement is met, by which worst value, and by how much."""
+    """Return whether a requirement is met, by which worst value, and by how much."""
     if verdict is None:
         return DASH
     word = "met" if verdict.met else "missed"

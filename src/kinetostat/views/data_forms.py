@@ -60,7 +60,7 @@ def _nested_lists(values: np.ndarray[Any, Any]) -> Any:
 
 
 def stiffness_of_spring(stiffness: float | None) -> float | str | None:
-    """A spring's stiffness as machine files write it: infinity is "rigid"."""
+    """Return a spring's stiffness as machine files write it: infinity is "rigid"."""
     return "rigid" if stiffness is not None and math.isinf(stiffness) else stiffness
 
 
@@ -96,12 +96,12 @@ def _cell(value: Any) -> Any:
 
 
 def json_of(description: Description, answer: Any) -> dict[str, Any]:
-    """An answer as plain data: a key for each field, a list of objects for records."""
+    """Return an answer as plain data: a key for each field, a list of objects for records."""
     return as_answer(_object(description.fields, answer))
 
 
 def _object(fields: Sequence[Field | Records], item: Any) -> dict[str, Any]:
-    """Keys and values of the fields that JSON has."""
+    """Return the keys and values of the fields that JSON has."""
     result: dict[str, Any] = {}
     for part in fields:
         if "json" not in part.forms:
@@ -114,7 +114,7 @@ def _object(fields: Sequence[Field | Records], item: Any) -> dict[str, Any]:
 
 
 def csv_of(description: Description, answer: Any) -> str:
-    """The first records of an answer as CSV: a row for each, numbered from 1.
+    """Return the first records of an answer as CSV: a row for each, numbered from 1.
 
     Names that a spreadsheet would take for a formula have an apostrophe before them.
     """
@@ -130,7 +130,7 @@ def csv_of(description: Description, answer: Any) -> str:
 
 
 def _entries(part: Field, items: Sequence[Any]) -> list[str] | None:
-    """Names of the entries of a mapping, of all records together; None for a field that is not one."""
+    """Return the names of the entries of a mapping, of all records together; None for a field that is not one."""
     values = [part.of(item) for item in items]
     mappings = [value for value in values if isinstance(value, Mapping)]
     return list(dict.fromkeys(str(name) for value in mappings for name in value)) if mappings else None
@@ -149,7 +149,7 @@ def _cells(part: Field, item: Any, entries: Sequence[str] | None) -> list[Any]:
 
 
 def netcdf_of(description: Description, answer: Any) -> bytes:
-    """An answer as NetCDF-4: arrays over their axes, and the records, one along an axis of their own.
+    """Return an answer as NetCDF-4: arrays over their axes, and the records, one along an axis of their own.
 
     Axes are those of the description, and of records their numbers from 1 and the names of mappings. The file is as
     xarray would write it, which takes three times as long to import as to write.
@@ -205,7 +205,7 @@ def _add_records(
 
 
 def _scalar(value: Any) -> Any:
-    """A number as it is, a missing one as NaN, anything else as text."""
+    """Return a number as it is, a missing one as NaN, anything else as text."""
     return value if isinstance(value, bool | Real) else np.nan if value is None else str(value)
 
 

@@ -234,7 +234,7 @@ def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
 
 
 def _most_at_speeds(speed: Array, torque: Array) -> tuple[Array, Array]:
-    """The greatest torque at each speed or above it, as a line from the axis of torques to that of speeds."""
+    """Return the greatest torque at each speed or above it, as a line from the axis of torques to that of speeds."""
     order = np.argsort(-speed)
     greatest = np.maximum.accumulate(torque[order])
     ahead = np.flatnonzero(np.diff(greatest, prepend=-1.0) > 0.0)
@@ -320,12 +320,12 @@ def curves_csv(answer: DriveLoads) -> str | None:
 
 
 def _of_modes(name: str) -> Callable[[DriveLoads], Any]:
-    """A number of the modes along the motion; None where they are not known."""
+    """Return a number of the modes along the motion; None where they are not known."""
     return lambda answer: getattr(answer.along_modes, name, None)
 
 
 def _over_time(name: str, unit: str, meaning: str) -> Field:
-    """A curve of all drives; empty where there is no answer."""
+    """Return a curve of all drives; empty where there is no answer."""
 
     def take(answer: DriveLoads) -> Array:
         return np.zeros((0, 0)) if answer.curves is None else np.asarray(getattr(answer.curves, name))

@@ -77,7 +77,7 @@ def _at_most(answer: Elevation, sizes: Array, unit: str) -> str:
 
 
 def _forces_sentence(answer: Elevation) -> str:
-    """The greatest load of each kind, and how much of the limits is used."""
+    """Return the greatest load of each kind, and how much of the limits is used."""
     parts = []
     for turning, kind in KINDS_OF_LOADS:
         unit, columns = load_unit(turning), [i for i, turns in enumerate(answer.turning) if turns is turning]
@@ -187,7 +187,7 @@ def elevation_csv(answer: Elevation) -> str:
 
 
 def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
-    """The drawing over the elevation; none where the machine comes to no rest."""
+    """Return the drawing over the elevation; none where the machine comes to no rest."""
     if not np.isfinite(answer.sag).any():
         return {}
     caption = "Sag, first frequency, loads and corrections of the actuators over the elevation; dotted: loads reverse."

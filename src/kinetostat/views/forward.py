@@ -33,7 +33,7 @@ def coordinate_text(value: float, unit: str, display: Display) -> str:
 
 
 def mode_table(machine: Machine, poses: Sequence[ForwardPose]) -> FittedTable:
-    """The assembly modes, a row each, with the coordinates of the pose."""
+    """Return the assembly modes, a row each, with the coordinates of the pose."""
     display = machine.display
     units = {name: find(machine.family, f"pose.{name}").unit for name in poses[0].pose}
     heads = [display.scale(unit).label(name) for name, unit in units.items()]

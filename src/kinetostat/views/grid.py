@@ -61,14 +61,14 @@ def display_of(dataset: xr.Dataset) -> Display:
 
 
 def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
-    """Values of a coordinate as an axis shows them, and its label with the unit."""
+    """Return the values of a coordinate as an axis shows them, and its label with the unit."""
     coordinate = dataset[name]
     scale = display_of(dataset).scale(coordinate.attrs["units"])
     return coordinate.values * scale.factor, scale.label(_plain(field_of(coordinate)))
 
 
 def _plain(path: str) -> str:
-    """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
+    """Return a path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
     section, _, field = named_entry(path).partition(".")
     words = field.replace(".", " ").replace("_", " ")
     return words if section == "pose" else f"{section}: {words}"
@@ -114,7 +114,7 @@ def _variables(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def answered_points(dataset: xr.Dataset) -> bool:
-    """Whether any point of a grid has a result."""
+    """Return whether any point of a grid has a result."""
     return bool((dataset["status"] == int(Status.OK)).any())
 
 
@@ -132,7 +132,7 @@ def lines_of_points(failed: Mapping[Status, int], size: int) -> Lines:
 
 
 def _tables(dataset: xr.Dataset, full: bool) -> Iterator[FittedTable]:
-    """A one-dimensional dataset row by row; of a larger one, the extremes of each quantity."""
+    """Give a one-dimensional dataset row by row; of a larger one, the extremes of each quantity."""
     names, rows = quantities_of(dataset), dataset["status"].size
     if len(dataset["status"].dims) == 1 and (full or rows <= MOST_ROWS_OF_A_SWEEP):
         yield _curve_table(dataset, names)
@@ -165,7 +165,7 @@ def _curve_table(dataset: xr.Dataset, names: Sequence[str]) -> FittedTable:
 
 
 def _of_unit(dataset: xr.Dataset, name: str, names: Sequence[str]) -> Iterator[float]:
-    """All values of the quantities that have the unit of one of them."""
+    """Return all values of the quantities that have the unit of one of them."""
     unit = QUANTITIES[name].unit
     return (float(v) for other in names if QUANTITIES[other].unit == unit for v in dataset[other].values.flat)
 

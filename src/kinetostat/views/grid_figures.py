@@ -172,7 +172,7 @@ def _label_outside(panel: Axes, below: str, beside: str) -> None:
 
 
 def _is_count(data: xr.DataArray) -> bool:
-    """Whether a quantity counts, and takes so few values that each can have a colour."""
+    """Return whether a quantity counts, and takes so few values that each can have a colour."""
     name = str(data.name)
     return name in QUANTITIES and QUANTITIES[name].whole and np.unique(data.values).size <= MOST_COLOURED_COUNTS
 

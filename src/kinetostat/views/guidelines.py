@@ -104,7 +104,7 @@ def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
 
 
 def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
-    """The share of each element in the compliance of each direction."""
+    """Return the share of each element in the compliance of each direction."""
     table = numeric_table("Attribution: share of each element in the diagonal of C", "element", answer.components)
     for element, row in zip(answer.elements, _at_pose(here.shares).tolist(), strict=True):
         table.add_row(element.name, *(_share(part) for part in row))
@@ -118,7 +118,7 @@ def _share(part: float) -> Text:
 
 
 def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
-    """The stiffness from which each element counts as rigid.
+    """Return the stiffness from which each element counts as rigid.
 
     An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
     """
@@ -151,7 +151,7 @@ def _limit(value: float) -> str:
 
 
 def _effect_table(answer: Guidelines, count: int) -> FittedTable:
-    """The effect of the first parameters on each direction."""
+    """Return the effect of the first parameters on each direction."""
     grid = bool(answer.poses[0])
     title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     if grid:
@@ -173,7 +173,7 @@ def _arrow(percent: float) -> Text:
 
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
-    """The elements with their roles at the pose and over the grid, by direction."""
+    """Return the elements with their roles at the pose and over the grid, by direction."""
     here, over = answer.here, answer.over_grid
     if here is None:
         return []
@@ -217,7 +217,7 @@ def _per_actuator(limit: float | None, actuator: Element | None) -> float | None
 
 
 def _parameters(answer: Guidelines) -> list[dict[str, Any]]:
-    """The parameters with their effects by direction."""
+    """Return the parameters with their effects by direction."""
     rows = []
     for effect in answer.parameters:
         row: dict[str, Any] = {
@@ -237,7 +237,7 @@ def _by_direction(answer: Guidelines, row: Any) -> dict[str, Any]:
 
 
 def _equations(answer: Guidelines) -> dict[str, dict[str, Any]] | None:
-    """The coefficients of K by element and direction."""
+    """Return the coefficients of K by element and direction."""
     rows = answer.stiffness_equations
     return None if rows is None else {name: _by_direction(answer, row) for name, row in rows.items()}
 

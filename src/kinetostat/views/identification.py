@@ -80,7 +80,7 @@ def _lines(answer: Identification) -> Lines:
 
 
 def _ranges(proposed: NextPoses, display: Display) -> str:
-    """The range of each coordinate among the candidates."""
+    """Return the range of each coordinate among the candidates."""
     parts = []
     for path, ends in proposed.ranges.items():
         scale = display.scale(unit_of(path))
@@ -131,14 +131,14 @@ def _number_table(record: FitRecord, display: Display) -> FittedTable:
 
 
 def value_and_half(value: float, half: float, scale: Scale) -> tuple[str, str]:
-    """An identified number and half of its 95 % interval in a unit, to the digits that are known."""
+    """Return an identified number and half of its 95 % interval in a unit, to the digits that are known."""
     if not np.isfinite(half):
         return number(value * scale.factor), NOT_SEEN
     return number_and_uncertainty(value * scale.factor, half * scale.factor)
 
 
 def scale_of(display: Display, unit: str, group: str) -> Scale:
-    """The unit in which an error is read: that of small motions, ppm for gains, percent for compliances."""
+    """Return the unit in which an error is read: that of small motions, ppm for gains, percent for compliances."""
     if unit in SI_UNITS.values():
         return display.deflection(unit)
     return SHARE if group == "compliances" else RATIO
@@ -210,7 +210,7 @@ def _unknowns(answer: Identification) -> list[dict[str, Any]]:
 
 
 def _fit_file(answer: Identification) -> dict[str, Any]:
-    """The record of the fit, with what commands of the machine as built need."""
+    """Return the record of the fit, with what commands of the machine as built need."""
     return with_home(answer, json_of(IDENTIFICATION, answer))
 
 
@@ -291,7 +291,7 @@ def _ask(
 def _sizes(
     texts: Sequence[str], option: str, form: str = "what=size", example: str = "zeros=0.1 mm"
 ) -> Mapping[str, str]:
-    """Texts by group or path, from texts "what=size"."""
+    """Return texts by group or path, from texts "what=size"."""
     sizes = {}
     for text in texts:
         name, equals, size = (part.strip() for part in text.partition("="))

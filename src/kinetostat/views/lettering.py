@@ -47,7 +47,7 @@ def families() -> tuple[str, ...]:
 
 @cache
 def _known_characters() -> frozenset[int]:
-    """The codes of the characters that the installed fonts have."""
+    """Return the codes of the characters that the installed fonts have."""
     paths = [fontManager.findfont(name) for name in families()]
     return frozenset(code for path in paths for code in get_font(path).get_charmap())
 
@@ -75,7 +75,7 @@ def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
 
 
 def _texts(artist: Artist) -> Iterator[Text]:
-    """The texts within an artist, except for numbers along axes, which every font has."""
+    """Give the texts within an artist, except for numbers along axes, which every font has."""
     if isinstance(artist, Text):
         yield artist
     if isinstance(artist, Axis) and isinstance(artist.get_major_formatter(), NUMBERS):

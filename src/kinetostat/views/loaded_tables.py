@@ -127,7 +127,7 @@ def leg_loads(state: LoadedState) -> list[tuple[str, SpringState]]:
 
 
 def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequence[float] = ()) -> FittedTable | None:
-    """The stiffness to further loads in each direction, beside that of the machine without loads.
+    """Return the stiffness to further loads in each direction, beside that of the machine without loads.
 
     Args:
         state: a state of rest; None is returned where its stiffness is not finite.
@@ -154,7 +154,7 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
 
 
 def springs_of(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
-    """The table of the springs: each by itself where they are few or `full`, else by kind."""
+    """Return the table of the springs: each by itself where they are few or `full`, else by kind."""
     few = len(state.springs) <= MOST_LISTED_SPRINGS
     return spring_table(state, display) if few or full else _kinds_table(state, display)
 
@@ -177,7 +177,7 @@ def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
 
 
 def spring_table(state: LoadedState, display: Display) -> FittedTable:
-    """Load, deformation and state of every spring."""
+    """Return the load, deformation and state of every spring."""
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
         load = display.show(spring.load, load_unit(spring.turning))

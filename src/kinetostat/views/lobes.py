@@ -66,7 +66,7 @@ def _tables(answer: Lobes, full: bool) -> Iterator[FittedTable]:
 
 
 def lobes_figures(answer: Lobes) -> dict[str, Drawing]:
-    """The drawing of the lobes; none without an answer, or where every cut is stable."""
+    """Return the drawing of the lobes; none without an answer, or where every cut is stable."""
     if not answer.poses or math.isinf(answer.least):
         return {}
     caption = "Width of cut that stays stable over the speed of the spindle; above the curve the cut chatters."

@@ -37,7 +37,7 @@ def measured_table(answer: MeasuredComparison) -> FittedTable:
 
 
 def _with_uncertainty(row: MeasuredRow, display: Display, value: float, uncertainty: float) -> str:
-    """A value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
+    """Return a value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
     factor = _scale(row, display).factor
     if uncertainty <= EXACT_SHARE * abs(value):
         return number(value * factor)
@@ -45,13 +45,13 @@ def _with_uncertainty(row: MeasuredRow, display: Display, value: float, uncertai
 
 
 def _scale(row: MeasuredRow, display: Display) -> Scale:
-    """The unit in which a row is shown: a small one for deflections."""
+    """Return the unit in which a row is shown: a small one for deflections."""
     unit = row.entry.unit
     return display.deflection(unit) if unit in ("m", "rad") else display.scale(unit)
 
 
 def verdict_of(row: MeasuredRow, display: Display) -> str:
-    """The verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off.
+    """Return the verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off.
 
     A measured value that cannot be told from zero has its error in its unit, because a percentage of it means nothing.
     """

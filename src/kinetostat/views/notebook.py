@@ -67,7 +67,7 @@ def html_of(answer: object) -> str:
 
 
 def png_of(figure: Figure) -> bytes:
-    """A figure as a PNG."""
+    """Return a figure as a PNG."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=PIXELS_PER_INCH, metadata={"Software": None})
     return stream.getvalue()
@@ -79,7 +79,7 @@ def _figures(answer: object) -> str:
 
 
 def _picture(machine: Machine, kind: str = "machine") -> str:
-    """A picture of the machine, or a sentence that says why it cannot be drawn."""
+    """Return a picture of the machine, or a sentence that says why it cannot be drawn."""
     try:
         data = machine_picture(machine, PICTURE_PIXELS, transparent=True)
     except InputError as error:
@@ -119,7 +119,7 @@ def _text(content: object) -> Text:
 
 
 def _html_with_style(text: Text, style: str | Style | None = None) -> str:
-    """A text as HTML: each part in its own style, and all of it in a further one."""
+    """Return a text as HTML: each part in its own style, and all of it in a further one."""
     plain = Console(file=io.StringIO(), width=LINE_LENGTH)
     parts = [_styled_html(escape(part.text), part.style) for part in text.render(plain)]
     return _styled_html("".join(parts), Style.parse(style) if isinstance(style, str) else style)
@@ -136,7 +136,7 @@ def _styled_html(content: str, style: Style | None) -> str:
 
 
 def _table(terminal: Table) -> str:
-    """A table of the terminal as a table of HTML."""
+    """Return a table of the terminal as a table of HTML."""
     texts = zip(*(column.cells for column in terminal.columns), strict=True)
     rows = [[_markup(cell, row.style) for cell in cells] for row, cells in zip(terminal.rows, texts, strict=True)]
     caption = _markup(terminal.title) if terminal.title else ""

@@ -68,7 +68,7 @@ def bounds_table(problem: Problem) -> Table:
 
 
 def not_searched(problem: Problem) -> str:
-    """Names of the variables that only have a tolerance."""
+    """Return the names of the variables that only have a tolerance."""
     return ", ".join(variable.name for variable in problem.space.variables if variable.fixed)
 
 
@@ -130,7 +130,7 @@ def variable_table(result: Result) -> Table:
 
 
 def direction_table(result: Result) -> Table:
-    """The compliance of each direction before and after."""
+    """Return the compliance of each direction before and after."""
     display = result.problem.machine.display
     worst = "" if result.problem.poses.count == 1 else ", the worst of all poses"
     table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "change", "unit"])
@@ -247,7 +247,7 @@ def _if_solved(value_of: Callable[[Result], Any]) -> Callable[[Result], Any]:
 
 
 def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
-    """The value of every field that the searched variables set, by its path, SI."""
+    """Return the value of every field that the searched variables set, by its path, SI."""
     columns = problem.space.columns(genes[None])
     return {
         field.path: float(columns[field.leaves[0]][0])
@@ -268,7 +268,7 @@ def _numbers_of(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
 
 
 def _best(key: str) -> Field:
-    """A field of the answer that has this key in `_numbers_of` the best design."""
+    """Return a field of the answer that has this key in `_numbers_of` the best design."""
     return Field(key, _if_solved(lambda result: _numbers_of(result.problem, result.outcome, 0)[key]), optional=True)
 
 
@@ -342,7 +342,7 @@ def _front(result: Result) -> list[dict[str, Any]] | None:
 
 
 def designs_dataset(result: Result) -> "xr.Dataset":
-    """Every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
+    """Return every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
     problem, log = result.problem, result.log
     outcome = log.outcome()
     steps = np.repeat(np.arange(len(log.steps)), [step["designs"] for step in log.steps])

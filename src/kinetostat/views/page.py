@@ -19,7 +19,7 @@ STYLE = Path(__file__).with_name("page.css").read_text("utf-8")
 
 
 def whole_page(title: str, style: str, body: Iterable[str]) -> str:
-    """A self-contained page.
+    """Return a self-contained page.
 
     Args:
         title: title of the window.
@@ -56,15 +56,15 @@ def _row(tag: str, cells: Sequence[str], numeric: Sequence[bool]) -> str:
 
 
 def breakable(text: str) -> str:
-    """A text as HTML whose names may be broken after dots and underscores, such as "geometry.base_radius"."""
+    """Return a text as HTML whose names may be broken after dots and underscores, such as "geometry.base_radius"."""
     return text if isinstance(text, Markup) else _NAME.sub(r"\1<wbr>", escape(text))
 
 
 def figure(picture: str, caption: str) -> str:
-    """A picture (an HTML element) with its caption."""
+    """Return a picture (an HTML element) with its caption."""
     return f"<figure>{picture}<figcaption>{as_markup(caption)}</figcaption></figure>"
 
 
 def as_markup(text: str) -> str:
-    """A text as HTML, in which no line ends within a word of the command line, such as "--loaded"."""
+    """Return a text as HTML, in which no line ends within a word of the command line, such as "--loaded"."""
     return text if isinstance(text, Markup) else _OPTION.sub(r'<span class="option">\g<0></span>', escape(text))

@@ -95,7 +95,7 @@ def write_all(
 
 
 def figures(reproduction: Reproduction) -> dict[str, Drawing]:
-    """The figures by file name."""
+    """Return the figures by file name."""
     # The paper calls this offset of the passive leg y, the coordinate of its figure.
     section = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
     section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
@@ -212,7 +212,7 @@ REPRODUCTION = Description(
 
 
 def page(reproduction: Reproduction, drawn: Mapping[str, Figure]) -> str:
-    """The page.
+    """Return the page.
 
     Args:
         reproduction: the recomputed paper.

@@ -46,7 +46,7 @@ def _lines(answer: PoseAnswers) -> Lines:
 
 
 def _tables(answer: PoseAnswers, _full: bool) -> Iterator[FittedTable]:
-    """The extremes of each quantity, with the numbers of their poses, from 1."""
+    """Give the extremes of each quantity, with the numbers of their poses, from 1."""
     if not answer.answered:
         return
     heads = ["unit", "least", "at", "largest", "at"]

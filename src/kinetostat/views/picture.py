@@ -171,7 +171,7 @@ def _lights(layers: Sequence[Hits], ground: Ground, casters: Triangles, detail: 
 
 
 def _solids_seen(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
-    """The solids as the camera sees them [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
+    """Return the solids as the camera sees them [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
 
     The opaque layer comes first; translucent ones are laid over it where nothing opaque hides them.
     """
@@ -190,7 +190,7 @@ def _solids_seen(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera
 
 
 def _pixels(machine: Float32s, shadow: Float32s, ink: Float32s, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
-    """The machine over the grid, over the shadow, over the page [height x width x 4]."""
+    """Return the machine over the grid, over the shadow, over the page [height x width x 4]."""
     shadow, ink = paper.shadow * shadow[..., None], paper.grid * ink[..., None]
     under = np.zeros(3, np.float32) if transparent else np.array(paper.color, np.float32)
     color = under * (1.0 - shadow) * (1.0 - ink) + np.array(paper.ink, np.float32) * ink

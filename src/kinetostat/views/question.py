@@ -187,7 +187,7 @@ class Description:
         return tuple(dict.fromkeys(["json", *csv, *nc, *self.makers]))
 
     def sentences(self, answer: Any) -> Lines:
-        """The lines of an answer; after the first one, a line about the loads of the file that do not count."""
+        """Return the lines of an answer; after the first one, a line about the loads of the file that do not count."""
         first, *others = [*self.lines(answer)] or [("", "")]
         parts = [part for part in self.fields if isinstance(part, Field) and part.key == LOADS_LEFT_OUT.key]
         left_out = parts[0].of(answer) if parts else ""
@@ -195,12 +195,12 @@ class Description:
         return [(head, sentence) for head, sentence in lines if sentence]
 
     def machine_of(self, answer: Any) -> "Machine":
-        """The machine of an answer."""
+        """Return the machine of an answer."""
         machine: Machine = Field("machine", self.machine).of(answer)
         return machine
 
     def drawings(self, answer: Any) -> "dict[str, Drawing]":
-        """The figures of an answer by name; none if nothing can be drawn."""
+        """Return the figures of an answer by name; none if nothing can be drawn."""
         return dict(late(self.figures)(answer)) if self.figures else {}
 
 

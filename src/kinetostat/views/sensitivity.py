@@ -68,7 +68,7 @@ def _lines(answer: Sensitivity) -> Lines:
 
 
 def _parameters(answer: Sensitivity) -> list[dict[str, Any]]:
-    """The parameters with the names of the indices."""
+    """Return the parameters with the names of the indices."""
     names = answer.quantities
     return [
         {

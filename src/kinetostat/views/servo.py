@@ -25,7 +25,7 @@ SAME_SHARE = 1e-9
 
 
 def _share_at_rest(drive: dict[str, Any]) -> float:
-    """Stiffness of a drive at 0 Hz over that of its transmission."""
+    """Return the stiffness of a drive at 0 Hz over that of its transmission."""
     return float(drive["static"] / drive["transmission"])
 
 
@@ -67,7 +67,7 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
 
 
 def _stiffness(answer: Servo, value: float, unit: str) -> str:
-    """A stiffness with its unit, or "rigid"."""
+    """Return a stiffness with its unit, or "rigid"."""
     return RIGID if math.isinf(value) else answer.machine.display.show(value, unit)
 
 
@@ -97,7 +97,7 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
 
 
 def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
-    """The numbers of each drive for files, in which None stands for an infinite number."""
+    """Return the numbers of each drive for files, in which None stands for an infinite number."""
     return [
         {key: None if isinstance(value, float) and math.isinf(value) else value for key, value in drive.items()}
         for drive in _drives(answer)
@@ -124,7 +124,7 @@ def _response(answer: Servo) -> Complex:
 
 
 def servo_figures(answer: Servo) -> dict[str, Drawing]:
-    """The drawing of the response; none without an answer, or where a motion grows."""
+    """Return the drawing of the response; none without an answer, or where a motion grows."""
     if answer.loops is None or not answer.stable:
         return {}
     caption = "Dynamic stiffness of the tool point with servo loops closed, and with motors that stand still."

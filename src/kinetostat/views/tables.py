@@ -180,7 +180,7 @@ def print_doubts(console: Console, machine: Machine) -> None:
 
 
 def machine_table(machine: Machine) -> Table:
-    """Every value of a machine with its meaning."""
+    """Return every value of a machine with its meaning."""
     table = text_table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
     numbers = values(machine)
     fields = list(parameters(machine.family))
@@ -226,7 +226,7 @@ class Piped(Console):
 
 
 def terminal() -> Console:
-    """The console of this process: as wide as the terminal, or where there is none, as its tables need it.
+    """Return the console of this process: as wide as the terminal, or where there is none, as its tables need it.
 
     Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
     """
@@ -257,7 +257,7 @@ def words_on_omitted(count: int) -> str:
 
 
 def text_table(title: str, *columns: str) -> FittedTable:
-    """A table of texts, which are broken between words where the terminal is narrow."""
+    """Return a table of texts, which are broken between words where the terminal is narrow."""
     table = FittedTable(title)
     for column in columns:
         table.add_column(column)
@@ -265,7 +265,7 @@ def text_table(title: str, *columns: str) -> FittedTable:
 
 
 def numeric_table(title: str, first: str, columns: Sequence[str]) -> FittedTable:
-    """A table whose columns after the first hold numbers."""
+    """Return a table whose columns after the first hold numbers."""
     table = FittedTable(title)
     table.add_column(first, no_wrap=True)
     for column in columns:

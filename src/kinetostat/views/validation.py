@@ -37,7 +37,7 @@ def _lines(validation: Validation) -> Lines:
 
 
 def _tables(validation: Validation, full: bool) -> Iterator[Table]:
-    """The diagonals of C side by side and how far they differ; with `full` both matrices, last."""
+    """Give the diagonals of C side by side and how far they differ; with `full` both matrices, last."""
     yield _diagonal_table(validation)
     differences = [*validation.differences, "uncertainty of the engine"]
     table = numeric_table("Relative difference by block, and how exact the engine itself is", "", differences)

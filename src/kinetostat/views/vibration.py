@@ -109,7 +109,7 @@ def strain_of(modes: Sequence[Mode]) -> list[Mapping[str, float]]:
 
 
 def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str]) -> FittedTable:
-    """A line for each mode: frequency, damping, how the tool moves, what would ring there alone.
+    """Return a line for each mode: frequency, damping, how the tool moves, what would ring there alone.
 
     Args:
         modes: the modes from the lowest on.
@@ -135,7 +135,7 @@ def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str
 
 
 def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTable:
-    """Shares of an energy by part in each mode, the greatest parts first, in percent."""
+    """Return the shares of an energy by part in each mode, the greatest parts first, in percent."""
     names = dict.fromkeys(name for mode in shares for name in mode)
     largest = {name: max(abs(mode.get(name, 0.0)) for mode in shares) for name in names}
     order = [name for name, _ in ranking_of(largest)]
@@ -151,7 +151,7 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTabl
 
 
 def percent(share: float) -> str:
-    """A share as a number of percent, a dash where it is nothing."""
+    """Return a share as a number of percent, a dash where it is nothing."""
     return f"{100.0 * share:.1f}" if abs(share) >= LEAST_PERCENT else "–"
 
 
@@ -181,7 +181,7 @@ def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:
 
 
 def _named_modes(answer: Vibration) -> list[dict[str, Any]]:
-    """The modes with the names of their components."""
+    """Return the modes with the names of their components."""
     names, axes = answer.components, "xyz"
     return [
         vars(mode)
@@ -194,7 +194,7 @@ def _named_modes(answer: Vibration) -> list[dict[str, Any]]:
 
 
 def _receptance(answer: Vibration) -> Complex:
-    """The receptance over the frequencies of the response, of the components that the machine has."""
+    """Return the receptance over the frequencies of the response, of the components that the machine has."""
     parts = [COMPONENTS.index(name) for name in answer.components]
     return answer.receptance(frequency_range(answer).tolist())[:, parts][:, :, parts]
 

@@ -61,7 +61,7 @@ class Draft:
     rest: dict[str, Any] = field(default_factory=dict)
 
     def study(self, machine: str) -> StudyFile:
-        """The study as a file would hold it, about a machine of this name.
+        """Return the study as a file would hold it, about a machine of this name.
 
         Raises:
             InputError: a value is not valid; the message is that of `kinetostat optimize`.
@@ -82,7 +82,7 @@ class Draft:
         return read_study(document, FORM)
 
     def problem(self, present: Machine) -> Problem:
-        """The problem to solve; `present` is the machine of the session.
+        """Return the problem to solve; `present` is the machine of the session.
 
         Raises:
             InputError: a value is not valid or does not fit the machine.

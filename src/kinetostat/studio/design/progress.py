@@ -56,20 +56,20 @@ class Progress:
     result: dict[str, Any] | None = None
 
     def scale(self, objective: Objective) -> Scale:
-        """The unit in which the values of an objective are shown."""
+        """Return the unit in which the values of an objective are shown."""
         return self.problem.machine.display.scale(objective.term.unit)
 
     def label(self, objective: Objective) -> str:
-        """The label of an objective with the unit in which its values are shown."""
+        """Return the label of an objective with the unit in which its values are shown."""
         return self.scale(objective).label(plain_name(objective.term.label))
 
     def exact(self, objective: Objective, value: float) -> str:
-        """The value of an objective with all its digits and its unit; a sum of several kinds has none."""
+        """Return the value of an objective with all its digits and its unit; a sum of several kinds has none."""
         scale = self.scale(objective)
         return with_unit(number(value * scale.factor, digits=EXACT), scale.unit.replace("SI", "1"))
 
     def design(self, place: int) -> Machine:
-        """The design at a place of the front as a machine; with one objective, place 0 is the best design."""
+        """Return the design at a place of the front as a machine; with one objective, place 0 is the best design."""
         if self.genes is None or not 0 <= place < len(self.genes):
             raise IndexError(place)
         return machine_of_design(self.problem, self.genes[place])

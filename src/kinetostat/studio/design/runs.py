@@ -84,7 +84,7 @@ class Runs:
             self._spare = _started_worker()
 
     def every(self) -> list[Run]:
-        """All searches, the latest first.
+        """Return all searches, the latest first.
 
         Raises:
             InputError: the folder of all searches cannot be read.
@@ -97,7 +97,7 @@ class Runs:
         return [run for run in listed if run is not None]
 
     def of(self, number: int) -> Run:
-        """The search of this number.
+        """Return the search of this number.
 
         Raises:
             InputError: it has been deleted.

@@ -106,7 +106,7 @@ class Favourites:
         self._folder = state / FAVOURITES
 
     def every(self) -> list[Favourite]:
-        """All favourites, the latest first; files that cannot be read are left out."""
+        """Return all favourites, the latest first; files that cannot be read are left out."""
         favourites = []
         for number, path in numbered_entries(self._folder).items():
             try:

@@ -164,7 +164,7 @@ class StudyForm:
         ui.button(text, icon="add", on_click=action).props("flat dense no-caps").classes("form-add").mark(mark)
 
     def _controls(self) -> dict[str, Control]:
-        """The controls of the machine that the study is about."""
+        """Return the controls of the machine that the study is about."""
         machine = self.draft.machine
         if machine is None:
             return self._session.controls

@@ -44,7 +44,7 @@ class Panel(ABC):
         """
 
     def shows(self, report: Report) -> bool:
-        """Whether the panel has something to say about a report; of a machine that only loads hold, few have."""
+        """Return whether the panel has something to say about a report; of a machine that only loads hold, few have."""
         return report.analysis.status is Status.OK
 
     def leave(self) -> None:  # noqa: B027 - most panels show nothing outside their tab

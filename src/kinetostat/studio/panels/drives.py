@@ -157,13 +157,13 @@ class DrivesPanel(Panel):
 
 
 def _apart_from_pose(machine: Machine) -> tuple[object, ...]:
-    """All numbers of a machine that a motion does not change."""
+    """Return all numbers of a machine that a motion does not change."""
     numbers = {path: value for path, value in values(machine).items() if not path.startswith(POSE)}
     return machine.name, machine.family.name, machine.requirements, numbers
 
 
 def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, list[tuple[str, Array]]]:
-    """Curves of an answer at some times: the label of their axis, their unit, and each with its name.
+    """Return the curves of an answer at some times: the label of their axis, their unit, and each with its name.
 
     Drives of the kind of the first one are drawn, so that all have one unit.
 

@@ -134,7 +134,7 @@ class SensitivityPanel(Panel):
 
 
 def ranking_text(answer: Sensitivity) -> str:
-    """Bars of the parameters that influence the first quantity of a sensitivity study."""
+    """Return the bars of the parameters that influence the first quantity of a sensitivity study."""
     percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents.size]
     known = [(path, percent) for path, percent in percents if not math.isnan(percent)]
     largest = max((abs(percent) for _, percent in known), default=1.0)

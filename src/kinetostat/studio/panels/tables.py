@@ -119,7 +119,7 @@ class IndicesPanel(Panel):
 
 
 def indices_text(analysis: Analysis) -> str:
-    """All indices of a pose as tables under headings."""
+    """Return all indices of a pose as tables under headings."""
     return "".join([_principal(analysis), _pose(analysis), _centres(analysis)])
 
 
@@ -234,7 +234,7 @@ def loaded_text(state: LoadedState) -> str:
 
 
 def tension_bars(state: LoadedState) -> str:
-    """A bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
+    """Return a bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
     shown = leg_loads(state)
     largest = {
         turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (False, True)
@@ -248,7 +248,7 @@ def tension_bars(state: LoadedState) -> str:
 
 
 def _tangents(state: LoadedState) -> str:
-    """The stiffness that a tool feels now, and that of the springs alone with all other motions held."""
+    """Return the stiffness that a tool feels now, and that of the springs alone with all other motions held."""
     stiffness = tangent_table(state)
     if stiffness is None:
         return ""

@@ -262,7 +262,7 @@ def mode_rows(new: Ringing) -> tuple[list[str], list[list[float]], list[list[str
 
 
 def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
-    """Bars of the energies of a mode: what deforms, by spring, and what moves, by part.
+    """Return the bars of the energies of a mode: what deforms, by spring, and what moves, by part.
 
     Args:
         mode: the mode with its shares.

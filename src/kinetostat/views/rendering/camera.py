@@ -58,7 +58,7 @@ class Camera:
         return np.stack([right, down, np.ones_like(right)], axis=-1) @ self.axes
 
     def with_finer_pixels(self, factor: int) -> "Camera":
-        """The same view with more pixels."""
+        """Return the same view with more pixels."""
         return Camera(self.eye, self.axes, self.focal * factor, self.width * factor, self.height * factor)
 
 

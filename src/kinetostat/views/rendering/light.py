@@ -264,7 +264,7 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
 
 
 def _missing(ground: Ground, light: Light) -> Float32s:
-    """Share of the light that shadows take away, on the map; smoothed, because single points are grainy."""
+    """Return the share of the light that shadows take away, on the map; smoothed, because single points are grainy."""
     present = SUN_SHARE * light.sun / light.sun.max() + (1.0 - SUN_SHARE) * light.sky / light.sky.max()
     missing = gaussian_filter(1.0 - present.reshape(ground.side, ground.side), 1.0)
     return np.maximum(missing - FAINTEST_SHADOW, 0.0) / (1.0 - FAINTEST_SHADOW)

@@ -108,7 +108,7 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
 
 
 def _frequencies(answers: Answers) -> Iterator[Block]:
-    """A map of the first natural frequency over the poses of the maps, if there is one."""
+    """Give a map of the first natural frequency over the poses of the maps, if there is one."""
     over = answers.of("frequencies")
     if over is not None and (over["status"] == int(Status.OK)).any():
         draw = contour_maps if over["status"].ndim == 2 else grid_curves
@@ -160,7 +160,7 @@ WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": 
 
 
 def _fit_section(machine: Machine, record: FitRecord) -> Section:
-    """The machine as built, by the record of a fit and the pictures beside it."""
+    """Return the machine as built, by the record of a fit and the pictures beside it."""
     pictures = (
         Figure(caption, record.pictures[name], 0.85)
         for name, caption in FIT_CAPTIONS.items()

@@ -44,7 +44,7 @@ class _Writer:
         self._live = ""
 
     def body(self) -> list[str]:
-        """All elements of the page."""
+        """Return all elements of the page."""
         report = self._report
         facts = "".join(f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>" for name, text in report.facts)
         head = (
@@ -122,7 +122,7 @@ def _png(picture: bytes, caption: str) -> str:
 
 
 def _attachment(name: str, text: str) -> str:
-    """A text inside the page as JSON, with "<" written as an escape, so that no text ends the script element."""
+    """Return a text inside the page as JSON, with "<" written as an escape, so that no text ends the script element."""
     kind = MEDIA_TYPES[name.rpartition(".")[2]]
     data = text if kind == MEDIA_TYPES["json"] else json.dumps(text, ensure_ascii=False)
     return f'<script type="{kind}" id="{escape(name)}">{data.replace("<", chr(92) + "u003c")}</script>'

@@ -90,7 +90,7 @@ def _block(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
 
 
 def _svg_around(png: bytes) -> str:
-    """A PNG inside an SVG element, because the files handed to Typst must be text."""
+    """Return a PNG inside an SVG element, because the files handed to Typst must be text."""
     width, height = struct.unpack(">II", png[16:24])
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
     data = b64encode(png).decode()

@@ -68,11 +68,11 @@ class MachinePictures:
         }
 
     def portrait(self) -> bytes:
-        """A PNG of the machine."""
+        """Return a PNG of the machine."""
         return picture(self.scene, PICTURE_SIZE)
 
     def deflected_picture(self) -> bytes:
-        """A PNG of the loaded machine with its deflected shape."""
+        """Return a PNG of the loaded machine with its deflected shape."""
         loaded = (solid for solid in self.overlays if solid.layer in LOADED_LAYERS)
         return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), PICTURE_SIZE)
 
@@ -103,7 +103,7 @@ def renderer() -> dict[str, str] | None:
 
 
 def can_be_live() -> bool:
-    """Whether a page can show a scene: the renderer's libraries are installed."""
+    """Return whether a page can show a scene: the renderer's libraries are installed."""
     return renderer() is not None
 
 

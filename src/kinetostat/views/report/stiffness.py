@@ -150,7 +150,7 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
 
 
 def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
-    """The least and the greatest value of each quantity."""
+    """Return the least and the greatest value of each quantity."""
     rows, display = [], display_of(maps)
     for name in names:
         known = maps[name].where(maps["status"] == int(Status.OK)).values

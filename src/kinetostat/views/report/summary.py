@@ -89,14 +89,14 @@ def _actuator_demands(answers: Answers, state: LoadedState) -> Iterator[tuple[st
 
 
 def _verdicts(answers: Answers, prefix: str, names: Iterable[str]) -> str:
-    """The conditions on some quantities, each with its verdict."""
+    """Return the conditions on some quantities, each with its verdict."""
     wanted = {f"{prefix}{name}" for name in names}
     judged = [verdict for verdict in answers.of("requirements") or () if verdict.quantity in wanted]
     return "; ".join(f"{each.condition}: {'met' if each.met else 'not met'}" for each in judged)
 
 
 def _requirements(answers: Answers) -> tuple[Block, ...]:
-    """The requirements of the file: how many are met, and each with its margin and worst pose."""
+    """Return the requirements of the file: how many are met, and each with its margin and worst pose."""
     judged, display = answers.of("requirements"), answers.machine.display
     if not judged:
         return ()
@@ -114,7 +114,7 @@ def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
 
 
 def _directions(answers: Answers) -> Table:
-    """Each direction in a line: compliance, free and held stiffness, and the parts that contribute most."""
+    """Return each direction in a line: compliance, free and held stiffness, and the parts that contribute most."""
     analysis = answers.analysis
     display = analysis.machine.display
     heads = ("direction", "compliance C", "stiffness 1/C", "stiffness K", "mainly from")
@@ -142,7 +142,7 @@ def _contributors(analysis: Analysis, springs: Sequence[Spring], i: int) -> str:
 
 
 def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figure:
-    """The picture of the machine on the first page.
+    """Return the picture of the machine on the first page.
 
     Args:
         analysis: the analysis at the pose.

@@ -190,7 +190,7 @@ def _validation(machine: Machine, options: ReportOptions) -> Validation | str:
 
 
 def results_of(answers: Answers) -> dict[str, Any]:
-    """The analysis as plain data, with the other answers that have a section of their own under their names."""
+    """Return the analysis as plain data, with the other answers that have a section of their own under their names."""
     others = {name: answers.of(name) for name in ANSWERS_WITH_SECTIONS}
     return plain_of(answers.analysis) | {name: plain_of(answer) for name, answer in others.items() if answer}
 

@@ -234,7 +234,7 @@ def _point(joint: Joint) -> Vector:
 
 
 def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
-    """A joint with one more axis. Of the two spherical joints of a strut the lower is drawn as a Hooke joint."""
+    """Return a joint with one more axis. Of the two spherical joints of a strut the lower is drawn as a Hooke joint."""
     if len(joint.axes) == 2:
         return replace(joint, kind="universal")
     if len(leg.lines) == 1 and together(joint.point, _lower_end(leg)):
@@ -245,7 +245,7 @@ def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
 
 
 def _lower_end(leg: Leg) -> Vector:
-    """The first point of a leg with several axes."""
+    """Return the first point of a leg with several axes."""
     points = [joint.point for joint in leg.passive if joint.point is not None]
     return points[0]
 
@@ -259,7 +259,7 @@ def _spring_part(spring: Spring, point: Vector) -> SpringPart:
 
 
 def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
-    """Whether a joint is drawn already as the balls of a pair of bars."""
+    """Return whether a joint is drawn already as the balls of a pair of bars."""
     return any(
         link.kind == "bars"
         and not link.pinned
@@ -269,7 +269,7 @@ def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
 
 
 def together(first: Vector, second: Vector) -> bool:
-    """Whether two points are the same to the eye."""
+    """Return whether two points are the same to the eye."""
     return (first - second).norm() < SAME_TO_THE_EYE
 
 

@@ -74,7 +74,7 @@ def _neighbours(joint: JointPart, leg: Anatomy, base: Plate | None, platform: Pl
 
 
 def _joint(joint: JointPart, towards: tuple[Vector, Vector], radius: float, material: str) -> list[Solid]:
-    """A joint.
+    """Return a joint.
 
     Args:
         joint: its kind, place and axes.
@@ -106,7 +106,7 @@ def _spherical(joint: JointPart, after: Vector, radius: float) -> list[Solid]:
 
 
 def _universal(joint: JointPart, before: Vector, after: Vector, radius: float) -> list[Solid]:
-    """A cross whose arms two forks hold."""
+    """Return a cross whose arms two forks hold."""
     first, second = joint.axes
     cross = [
         _at(joint, f"cross {n}", shapes.pin(0.36 * radius, 3.5 * radius), "steel", axis)
@@ -122,7 +122,7 @@ def _universal(joint: JointPart, before: Vector, after: Vector, radius: float) -
 
 
 def _fork(joint: JointPart, name: str, axis: Vector, stem: Vector, radius: float) -> Solid:
-    """A fork around the pin along `axis`, with its bridge towards `stem`."""
+    """Return a fork around the pin along `axis`, with its bridge towards `stem`."""
     arm, width = 0.55 * radius, 1.5 * radius
     outline = shapes.fork(2.1 * radius, arm, 2.3 * radius, 0.6 * radius)
     across = unit(axis.cross(stem))
@@ -134,7 +134,7 @@ def _fork(joint: JointPart, name: str, axis: Vector, stem: Vector, radius: float
 
 
 def _revolute(joint: JointPart, before: Vector, radius: float, material: str) -> list[Solid]:
-    """A pin through an eye, held in a fork."""
+    """Return a pin through an eye, held in a fork."""
     (axis, *_) = joint.axes
     return [
         _at(joint, "pin", shapes.pin(0.55 * radius, 4.0 * radius), "steel", axis),
@@ -172,7 +172,7 @@ def rail_ends(rail: RailPart, sizes: Proportions) -> tuple[Vector, Vector]:
 
 
 def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> list[Solid]:
-    """A rail on its bed, with brackets at its ends, and the carriage.
+    """Return a rail on its bed, with brackets at its ends, and the carriage.
 
     Args:
         rail: its axis and where the carriage is.
@@ -185,7 +185,7 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
     length = (end - start).norm()
 
     def part(name: str, box: tuple[float, float, float], material: str, along: float, away: float) -> Solid:
-        """A box: depth away from the leg and width across in radii, length along the axis in m."""
+        """Return a box: depth away from the leg and width across in radii, length along the axis in m."""
         deep, wide, long = box
         origin = start + rail.axis * (along - 0.5 * long) + outward * (away * radius)
         shape = shapes.block(deep * radius, wide * radius, long, 0.1 * radius)
@@ -202,7 +202,7 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
 
 
 def _spring(spring: SpringPart, radius: float) -> Solid:
-    """A virtual spring as in a sketch: a spiral about its axis, or a coil along it."""
+    """Return a virtual spring as in a sketch: a spiral about its axis, or a coil along it."""
     shape = (
         shapes.spiral(1.9 * radius, 3.3 * radius, COIL_TURNS, 0.17 * radius)
         if spring.torsional
@@ -213,7 +213,7 @@ def _spring(spring: SpringPart, radius: float) -> Solid:
 
 
 def _link(link: LinkPart, radius: float, material: str, profile: Profile | None, span: float) -> list[Solid]:
-    """A link of a leg.
+    """Return a link of a leg.
 
     Args:
         link: its kind and ends.
@@ -246,7 +246,7 @@ def _bar(link: LinkPart, radius: float, material: str, profile: Profile | None) 
 
 
 def _telescope(link: LinkPart, radius: float, material: str, span: float) -> list[Solid]:
-    """A cylinder at the start, from which the rod comes."""
+    """Return a cylinder at the start, from which the rod comes."""
     length, along = link.span.norm(), unit(link.span)
     gap = min(2.0 * radius, 0.12 * length)
     barrel = min(BARREL_SHARE * span, LONGEST_BARREL * length) - gap
@@ -265,7 +265,7 @@ def _telescope(link: LinkPart, radius: float, material: str, span: float) -> lis
 
 
 def _bars(link: LinkPart, radius: float, material: str) -> list[Solid]:
-    """Two bars, and the shafts or pins that hold them."""
+    """Return two bars, and the shafts or pins that hold them."""
     side = link.side if link.side is not None else link.span * 0.0
     thick, width = BAR_RADIUS * radius, side.norm()
     solids = []

@@ -93,7 +93,7 @@ def frame_labels(name: str, place: Displacement, length: float) -> list[Label]:
 
 
 def has_open_frame(configuration: Configuration) -> bool:
-    """Whether cables hang between the posts of a frame: a plate behind their anchors would hide the machine."""
+    """Return whether cables hang between the posts of a frame: a plate behind their anchors would hide the machine."""
     return all(spring.acts for leg in configuration.legs for spring in leg.springs if spring.actuated)
 
 
@@ -126,7 +126,7 @@ def tool_solids(machine: Machine, configuration: Configuration, platform: Plate,
 
 
 def _label_point(leg: Anatomy, sizes: Proportions) -> Vector:
-    """A point beside the foot of a leg."""
+    """Return a point beside the foot of a leg."""
     return leg.foot - unit(leg.second_point - leg.foot) * (0.5 * sizes.leg) + Vector(0.0, 0.0, 2.2 * sizes.leg)
 
 

@@ -137,7 +137,7 @@ def _halved_quads(quads: Integers) -> Integers:
 
 
 def _without_slivers(points: Array, normals: Array, triangles: Integers) -> Mesh:
-    """A mesh without triangles of which two corners coincide, and without points that are in no triangle."""
+    """Return a mesh without triangles of which two corners coincide, and without points that are in no triangle."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     real = np.any(a != b, axis=1) & np.any(b != c, axis=1) & np.any(c != a, axis=1)
     used, numbers = np.unique(triangles[real], return_inverse=True)
@@ -197,7 +197,7 @@ def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
 
 
 def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], tip: int) -> bool:
-    """Whether the triangle at a corner lies inside and holds no other corner."""
+    """Return whether the triangle at a corner lies inside and holds no other corner."""
     corners = left[tip - 1], left[tip], left[(tip + 1) % len(left)]
     a, b, c = (points[i] for i in corners)
     if turn_of(a, b, c) <= 0.0:
@@ -207,7 +207,7 @@ def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], tip: int
 
 
 def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
-    """The corner that turns most to the left: the best choice where round-off has hidden every ear."""
+    """Return the corner that turns most to the left: the best choice where round-off has hidden every ear."""
     turns = [turn_of(points[left[i - 1]], points[left[i]], points[left[(i + 1) % len(left)]]) for i in range(len(left))]
     return max(range(len(left)), key=turns.__getitem__)
 
@@ -222,7 +222,7 @@ def _level(flat: Array, height: float) -> Array:
 
 
 def _wall(rings: Array, tilts: Array, outward: Array) -> Mesh:
-    """The side of a plate, edge by edge.
+    """Return the side of a plate, edge by edge.
 
     Args:
         rings: corners by height [rows x corners x 3].
@@ -294,7 +294,7 @@ def _carried_normal(normal: Array, tangent: Array) -> Array:
 
 
 def _disc(ring: Array, normal: Array) -> Mesh:
-    """A flat end whose rim is convex."""
+    """Return a flat end whose rim is convex."""
     fan = np.array([(0, k, k + 1) for k in range(1, len(ring) - 1)])
     turned = np.cross(ring[1] - ring[0], ring[2] - ring[0]) @ normal < 0.0
     return Mesh(ring, np.broadcast_to(normal, ring.shape).copy(), fan[:, ::-1].copy() if turned else fan)

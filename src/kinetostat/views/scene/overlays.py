@@ -56,7 +56,7 @@ def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Pro
 
 
 def _three(directions: Array) -> Rotation:
-    """Right-handed axes along up to three directions."""
+    """Return right-handed axes along up to three directions."""
     given = [Vector(*direction) for direction in directions]
     first = given[0]
     second = given[1] if len(given) > 1 else upright(ZERO, first).rotation.x
@@ -128,7 +128,7 @@ def load_solids(load: Wrench, point: Vector, sizes: Proportions) -> list[Solid]:
 def _bent_arrow(
     names: tuple[str, str], radius: float, turn: float, wire: float, head: Turned, material: str, place: Displacement
 ) -> list[Solid]:
-    """An arrow around the z axis of a place: an arc over the angle `turn`, and a head at its end."""
+    """Return an arrow around the z axis of a place: an arc over the angle `turn`, and a head at its end."""
     tip = place.apply(Vector(radius * math.cos(turn), radius * math.sin(turn), 0.0))
     heading = place.rotation.apply(Vector(-math.sin(turn), math.cos(turn), 0.0))
     return [
@@ -191,14 +191,14 @@ def loaded_overlays(
 
 
 def motions_of(state: LoadedState, response: Response) -> Deflection:
-    """The motions of a machine from its unloaded pose, of which the response is, to its rest."""
+    """Return the motions of a machine from its unloaded pose, of which the response is, to its rest."""
     by_name = dict(zip(state.components, state.displacement, strict=True))
     turned, moved = ([by_name.get(name, 0.0) for name in COMPONENTS[part]] for part in (slice(3), slice(3, 6)))
     return Deflection(response.load, Twist(Vector(*turned), Vector(*moved)), state.links)
 
 
 def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> float:
-    """A round factor, at least 1, that makes the motions of a loaded machine visible.
+    """Return a round factor, at least 1, that makes the motions of a loaded machine visible.
 
     Args:
         response: the response of the machine at its unloaded pose.
@@ -249,7 +249,7 @@ def deflection_overlays(
 def swing_data(
     machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection
 ) -> list[dict[str, Any]]:
-    """Both ends of a swing as plain data, so that a browser needs nothing else to move the machine between them.
+    """Return both ends of a swing as plain data, so that a browser needs nothing else to move the machine between them.
 
     Each solid is in the middle of its swing, as `solid_data` has it, with `ends`: how far every point of its path
     moves to one end, or its two extreme places. It swings as far as a deflected shape is drawn. Nothing is drawn of
@@ -306,7 +306,7 @@ def _finite(moved: Deflection) -> bool:
 
 
 def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
-    """A round factor (1, 2 or 5 times a power of ten) that makes a deflected shape visible.
+    """Return a round factor (1, 2 or 5 times a power of ten) that makes a deflected shape visible.
 
     Args:
         moved: the small motions.
@@ -323,13 +323,13 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
 
 
 def _largest(moved: Deflection, reach: float) -> float:
-    """The greatest displacement of all ends of links and of the platform, m."""
+    """Return the greatest displacement of all ends of links and of the platform, m."""
     links = [motion.translational.norm() for link in moved.links for motion in (link.start_motion, link.end_motion)]
     return max([*links, moved.motion.translational.norm() + moved.motion.rotational.norm() * reach])
 
 
 def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
-    """The deflected machine: its links as bent wires, and its platform at its displaced place."""
+    """Return the deflected machine: its links as bent wires, and its platform at its displaced place."""
     wires = []
     for n, link in enumerate(moved.links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
@@ -342,7 +342,7 @@ def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
 
 
 def exaggerated_displacement(motion: Twist, point: Vector, factor: float) -> Displacement:
-    """A small motion of a body at a point, times a factor, as a rigid displacement of the body."""
+    """Return a small motion of a body at a point, times a factor, as a rigid displacement of the body."""
     angle = motion.rotational.norm() * factor
     axis = unit(motion.rotational)
     turn = rotation_along(axis, cos(angle), sin(angle)) if abs(angle) > NO_TURN else IDENTITY

@@ -21,7 +21,7 @@ shared = lru_cache(512)
 
 @shared
 def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0) -> Turned:
-    """A cylinder about z from height `start`, its ends chamfered."""
+    """Return a cylinder about z from height `start`, its ends chamfered."""
     c = min(chamfer, 0.5 * radius, 0.45 * length)
     end = start + length
     return Turned(
@@ -31,26 +31,26 @@ def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0
 
 @shared
 def pin(radius: float, length: float) -> Turned:
-    """A shaft about z through the origin, centred there."""
+    """Return a shaft about z through the origin, centred there."""
     return shaft(radius, length, 0.18 * radius, -0.5 * length)
 
 
 @shared
 def ball(radius: float) -> Turned:
-    """A ball about the origin."""
+    """Return a ball about the origin."""
     angles = [math.pi * (i / HALF_CIRCLE_POINTS - 0.5) for i in range(HALF_CIRCLE_POINTS + 1)]
     return Turned(tuple((abs(radius * math.cos(a)), radius * math.sin(a)) for a in angles))
 
 
 @shared
 def cone(bottom: float, top: float, length: float) -> Turned:
-    """A frustum about z from the origin."""
+    """Return a frustum about z from the origin."""
     return Turned(((0.0, 0.0), (bottom, 0.0), (top, length), (0.0, length)))
 
 
 @shared
 def waist(radius: float, neck: float, length: float) -> Turned:
-    """A shaft with a thin neck in its middle, centred at the origin: a flexure."""
+    """Return a shaft with a thin neck in its middle, centred at the origin: a flexure."""
     half = 0.5 * length
     heights = [half * (i / CORNER_POINTS - 1.0) for i in range(2 * CORNER_POINTS + 1)]
     sides = [(neck + (radius - neck) * (h / half) ** 2, h) for h in heights]
@@ -59,7 +59,7 @@ def waist(radius: float, neck: float, length: float) -> Turned:
 
 @shared
 def socket(radius: float) -> Turned:
-    """A cup around the lower half of a ball of this radius, with its stem towards -z."""
+    """Return a cup around the lower half of a ball of this radius, with its stem towards -z."""
     angles = [math.radians(a) for a in range(-60, 21, 10)]
     outer = [(1.22 * radius * math.cos(a), 1.22 * radius * math.sin(a)) for a in angles]
     rim = (1.02 * radius * math.cos(angles[-1]), 1.02 * radius * math.sin(angles[-1]))
@@ -68,7 +68,7 @@ def socket(radius: float) -> Turned:
 
 @shared
 def block(width: float, depth: float, height: float, chamfer: float = 0.0) -> Extruded:
-    """A box on the x-y plane, centred on z."""
+    """Return a box on the x-y plane, centred on z."""
     w, d = 0.5 * width, 0.5 * depth
     return Extruded(((-w, -d), (w, -d), (w, d), (-w, d)), height, chamfer)
 
@@ -95,7 +95,7 @@ def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...
 
 @shared
 def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
-    """A flat spiral in the x-y plane with a straight end: the symbol of a torsional spring about z."""
+    """Return a flat spiral in the x-y plane with a straight end: the symbol of a torsional spring about z."""
     count = round(COIL_TURN_POINTS * turns)
     steps = [i / count for i in range(count + 1)]
     curve = [((inner + (outer - inner) * t), math.tau * turns * t) for t in steps]
@@ -106,7 +106,7 @@ def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
 
 @shared
 def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
-    """A coil about z, centred at the origin: the symbol of a linear spring."""
+    """Return a coil about z, centred at the origin: the symbol of a linear spring."""
     count = round(COIL_TURN_POINTS * turns)
     angles = [math.tau * turns * i / count for i in range(count + 1)]
     path = [(radius * math.cos(a), radius * math.sin(a), length * (i / count - 0.5)) for i, a in enumerate(angles)]
@@ -115,14 +115,14 @@ def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
 
 @shared
 def arc(radius: float, turn: float, wire: float) -> Swept:
-    """A wire arc in the x-y plane, from x over the angle `turn` (rad)."""
+    """Return a wire arc in the x-y plane, from x over the angle `turn` (rad)."""
     angles = [turn * i / (2 * HALF_CIRCLE_POINTS) for i in range(2 * HALF_CIRCLE_POINTS + 1)]
     return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire)
 
 
 @shared
 def arrow(length: float, radius: float) -> Turned:
-    """An arrow along z from the origin."""
+    """Return an arrow along z from the origin."""
     head = min(0.4 * length, 6.0 * radius)
     neck = length - head
     return Turned(((0.0, 0.0), (radius, 0.0), (radius, neck), (2.6 * radius, neck), (0.0, length)))
@@ -130,7 +130,7 @@ def arrow(length: float, radius: float) -> Turned:
 
 @shared
 def double_arrow(length: float, radius: float) -> Turned:
-    """An arrow along z with a head at either end, centred at the origin."""
+    """Return an arrow along z with a head at either end, centred at the origin."""
     half, head = 0.5 * length, min(0.2 * length, 6.0 * radius)
     neck, wide = half - head, 2.6 * radius
     return Turned(((0.0, -half), (wide, -neck), (radius, -neck), (radius, neck), (wide, neck), (0.0, half)))

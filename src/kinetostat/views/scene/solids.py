@@ -151,7 +151,7 @@ class Solid:
     leg: str = ""
 
     def moved_by(self, motion: Displacement, **changes: Any) -> "Solid":
-        """The solid after a displacement, with some attributes replaced."""
+        """Return the solid after a displacement, with some attributes replaced."""
         return replace(self, place=motion @ self.place, **changes)
 
 
@@ -258,5 +258,5 @@ def unit(vector: Vector) -> Vector:
 
 
 def _axis_across(direction: Vector) -> Vector:
-    """The axis that is most nearly perpendicular to a direction."""
+    """Return the axis that is most nearly perpendicular to a direction."""
     return min(AXES, key=lambda axis: abs(axis.dot(direction)))
