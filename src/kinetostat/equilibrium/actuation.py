@@ -129,42 +129,55 @@ def _tensions(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -> tu
 
 
 def _tensions_at(equations: Balance, pose: int, least: float, most: float, rule: Rule) -> Array | None:
-    """Loads of all coordinates at one pose, 0 of passive ones; None where none within the bounds balance."""
-    ways, legs = equations.mechanism.ways, equations.mechanism.legs
-    size = ways.shape[1]
-    # Unknown are the wrenches of the legs; passive joints and the platform are in balance.
-    conditions, given = [np.tile(np.eye(size), len(legs))], [ways.T @ equations.load[pose]]
-    felt, weight, signs = [], [], []
-    for number, (leg, terms) in enumerate(zip(legs, equations.legs, strict=True)):
-        rows = np.zeros((leg.size, size * len(legs)))
-        rows[:, size * number : size * (number + 1)] = (ways.T @ terms.rates[pose]).T
-        passive = np.array([spring is None for spring in leg.springs], dtype=bool) | leg.hinged
-        conditions.append(rows[passive])
-        given.append(terms.left[pose][passive])
-        felt.append(np.where(passive[:, None], 0.0, rows))
-        weight.append(np.where(passive, 0.0, terms.left[pose]))
-        signs.append(leg.sign)
-    matrix, right = np.concatenate(conditions), np.concatenate(given)
+    """Loads of all coordinates at one pose, 0 of passive ones; None where none within the bounds balance.
+
+    Unknown are the wrenches of the legs. Passive joints and the platform are in balance, which leaves some mixes of
+    wrenches open; of these the rule chooses by the loads of the springs that only pull or push.
+    """
+    matrix, right, loads_of_wrenches, weight = _balance_of_wrenches(equations, pose)
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
     start = np.linalg.lstsq(matrix, right, rcond=UNRESISTED)[0]
     if np.abs(matrix @ start - right).max() > BALANCED * max(np.abs(right).max(), least):
         return None
-    _, values, rows = np.linalg.svd(matrix)
-    free = rows[int((values > UNRESISTED * values[0]).sum()) :].T
-    felt_by_all, sign = np.concatenate(felt), np.concatenate(signs)
-    base, turn = felt_by_all @ start - np.concatenate(weight), felt_by_all @ free
-    pulls = sign != 0.0
-    inner = _inner_loads(sign[pulls] * base[pulls], sign[pulls, None] * turn[pulls], least, most, rule)
-    return None if inner is None else base + turn @ inner
+    _, sizes, rows = np.linalg.svd(matrix)
+    internal = rows[int((sizes > UNRESISTED * sizes[0]).sum()) :].T
+    base, change = loads_of_wrenches @ start - weight, loads_of_wrenches @ internal
+    sign = np.concatenate([leg.sign for leg in equations.mechanism.legs])
+    bounded = sign != 0.0
+    amounts = _internal_amounts(sign[bounded] * base[bounded], sign[bounded, None] * change[bounded], least, most, rule)
+    return None if amounts is None else base + change @ amounts
 
 
-def _inner_loads(base: Array, turn: Array, least: float, most: float, rule: Rule) -> Array | None:
-    """The z for which base + turn z is within bounds and as the rule says; None where there is none."""
-    across, sizes, along = np.linalg.svd(turn, full_matrices=False)
+def _balance_of_wrenches(equations: Balance, pose: int) -> tuple[Array, Array, Array, Array]:
+    """The equations for the wrenches of all legs at one pose, and what the springs carry by them.
+
+    Returns:
+        Matrix and right side of the balance of platform and passive joints [conditions x wrenches], [conditions]; loads
+        of the springs per unit of each wrench, 0 of passive coordinates [coordinates x wrenches], and what weight takes
+        of these [coordinates].
+    """
+    ways, legs = equations.mechanism.ways, equations.mechanism.legs
+    size = ways.shape[1]
+    conditions, right = [np.tile(np.eye(size), len(legs))], [ways.T @ equations.load[pose]]
+    loads, weight = [], []
+    for number, (leg, terms) in enumerate(zip(legs, equations.legs, strict=True)):
+        rows = np.zeros((leg.size, size * len(legs)))
+        rows[:, size * number : size * (number + 1)] = (ways.T @ terms.rates[pose]).T
+        passive = np.array([spring is None for spring in leg.springs], dtype=bool) | leg.hinged
+        conditions.append(rows[passive])
+        right.append(terms.left[pose][passive])
+        loads.append(np.where(passive[:, None], 0.0, rows))
+        weight.append(np.where(passive, 0.0, terms.left[pose]))
+    return np.concatenate(conditions), np.concatenate(right), np.concatenate(loads), np.concatenate(weight)
+
+
+def _internal_amounts(base: Array, change: Array, least: float, most: float, rule: Rule) -> Array | None:
+    """The z for which base + change z is within bounds and as the rule says; None where there is none."""
+    across, sizes, along = np.linalg.svd(change, full_matrices=False)
     kept = sizes > UNRESISTED * max(sizes.max(initial=0.0), UNRESISTED)
     across, inverse = across[:, kept], along[kept].T / sizes[kept]
-    # base + turn z = given + across y with y = across^T (base + turn z), and given is at right angles to it.
+    # base + change z = given + across y with y = across^T (base + change z), and given is at right angles to it.
     balances = Balancing((base - across @ (across.T @ base))[None], across[None], np.array([True]))
     loads, exist = within_bounds(balances, np.array([least]), np.array([most]), rule)
     return np.asarray(inverse @ (across.T @ (loads[0] - base))) if exist[0] else None

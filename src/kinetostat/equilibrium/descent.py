@@ -39,6 +39,9 @@ BISECTIONS = 50
 """Number of halvings in the search for the shift of the stiffness with which a step is as long as the radius."""
 MOST_SWITCHES = 8
 """Greatest number of times that one-sided springs switch between carrying and slack within a step."""
+WIDENING, NARROWING = 2.0, 0.25
+"""Radius in lengths of the last step, after one that fell as foreseen and after one that is not taken (the usual ones
+of trust regions)."""
 LEAST_SHARE, GOOD_SHARE = 0.1, 0.75
 """Share of the foreseen fall of the potential from which a step is taken, and from which the radius may grow."""
 
@@ -66,8 +69,8 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         fall = potential(part, before, before.platform) - potential(part, after, before.platform)
         share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
         lower = share > LEAST_SHARE
-        wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], 2.0 * step.size), radius[rows])
-        radius[rows] = np.where(lower, np.minimum(wider, LARGEST_RADIUS), 0.25 * step.size)
+        wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], WIDENING * step.size), radius[rows])
+        radius[rows] = np.where(lower, np.minimum(wider, LARGEST_RADIUS), NARROWING * step.size)
         state = state.with_part(rows, before).with_part(rows[lower], after.at(np.flatnonzero(lower)))
         rows = rows[step.size > NEARLY_AT_REST]
     return state

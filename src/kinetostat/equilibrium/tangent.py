@@ -42,33 +42,48 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
         right: right sides.
         loaded: whether to count what loads and wrenches do by turning.
     """
-    size, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
-    whole, total = equations.platform_rates(loaded), right[:, :size]
-    parts, stiffest = [], np.zeros(len(right))
-    for number, (start, end) in enumerate(pairwise(starts)):
-        pushed = np.zeros((len(right), end - start, size))
-        pushed[:, -size:] = np.eye(size)
-        try:
-            part = np.linalg.solve(
-                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], pushed], axis=2)
-            )
-        except np.linalg.LinAlgError:
-            return solve_over_admissible(equations, right, loaded)
-        stiffness = part[:, -size:, -size:]
-        if not (np.abs(stiffness) < STIFFEST_LEG).all():
-            return solve_over_admissible(equations, right, loaded)
-        parts.append(part)
+    size = equations.mechanism.ways.shape[1]
+    legs = _eliminated_legs(equations, right, loaded)
+    if legs is None:
+        return solve_over_admissible(equations, right, loaded)
+    whole, load = equations.platform_rates(loaded), right[:, :size]
+    stiffest = np.zeros(len(right))
+    for leg in legs:
+        stiffness = leg[:, -size:, -size:]
         stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
-        whole, total = whole + stiffness, total - part[:, -size:, :-size]
-    twist = finite_solution(whole, total)
-    result = np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
+        whole, load = whole + stiffness, load - leg[:, -size:, :-size]
+    twist = finite_solution(whole, load)
+    result = np.concatenate([twist, *(leg[:, :, :-size] + leg[:, :, -size:] @ twist for leg in legs)], axis=1)
     sound = np.flatnonzero(np.isfinite(whole).all(axis=(1, 2)))
     softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
     rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
     if len(rows):
-        there = balance(equations.mechanism.at(rows), equations.state.at(rows))
-        result[rows] = solve_over_admissible(there, right[rows], loaded)
+        of_rows = balance(equations.mechanism.at(rows), equations.state.at(rows))
+        result[rows] = solve_over_admissible(of_rows, right[rows], loaded)
     return result
+
+
+def _eliminated_legs(equations: Balance, right: Array, loaded: bool) -> list[Array] | None:
+    """The unknowns of each leg by the right sides and by the platform's twist; None where a leg is rigid, or nearly so.
+
+    Returns:
+        For each leg, a column for each right side and then one for each way of the platform [n x unknowns of the leg x
+        (k + ways)]. The last rows are the wrench of the leg, so that the last block is its stiffness to the platform.
+    """
+    size, legs = equations.mechanism.ways.shape[1], []
+    for number, (start, end) in enumerate(pairwise(equations.mechanism.starts)):
+        by_platform = np.zeros((len(right), end - start, size))
+        by_platform[:, -size:] = np.eye(size)
+        try:
+            leg = np.linalg.solve(
+                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], by_platform], axis=2)
+            )
+        except np.linalg.LinAlgError:
+            return None
+        if not (np.abs(leg[:, -size:, -size:]) < STIFFEST_LEG).all():
+            return None
+        legs.append(leg)
+    return legs
 
 
 def compliance(equations: Balance) -> Array:

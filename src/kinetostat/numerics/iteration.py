@@ -141,7 +141,7 @@ def newton(
         longest: size to which a step is shortened.
         size: function that measures steps [n x unknowns]; the largest number if not given.
     """
-    value, trial, rows = start, start, np.arange(count)
+    value, trial, rows = start, start, np.arange(count)  # accepted unknowns; those that are tried, of the open problems
     limits = np.broadcast_to(closed, (count,))
     outcome, steps = np.full(count, int(Ending.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
     residual, last = np.full((2, count), np.inf)
@@ -160,9 +160,7 @@ def newton(
         finite = np.isfinite(length)
         arrived = length < settled
         if round_off is not None:
-            ratio = length / np.maximum(last[rows], LEAST_DIVISOR)
-            enough = np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
-            arrived = enough & (number > 1)
+            arrived = _foreseen_end(length, last[rows], arrived, round_off) & (number > 1)
         outcome[rows[arrived]], outcome[rows[~finite]] = Ending.CONVERGED, Ending.DIVERGED
         last[rows], steps[rows], greatest[rows] = length, number, np.maximum(greatest[rows], length)
         if (length > longest).any():
@@ -174,6 +172,15 @@ def newton(
         if not rows.size:
             return Solution(value, outcome, residual, steps, greatest)
     return Solution(_with_part(value, rows, trial, rows >= 0), outcome, residual, steps, greatest)
+
+
+def _foreseen_end(length: Array, last: Array, arrived: Mask, round_off: float) -> Mask:
+    """Whether the next step would be round-off, as quadratic convergence foresees it from this one and the last [n].
+
+    Where steps do not shrink fast, nothing is foreseen, and `arrived` decides.
+    """
+    ratio = length / np.maximum(last, LEAST_DIVISOR)
+    return np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
 
 
 def _at(value: Value, places: Integers, count: int) -> Value:

@@ -177,30 +177,59 @@ def _allowed_motions(
         [k x coordinates x motions], of which as many as the platform has come first and follow it.
     """
     size = int(starts[0])
-    inverses, owns, missed = [], [], []
-    for leg, (first, last) in enumerate(pairwise(starts)):
+    legs = []
+    for number, (first, last) in enumerate(pairwise(starts)):
         kept = left_out[rows, first - size : last - size, first:last]
         kept = kept[:, kept.any(axis=(0, 2))]
-        closing = conditions[rows, size * leg : size * (leg + 1), first:last]
-        left, sizes, right = np.linalg.svd(np.concatenate([closing, kept], axis=1))
-        rank = (sizes > CLOSING_ROUND_OFF * sizes[:, :1]).sum(axis=1)
-        acts = np.arange(sizes.shape[1]) < rank[:, None]
-        shrink = np.divide(1.0, sizes, where=acts, out=np.zeros_like(sizes))
-        count = sizes.shape[1]
-        back = left[:, :, :count] * acts[:, None]
-        inverses.append(np.swapaxes(right[:, :count], 1, 2) * shrink[:, None] @ np.swapaxes(back, 1, 2)[:, :, :size])
-        missed.append(np.eye(back.shape[1])[:, :size] - back @ np.swapaxes(back, 1, 2)[:, :, :size])
-        owns.append((rank, right))
-    _, sizes, ways = np.linalg.svd(np.concatenate(missed, axis=1), full_matrices=False)
-    ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(rank for rank, _ in owns)], axis=1)
+        closing = conditions[rows, size * number : size * (number + 1), first:last]
+        legs.append(_following(closing, kept))
+    _, sizes, ways = np.linalg.svd(np.concatenate([leg.missed for leg in legs], axis=1), full_matrices=False)
+    ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(leg.rank for leg in legs)], axis=1)
     for each in np.unique(ranks, axis=0):
-        here = (ranks == each).all(axis=1)
-        platform = np.swapaxes(ways[here, each[0] :], 1, 2)
-        moved = [
-            np.concatenate([inverse[here] @ platform, np.swapaxes(right[here, rank:], 1, 2)], axis=2)
-            for inverse, (_, right), rank in zip(inverses, owns, each[1:], strict=True)
+        of_ranks = (ranks == each).all(axis=1)
+        platform = np.swapaxes(ways[of_ranks, each[0] :], 1, 2)
+        motions = [
+            np.concatenate([leg.inverse[of_ranks] @ platform, np.swapaxes(leg.right[of_ranks, rank:], 1, 2)], axis=2)
+            for leg, rank in zip(legs, each[1:], strict=True)
         ]
-        yield rows[here], [platform, *moved]
+        yield rows[of_ranks], [platform, *motions]
+
+
+@dataclass(frozen=True)
+class _Following:
+    """A leg as it follows the platform, at n poses.
+
+    Attributes:
+        inverse: least motion of its coordinates by the twist of the platform [n x coordinates x ways].
+        missed: part of a twist that it cannot follow [n x conditions x ways].
+        rank: number of its independent conditions [n].
+        right: motions of its coordinates as rows; those behind the first `rank` leave the platform where it is
+            [n x coordinates x coordinates].
+    """
+
+    inverse: Array
+    missed: Array
+    rank: Integers
+    right: Array
+
+
+def _following(closing: Array, kept: Array) -> _Following:
+    """Solve the conditions of a leg by singular values.
+
+    Args:
+        closing: the twist of its end per unit of each coordinate [n x ways x coordinates].
+        kept: conditions that leave out motions of the leg alone [n x conditions x coordinates].
+    """
+    size = closing.shape[1]
+    left, sizes, right = np.linalg.svd(np.concatenate([closing, kept], axis=1))
+    rank = (sizes > CLOSING_ROUND_OFF * sizes[:, :1]).sum(axis=1)
+    count = sizes.shape[1]
+    acts = np.arange(count) < rank[:, None]
+    shrink = np.divide(1.0, sizes, where=acts, out=np.zeros_like(sizes))
+    back = left[:, :, :count] * acts[:, None]
+    by_twist = np.swapaxes(back, 1, 2)[:, :, :size]
+    inverse = np.swapaxes(right[:, :count], 1, 2) * shrink[:, None] @ by_twist
+    return _Following(inverse, np.eye(back.shape[1])[:, :size] - back @ by_twist, rank, right)
 
 
 def _places(basis: Sequence[Array]) -> Iterator[Integers]:
