@@ -30,6 +30,7 @@ from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import loads_left_out, located_members
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
@@ -334,3 +335,17 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
             f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
             "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."
         )
+
+
+class AnswerInState(ImmutableAnswer):
+    """A base of answers to a question that is asked of a machine in a state, which they keep as `state`.
+
+    Tables, pictures and reports ask this state for what they need besides, and solve for nothing again.
+    """
+
+    state: MachineState
+
+    @property
+    def machine(self) -> Machine:
+        """The machine at its pose, with its limits, loads and masses."""
+        return self.state.machine

@@ -116,7 +116,7 @@ class _Search:
         to_goal = np.zeros(len(here.unknowns))
         to_goal[self.rows] = self.goal - here.unknowns[self.rows]
         distance, allowed = np.linalg.norm(to_goal), _allowed_motions(here.rates)
-        loads = np.linalg.lstsq(here.rates.T, to_goal, rcond=DEPENDENT)[0]
+        loads: Array = np.asarray(np.linalg.lstsq(here.rates.T, to_goal, rcond=DEPENDENT)[0], dtype=float)
         curvatures, axes = np.linalg.eigh(self._curvature(here, allowed, loads))
         principal, stiff = allowed @ axes, np.maximum(np.abs(curvatures), DEPENDENT)
         slope = principal.T @ to_goal

@@ -16,7 +16,7 @@ from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.mobility import (
     Mobility,
@@ -55,7 +55,7 @@ AXES = ("base", "platform")
 
 @former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
 @dataclass(frozen=True, eq=False)
-class Analysis(ImmutableAnswer):
+class Analysis(AnswerInState):
     """Stiffness of a machine at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:
@@ -125,11 +125,6 @@ class Analysis(ImmutableAnswer):
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, with its pose."""
-        return self.state.machine
 
     @property
     def moving_mass(self) -> float | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import Wrench
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, actuator_loads_at_rest, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.drive_limits import drive_limits
@@ -105,7 +105,7 @@ class CapabilitySet(ImmutableAnswer):
 
 
 @dataclass(frozen=True, eq=False)
-class Capability(ImmutableAnswer):
+class Capability(AnswerInState):
     """The forces, moments and speeds that the drives of a machine allow at its pose.
 
     Attributes:
@@ -127,11 +127,6 @@ class Capability(ImmutableAnswer):
 
     def __repr__(self) -> str:
         return f"<Capability of {self.machine.name!r}: {self.message}>"
-
-    @property
-    def machine(self) -> Machine:
-        """The machine with its pose."""
-        return self.state.machine
 
     @property
     def loads_left_out(self) -> str:

@@ -127,8 +127,10 @@ def _concatenation(slabs: list[ActuatorTargets]) -> ActuatorTargets:
 def _empty_targets(actuators: tuple[Actuator, ...], status: Integers) -> ActuatorTargets:
     """The answer where no pose has a command."""
     count, size = len(status), len(actuators)
-    shapes = ((count, size), (count, size), (count,), (count,), (count,), (count, 3, size))
-    return ActuatorTargets(actuators, *(np.full(shape, np.nan) for shape in shapes), status)
+    coordinates, unloaded = np.full((2, count, size), np.nan)
+    before, left, turned = np.full((3, count), np.nan)
+    rates = np.full((count, 3, size), np.nan)
+    return ActuatorTargets(actuators, coordinates, unloaded, before, left, turned, rates, status)
 
 
 def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int) -> ActuatorTargets:
@@ -169,8 +171,11 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     turned = np.linalg.norm(answer.off[:, :3], axis=1)
     rates = answer.rates[:, 3:] * (length[:, None] / units)[:, None]
     numbers = stands + equations.state.amounts * units, stands, before, left, turned, rates
-    known = [np.where(stable.reshape(-1, *[1] * (each.ndim - 1)), each, np.nan) for each in numbers]
-    return ActuatorTargets(tuple(actuators), *known, np.where(stable, Status.OK, status).astype(np.int64))
+    coordinates, unloaded, before, left, turned, rates = (
+        np.where(stable.reshape(-1, *[1] * (each.ndim - 1)), each, np.nan) for each in numbers
+    )
+    status = np.where(stable, Status.OK, status).astype(np.int64)
+    return ActuatorTargets(tuple(actuators), coordinates, unloaded, before, left, turned, rates, status)
 
 
 def _actuators(

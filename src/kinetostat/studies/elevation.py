@@ -25,7 +25,7 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.numbers import loaded_numbers
-from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import limit_use
 from kinetostat.kinematics.status import Status
@@ -80,7 +80,7 @@ class Reversal:
 
 
 @dataclass(frozen=True, eq=False)
-class Elevation(ImmutableAnswer):
+class Elevation(AnswerInState):
     """A machine at rest under its loads over the elevation, base axes, SI.
 
     Attributes:
@@ -121,11 +121,6 @@ class Elevation(ImmutableAnswer):
 
     def __repr__(self) -> str:
         return f"<Elevation of {self.machine.name!r}: {len(self.elevations)} elevations>"
-
-    @property
-    def machine(self) -> Machine:
-        """The machine as it stands upright, under its loads."""
-        return self.state.machine
 
     @property
     def sag(self) -> Array:

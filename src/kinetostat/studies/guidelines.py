@@ -15,7 +15,7 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, responses, silent
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Points
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
@@ -114,7 +114,7 @@ class ParameterEffect(ImmutableAnswer):
     skipped="left_out",
 )
 @dataclass(frozen=True, eq=False)
-class Guidelines(ImmutableAnswer):
+class Guidelines(AnswerInState):
     """Design guidelines.
 
     Attributes:
@@ -152,11 +152,6 @@ class Guidelines(ImmutableAnswer):
     poses: tuple[int, int] = (0, 0)
     everywhere: Roles | None = None
     loads_left_out: str = ""
-
-    @property
-    def machine(self) -> Machine:
-        """The machine."""
-        return self.state.machine
 
     def __repr__(self) -> str:
         count = len(self.parameters)

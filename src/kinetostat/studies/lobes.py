@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -49,7 +49,7 @@ ROUND_OFF_OF_DEGREES = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Lobes(ImmutableAnswer):
+class Lobes(AnswerInState):
     """Widths of cut that stay stable over the speed of the spindle.
 
     Attributes:
@@ -86,11 +86,6 @@ class Lobes(ImmutableAnswer):
 
     def __repr__(self) -> str:
         return f"<Lobes of {self.machine.name!r}: {len(self.speeds)} speeds>"
-
-    @property
-    def machine(self) -> Machine:
-        """The machine with its pose."""
-        return self.state.machine
 
 
 @checked

@@ -13,7 +13,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -32,7 +32,7 @@ CURVE_POINTS = 1200
 
 
 @dataclass(frozen=True, eq=False)
-class Servo(ImmutableAnswer):
+class Servo(AnswerInState):
     """The tool of a machine with its servo loops closed.
 
     Attributes:
@@ -66,11 +66,6 @@ class Servo(ImmutableAnswer):
 
     def __repr__(self) -> str:
         return f"<Servo loops of {self.machine.name!r}: {self.message}>"
-
-    @property
-    def machine(self) -> Machine:
-        """The machine with its pose."""
-        return self.state.machine
 
     @property
     def components(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from kinetostat.equilibrium.limit import LoadLimit
 from kinetostat.equilibrium.links import Strut, loaded_links
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, limit_use, load_checks, why_beyond, within
@@ -67,7 +67,7 @@ class SpringState:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadedState(ImmutableAnswer):
+class LoadedState(AnswerInState):
     """A machine at rest under gravity, its preload and its table [load]; base axes, at the loaded tool point, SI.
 
     Attributes:
@@ -113,11 +113,6 @@ class LoadedState(ImmutableAnswer):
     residual: float = 0.0
     links: tuple[DeflectedLink, ...] = ()
     requirements: tuple[Any, ...] = ()
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, at the pose that it has without loads."""
-        return self.state.machine
 
     @cached_property
     def message(self) -> str:

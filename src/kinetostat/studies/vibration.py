@@ -12,7 +12,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.loading import Deflection
@@ -104,7 +104,7 @@ class Mode(ImmutableAnswer):
 
 
 @dataclass(frozen=True, eq=False)
-class Vibration(ImmutableAnswer):
+class Vibration(AnswerInState):
     """The natural vibrations of a machine at its pose.
 
     Attributes:
@@ -143,11 +143,6 @@ class Vibration(ImmutableAnswer):
     highest: float | None = None
     tool: FreeTool | None = None
     loops: ClosedLoops | None = None
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, with its pose and its masses."""
-        return self.state.machine
 
     def __repr__(self) -> str:
         return f"<Vibration of {self.machine.name!r}: {self.status.word}, {len(self.modes)} modes>"

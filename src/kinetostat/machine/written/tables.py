@@ -132,25 +132,57 @@ def _cross_section() -> dict[str, Any]:
     return _table({**known, **sizes, **moduli}, ["shape"])
 
 
+COPIES = {
+    "copies": {"type": "integer", "minimum": 1, "description": "how many legs, turned about z of the base"},
+    "angles": {"type": "array", "items": QUANTITY, "description": "of the copies; left out: equal steps"},
+    "mirrored": {"type": "boolean", "description": "every other copy is a mirror image in the x-z plane"},
+}
+STIFFNESS = {
+    "type": ["number", "string", "array", "object"],
+    "description": 'of its actuator or flexure; "rigid" is exact; parts in a row: ["screw 200 N/um", ...]',
+}
+PRELOAD = {**QUANTITY, "description": "load of its spring where that is not deformed; a cable's pretension"}
+
+
 def _leg() -> dict[str, Any]:
-    fields = {name: _field(field) for kind in JOINT_TYPES.values() for name, field in kind.fields.items()}
+    """A leg: a chain of joints and links, or a cable between two points."""
+    joints = {"type": "array", "minItems": 1, "items": _joint()}
+    links = {"type": "object", "additionalProperties": _link()}
+    chain = _table({"name": {"type": "string"}, **COPIES, "joints": joints, "links": links}, ["name", "joints"])
+    end = {"type": "array", "items": QUANTITY, "minItems": 3, "maxItems": 3}
+    cable = {
+        "type": {"const": CABLE, "description": "an actuator that only pulls, between two points"},
+        "from": {**end, "description": "its end at the base, base frame at the home pose"},
+        "to": {**end, "description": "its end at the platform, base frame at the home pose"},
+        "stiffness": STIFFNESS,
+        "preload": PRELOAD,
+    }
+    rope = _table({"name": {"type": "string"}, **COPIES, **cable}, ["name", "type", "from", "to", "stiffness"])
+    return {"anyOf": [chain, rope]}
+
+
+def _joint() -> dict[str, Any]:
+    """A joint of any type: the fields that all have, then those of each type."""
     about = "; ".join(f"{name}: {kind.meaning}" for name, kind in JOINT_TYPES.items())
-    joint = {
+    common = {
         "name": {"type": "string"},
         "type": {"enum": list(JOINT_TYPES), "description": about},
         "joins": {**BODIES, "description": "bodies on the base side and on the platform side"},
         "actuated": {"enum": [True, False, *MOTORS], "description": "of a joint with several freedoms: which one"},
-        "stiffness": {
-            "type": ["number", "string", "array", "object"],
-            "description": 'of its actuator or flexure; "rigid" is exact; parts in a row: ["screw 200 N/um", ...]',
-        },
+        "stiffness": STIFFNESS,
         **{f"stiffness_{way}": {**QUANTITY, "description": field.quantity.meaning} for way, field in SEAT.items()},
         "compliance": COMPLIANCE,
-        "preload": {**QUANTITY, "description": "load of its spring where that is not deformed; a cable's pretension"},
+        "preload": PRELOAD,
         "acts": {"enum": list(ONE_SIDED), "description": "of a spring that carries loads of one sign only"},
         "section": {"type": "string", "description": "of the rod of a strut: its stiffness is EA/L at the pose"},
         AXIAL: {**QUANTITY, "description": ROD.quantity.meaning},
     }
+    fields = {name: _field(field) for kind in JOINT_TYPES.values() for name, field in kind.fields.items()}
+    return _table({**common, **fields}, ["name", "type", "joins"])
+
+
+def _link() -> dict[str, Any]:
+    """A link between two joints."""
     models = "; ".join(f"{model}: {meaning}" for model, meaning in LINK_MODELS.items())
     link = {
         "model": {"enum": list(LINK_MODELS), "description": models},
@@ -159,24 +191,7 @@ def _leg() -> dict[str, Any]:
         "compliance": COMPLIANCE,
         **{name: _field(field) for name, field in WEIGHT.items()},
     }
-    joints = {"type": "array", "minItems": 1, "items": _table({**joint, **fields}, ["name", "type", "joins"])}
-    links = {"type": "object", "additionalProperties": _table(link, ["model"])}
-    copies = {
-        "copies": {"type": "integer", "minimum": 1, "description": "how many legs, turned about z of the base"},
-        "angles": {"type": "array", "items": QUANTITY, "description": "of the copies; left out: equal steps"},
-        "mirrored": {"type": "boolean", "description": "every other copy is a mirror image in the x-z plane"},
-    }
-    chain = _table({"name": {"type": "string"}, **copies, "joints": joints, "links": links}, ["name", "joints"])
-    end = {"type": "array", "items": QUANTITY, "minItems": 3, "maxItems": 3}
-    cable = {
-        "type": {"const": CABLE, "description": "an actuator that only pulls, between two points"},
-        "from": {**end, "description": "its end at the base, base frame at the home pose"},
-        "to": {**end, "description": "its end at the platform, base frame at the home pose"},
-        "stiffness": joint["stiffness"],
-        "preload": joint["preload"],
-    }
-    rope = _table({"name": {"type": "string"}, **copies, **cable}, ["name", "type", "from", "to", "stiffness"])
-    return {"anyOf": [chain, rope]}
+    return _table(link, ["model"])
 
 
 def _field(field: Field) -> dict[str, Any]:
