@@ -10,23 +10,16 @@ Source: theory (45) to (49); compliances, theory (10).
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.closing import (
-    ClosedLegs,
-    Errors,
-    closed_legs,
-    coordinates_toward,
-    free_screws,
-    holding,
-    in_lengths,
-    independent_columns,
-    screws_of_legs,
-)
+from kinetostat.accuracy.closing import ClosedLegs, closed_legs, coordinates_toward
 from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_error_sources, shared_error_sources
 from kinetostat.accuracy.rows import HomeRows, LegRow, home_rows, random_coordinates
+from kinetostat.accuracy.wrenches import Errors, free_screws, in_lengths, independent_columns, legs_in_place, like_rows
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
@@ -104,6 +97,40 @@ class DrawnMachine:
 
 
 @dataclass(frozen=True, eq=False)
+class ErrorsBehind:
+    """Errors that displace what follows the same motion of a leg, each of them once.
+
+    Attributes:
+        leg: number of the leg.
+        behind: number of the leg's motions that come before them.
+        numbers: of the errors, k of them.
+        twists: the small screw motion in home place per unit of each [k x 6].
+        factors: what each twist is multiplied by at the poses [n x k].
+        steady: whether all of these factors are 1.
+    """
+
+    leg: int
+    behind: int
+    numbers: tuple[int, ...]
+    twists: Array
+    factors: Array
+    steady: bool
+
+    def motion(self, values: Array) -> Array | None:
+        """Their screw motion [1 or n x 6] at values of all errors [1 or n x errors]; None if none is there."""
+        amounts = values[:, self.numbers]
+        if not amounts.any():
+            return None
+        return np.asarray((amounts if self.steady else amounts * self.factors) @ self.twists)
+
+    def among(self, wanted: Collection[int]) -> "ErrorsBehind":
+        """Those of them that are wanted."""
+        kept = [place for place, number in enumerate(self.numbers) if number in wanted]
+        numbers = tuple(self.numbers[place] for place in kept)
+        return replace(self, numbers=numbers, twists=self.twists[kept], factors=self.factors[:, kept])
+
+
+@dataclass(frozen=True, eq=False)
 class ErrorModel:
     """A machine with small errors at n poses.
 
@@ -152,14 +179,31 @@ class ErrorModel:
         """
         motions: Errors = [{} for _ in self.rows.legs]
         each = np.atleast_2d(np.asarray(values, dtype=float))
-        present = np.any(each != 0.0, axis=0)
-        for number, (_, insertions) in enumerate(self.sources):
-            for i in insertions if present[number] else ():
-                amount = each[:, number]
-                if i.factor is not None:
-                    amount = amount * i.amount(self.drawn.state.coordinates[i.leg])
-                motions[i.leg][i.behind] = motions[i.leg].get(i.behind, np.zeros((1, 6))) + amount[:, None] * i.twist
+        for errors in self._errors_behind:
+            motion = errors.motion(each)
+            if motion is not None:
+                others = motions[errors.leg].get(errors.behind)
+                motions[errors.leg][errors.behind] = motion if others is None else others + motion
         return motions
+
+    @cached_property
+    def _errors_behind(self) -> tuple[ErrorsBehind, ...]:
+        """The errors of all legs by the motions behind which they stand, leg by leg."""
+        standing: dict[tuple[int, int, int], dict[int, Insertion]] = {}
+        for number, (_, insertions) in enumerate(self.sources):
+            for i in insertions:
+                again = 0  # an error may stand twice behind one motion
+                while number in standing.setdefault((i.leg, i.behind, again), {}):
+                    again += 1
+                standing[i.leg, i.behind, again][number] = i
+        result = []
+        for (leg, behind, _), these in sorted(standing.items(), key=itemgetter(0)):
+            coordinates, there = self.drawn.state.coordinates[leg], these.values()
+            factors = np.stack([i.amount(coordinates) for i in there], axis=1)
+            steady = all(i.factor is None for i in there)
+            twists = np.array([i.twist for i in there])
+            result.append(ErrorsBehind(leg, behind, tuple(these), twists, factors, steady))
+        return tuple(result)
 
     def closed_state(self, values: Array) -> ClosedLegs:
         """Place all legs with errors [errors] or [n x errors], theory (48).
@@ -233,29 +277,29 @@ class ErrorModel:
         return platform.point(np.broadcast_to(self.tool_home, (len(self), 3)))
 
     def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
-        tool, length, legs = self._tool_at(state.platform), self.rows.length, self.rows.legs
-        by_place: dict[int, dict[int, list[tuple[int, Insertion]]]] = {}
-        for number, (_, insertions) in enumerate(self.sources):
-            for i in insertions if wanted is None or number in wanted else ():
-                by_place.setdefault(i.leg, {}).setdefault(i.behind, []).append((number, i))
+        tool, length = self._tool_at(state.platform), self.rows.length
+        every = self._errors_behind if wanted is None else [errors.among(wanted) for errors in self._errors_behind]
+        by_leg: dict[int, list[ErrorsBehind]] = {}
+        for of_motion in every:
+            if of_motion.numbers:
+                by_leg.setdefault(of_motion.leg, []).append(of_motion)
         with np.errstate(all="ignore"):
-            places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
-            free = screws_of_legs(self.rows, places, tool, self.independent)
-            hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
+            groups = like_rows(self.rows, self.independent, len(self))
+            at = legs_in_place(self.rows, groups, state.coordinates, errors, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
-            for leg, of_leg in by_place.items():
-                at_origin, before = hold.at_origin(leg, tool, length), [places[leg].before[behind] for behind in of_leg]
-                bodies = Motions(
-                    *(np.stack([getattr(at, part) for at in before]) for part in ("rotation", "translation"))
+            for leg, of_leg in by_leg.items():
+                wrenches, before = (
+                    at.holding.at_origin(leg, tool, length),
+                    [at.displacement(leg, e.behind) for e in of_leg],
                 )
-                beside = np.stack([np.broadcast_to(errors[leg].get(b, np.zeros(6)), (len(self), 6)) for b in of_leg])
-                every = _work_beside(_work_in_body(at_origin, bodies), beside)
-                for wrenches, entries in zip(every, of_leg.values(), strict=True):
-                    amounts = np.stack([i.amount(self.drawn.state.coordinates[leg]) for _, i in entries], axis=1)
-                    work = np.swapaxes(wrenches, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
-                    twists = hold.shares[leg] @ work
-                    for column, (number, _) in enumerate(entries):  # an error may stand twice at one place
-                        result[:, :, number] += twists[:, :, column]
+                bodies = Motions(
+                    *(np.stack([getattr(body, part) for body in before]) for part in ("rotation", "translation"))
+                )
+                beside = [np.broadcast_to(errors[leg].get(e.behind, np.zeros(6)), (len(self), 6)) for e in of_leg]
+                works = _work_beside(_work_in_body(wrenches, bodies), np.stack(beside))
+                for of_motion, felt in zip(of_leg, works, strict=True):
+                    work = np.swapaxes(felt, 1, 2) @ of_motion.twists.T * of_motion.factors[:, None]
+                    result[:, :, of_motion.numbers] += at.holding.shares[leg] @ work
         result[:, 3:] *= length
         result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
         sound = np.isin(self.drawn.status, REGULAR) & state.settled

@@ -42,7 +42,7 @@ class Chain:
 
     Attributes:
         twists: unit twist of each motion where the leg is drawn [n x motions x 6]; n is 1 where it is the same at all
-            poses.
+            poses, and the number of legs where the poses of several legs that are alike stand one after another.
         coordinate: number of the coordinate that each motion follows [motions]; -1 where its amount is given.
         given: number of the given amount that each motion follows [motions]; -1 where a coordinate moves it.
         size: number of coordinates.
@@ -74,9 +74,11 @@ class Chain:
         Args:
             coordinates: the coordinates of its joints and springs [n x coordinates].
             amounts: all given amounts of the machine [n x amounts].
-            errors: small screw motions [n x 6] or [1 x 6], by the number of motions behind which they stand.
+            errors: small screw motions [n x 6], [1 x 6] or [legs x 6], by the number of motions behind which they
+                stand.
         """
-        count, small = len(coordinates), _motions_of(errors or {})
+        count = len(coordinates)
+        small = _motions_of(errors or {}, count)
         motion, before, carried = still(count), [], []
         for number, step in enumerate(self._steps(coordinates, amounts)):
             before.append(motion)
@@ -84,7 +86,7 @@ class Chain:
             carried.append(motion)
             motion = motion @ step if number or 0 in small else step  # nothing stands before the first
         before.append(motion)
-        screws = each_twist(carried, self.twists) if carried else np.zeros((count, 0, 6))
+        screws = each_twist(carried, _repeat(self.twists, count)) if carried else np.zeros((count, 0, 6))
         end = motion @ small[len(carried)] if len(carried) in small else motion
         return PlacedChain(tuple(before), end, screws)
 
@@ -93,7 +95,7 @@ class Chain:
         if not self.coordinate:
             return []
         if amounts is None:
-            return each_about(self.twists[0], coordinates[:, self.coordinate])
+            return each_about(self.twists, coordinates[:, self.coordinate])
         pairs = zip(self.coordinate, self.given, strict=True)
         moved = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
         return each_along(self.twists, np.stack(moved, axis=1))
@@ -116,14 +118,22 @@ def _matches(numbers: tuple[int, ...], count: int) -> Array:
     return (np.array(numbers, dtype=int)[:, None] == np.arange(count)).astype(float)
 
 
-def _motions_of(errors: Mapping[int, Array]) -> dict[int, Motions]:
+def _repeat(values: Array, count: int) -> Array:
+    """Values of several legs for all poses of each [count x ...]; one that serves all poses is left alone."""
+    return values if len(values) in (1, count) else np.repeat(values, count // len(values), axis=0)
+
+
+def _motions_of(errors: Mapping[int, Array], count: int) -> dict[int, Motions]:
     """The displacements by small screw motions, all of them in one step."""
     if not errors:
         return {}
     every = exponential(np.concatenate(list(errors.values())))
     ends = np.cumsum([len(error) for error in errors.values()]).tolist()
     places = zip(errors, [0, *ends], ends, strict=False)
-    return {number: Motions(every.rotation[a:b], every.translation[a:b]) for number, a, b in places}
+    return {
+        number: Motions(_repeat(every.rotation[a:b], count), _repeat(every.translation[a:b], count))
+        for number, a, b in places
+    }
 
 
 def closing_gap(platform: Motions, end: Motions) -> Array:

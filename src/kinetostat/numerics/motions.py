@@ -131,27 +131,36 @@ def each_along(twists: Array, amounts: Array) -> list[Motions]:
 
 
 def each_about(twists: Array, amounts: Array) -> list[Motions]:
-    """m displacements at each of n poses: the k-th by the screw `twists[k]` [m x 6] times `amounts[:, k]` [n x m].
+    """m displacements at each of n poses: the k-th by screws that all poses share, times `amounts[:, k]`.
 
     With K the cross product with the unit axis and t the angle, rotations are 1 + sin t K + (1 - cos t) K^2: fixed
     matrices times two numbers of each pose, in a quarter of the time of exponentials.
 
+    Args:
+        twists: the screws [m x 6], or those of several legs [legs x m x 6], each for an equal part of the poses.
+        amounts: their amounts [n x m]; the poses of one leg stand before those of the next.
+
     Source: Murray, Li and Sastry (1994), equations 2.14 and 2.36.
     """
-    size = np.linalg.norm(twists[:, :3], axis=1)
+    (count, motions), screws = amounts.shape, twists.reshape(-1, 6)
+    legs = len(screws) // max(motions, 1)
+    size = np.linalg.norm(screws[:, :3], axis=1)
     unit = np.where(size > 0.0, size, 1.0)[:, None]
-    across = skew_of(twists[:, :3] / unit)
+    across = skew_of(screws[:, :3] / unit)
     squared = across @ across
-    across_moving, squared_moving = (np.einsum("mij,mj->mi", k, twists[:, 3:] / unit) for k in (across, squared))
+    across_moving, squared_moving = (np.einsum("mij,mj->mi", k, screws[:, 3:] / unit) for k in (across, squared))
     # What 1, the amount, sin t and 1 - cos t are multiplied by: nine numbers of the rotation and three of the shift.
-    parts = np.zeros((len(twists), 4, 12))
+    parts = np.zeros((len(screws), 4, 12))
     parts[:, 0, :9] = np.eye(3).ravel()
-    parts[:, 1, 9:] = twists[:, 3:] + squared_moving * unit
+    parts[:, 1, 9:] = screws[:, 3:] + squared_moving * unit
     parts[:, 2] = np.concatenate([across.reshape(-1, 9), -squared_moving], axis=1)
     parts[:, 3] = np.concatenate([squared.reshape(-1, 9), across_moving], axis=1)
-    angle = amounts.T * size[:, None]
-    terms = np.stack([np.ones_like(angle), amounts.T, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2], axis=2)
-    return [Motions(each[:, :9].reshape(-1, 3, 3), each[:, 9:]) for each in terms @ parts]
+    amount = np.swapaxes(amounts.reshape(legs, -1, motions), 1, 2).reshape(len(screws), -1)
+    angle = amount * size[:, None]
+    terms = np.stack([np.ones_like(angle), amount, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2], axis=2)
+    every = (terms @ parts).reshape(legs, motions, -1, 12)
+    of_motions = [every[:, k].reshape(count, 12) for k in range(motions)]
+    return [Motions(each[:, :9].reshape(-1, 3, 3), each[:, 9:]) for each in of_motions]
 
 
 def each_twist(motions: Sequence[Motions], twists: Array) -> Array:
