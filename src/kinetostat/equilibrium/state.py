@@ -30,10 +30,9 @@ from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import loads_left_out, located_members
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
-from kinetostat.spec.answer import ImmutableAnswer
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.immutable import Immutable, ImmutableAnswer
 
 if TYPE_CHECKING:
     from kinetostat.equilibrium import actuation, balance, links, solving, tangent

@@ -37,7 +37,6 @@ from kinetostat.machine.loads import Mass
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along

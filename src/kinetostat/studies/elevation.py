@@ -37,7 +37,6 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, parse_range
-from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.budget import Budget, budget
 from kinetostat.studies.corrections import GRAVITY_ANGLE, CorrectionTable, correction_table
 from kinetostat.studies.requirements import Verdict, requirements

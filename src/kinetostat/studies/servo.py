@@ -19,7 +19,6 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
