@@ -20,6 +20,7 @@ from kinetostat.studio.panels import Panel
 from kinetostat.studio.playback import Player
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import paragraph
+from kinetostat.units import motion_unit
 from kinetostat.views.drives import DRIVES
 
 FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
@@ -172,10 +173,10 @@ def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, li
         kind: the kind of curve, as the panel offers them.
         times: s.
     """
-    display, known = answer.machine.display, answer.motion.times
+    display, moments = answer.machine.display, answer.motion.times
     if kind == TOOL and answer.deflection is not None:
         scale = display.deflection("m")
-        rows = [np.interp(times, known, row) for row in answer.deflection[:, 3:].T]
+        rows = [np.interp(times, moments, row) for row in answer.deflection[:, 3:].T]
         lines = [("at rest", np.linalg.norm(rows, axis=0) * scale.factor)]
         if answer.along_modes is not None and answer.along_modes.modes:
             more = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
@@ -184,16 +185,12 @@ def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, li
     if answer.curves is None:
         return "", "", []
     first = answer.drives[0]
-    length = display.scale("m" if first.slides else "rad")
+    length, force, torque = map(display.scale, (motion_unit(not first.slides), first.unit, first.motor_unit))
     curve, factor, unit, word = {
         SPEED: (answer.curves.speed, length.factor, f"{length.unit}/s", "speed"),
-        TORQUE: (
-            answer.curves.motor_torque,
-            display.scale(first.motor_unit).factor,
-            display.scale(first.motor_unit).unit,
-            "torque of the motor" if first.rotary else "force of the motor",
-        ),
+        TORQUE: (answer.curves.motor_torque, torque.factor, torque.unit,
+                 "torque of the motor" if first.rotary else "force of the motor"),
         POWER: (answer.curves.power, 1.0, "W", "power of the motor"),
-    }.get(kind, (answer.curves.force, display.scale(first.unit).factor, display.scale(first.unit).unit, "force"))
+    }.get(kind, (answer.curves.force, force.factor, force.unit, "force"))  # fmt: skip
     alike = [k for k, drive in enumerate(answer.drives) if drive.slides is first.slides]
-    return f"{word} ({unit})", unit, [(f"{k + 1}", np.interp(times, known, curve[k]) * factor) for k in alike]
+    return f"{word} ({unit})", unit, [(f"{k + 1}", np.interp(times, moments, curve[k]) * factor) for k in alike]

@@ -69,22 +69,28 @@ class VibrationPanel(Panel):
                 ui.space()
                 self.swinging = ui.label("").classes("note").mark("vibration-mode")
                 self.play = icon_button("pause", "Play or pause the mode", self._play_or_pause, "vibration-play")
-            with ui.element("div").classes("vibration-part") as self.modes:
-                self.table = DesignTable("natural vibrations; a row shows its mode", "show mode").mark(
-                    "vibration-table"
-                )
-                self.table.on("pick", self._pick)
-                self.energies = ui.html("", sanitize=False).mark("vibration-energies")
-            with ui.element("div").classes("vibration-part") as self.response:
-                with ui.row().classes("panel-tools"):
-                    self.moved = choice({}, "motion of the tool", self._draw, "vibration-moved")
-                    self.pushed = choice({}, "under a load", self._draw, "vibration-pushed")
-                self.none = ui.label("").classes("note").mark("vibration-uncoupled")
-                self.size = CurveView("size of the tool's response over the frequency").mark("vibration-size")
-                self.phase = CurveView("phase of the tool's response over the frequency").mark("vibration-phase")
-                for curve in (self.size, self.phase):
-                    curve.on("pick", self._pick)
+            self._build_modes()
+            self._build_response()
         self._show_chosen_kind()
+
+    def _build_modes(self) -> None:
+        """Build the table of the modes, with the energies of the chosen one below it."""
+        with ui.element("div").classes("vibration-part") as self.modes:
+            self.table = DesignTable("natural vibrations; a row shows its mode", "show mode").mark("vibration-table")
+            self.table.on("pick", self._pick)
+            self.energies = ui.html("", sanitize=False).mark("vibration-energies")
+
+    def _build_response(self) -> None:
+        """Build the curves of the response, with the choice of the motion and of the load above them."""
+        with ui.element("div").classes("vibration-part") as self.response:
+            with ui.row().classes("panel-tools"):
+                self.moved = choice({}, "motion of the tool", self._draw, "vibration-moved")
+                self.pushed = choice({}, "under a load", self._draw, "vibration-pushed")
+            self.none = ui.label("").classes("note").mark("vibration-uncoupled")
+            self.size = CurveView("size of the tool's response over the frequency").mark("vibration-size")
+            self.phase = CurveView("phase of the tool's response over the frequency").mark("vibration-phase")
+            for curve in (self.size, self.phase):
+                curve.on("pick", self._pick)
 
     def shows(self, report: Report) -> bool:
         return report.answered
@@ -195,33 +201,37 @@ class VibrationPanel(Panel):
             return
         if self.moved.value is None or self.pushed.value is None:
             return  # both are about to be offered
-        answer, across = self._ringing.answer, self._ringing.frequencies
+        machine, receptance = self._ringing.answer.machine, self._ringing.receptance
         moved, pushed = str(self.moved.value), str(self.pushed.value)
-        ways = [_way(answer.machine, name) for name in (moved, pushed)]
-        curve = _response_between(ways[0], self._ringing.receptance, ways[1])
-        direct = [np.abs(_response_between(way, self._ringing.receptance, way)).max() for way in ways]
+        directions = [_unit_screw(machine, name) for name in (moved, pushed)]
+        curve = _response_between(directions[0], receptance, directions[1])
+        direct = [np.abs(_response_between(screw, receptance, screw)).max() for screw in directions]
         coupled = bool(np.abs(curve).max() > COUPLED * math.sqrt(direct[0] * direct[1]))
         self.none.set_visibility(not coupled)
         self.none.set_text(f"A load {direction_phrase(pushed)} does not move the tool {direction_phrase(moved)}.")
         for view in (self.size, self.phase):
             view.set_visibility(coupled)
         unit = entry_unit("compliance", *("x" if name == CUT else name for name in (moved, pushed)))
-        scale = answer.machine.display.scale(unit)
-        marks = [mode.frequency for mode in answer.modes]
-        shared = {
-            "x": _plot_values(across),
+        scale = machine.display.scale(unit)
+        self._show_curve(self.size, np.abs(curve) * scale.factor, scale.label("size"), scale.unit, tall=True)
+        self._show_curve(self.phase, np.degrees(np.unwrap(np.angle(curve))), "phase (deg)", "deg", signed=True)
+
+    def _show_curve(self, view: CurveView, values: Array, label: str, unit: str, **options: bool) -> None:
+        """Show values over the frequencies of the response, with a mark at each mode and one at the chosen mode."""
+        if self._ringing is None or self._ringing.frequencies is None:
+            return
+        marks = [mode.frequency for mode in self._ringing.answer.modes]
+        content = {
+            "x": _plot_values(self._ringing.frequencies),
             "marks": marks,
             "here": marks[self._chosen],
             "log": True,
             "across": "Hz",
+            "lines": [{"name": "", "values": _plot_values(values)}],
+            "label": {"x": "frequency (Hz)", "y": label},
+            "unit": unit,
         }
-        for view, label, unit, values, more in (
-            (self.size, scale.label("size"), scale.unit, np.abs(curve) * scale.factor, {"tall": True}),
-            (self.phase, "phase (deg)", "deg", np.degrees(np.unwrap(np.angle(curve))), {"signed": True}),
-        ):
-            line = {"name": "", "values": _plot_values(values)}
-            labels = {"x": "frequency (Hz)", "y": label}
-            view.run_method("show", {**shared, **more, "lines": [line], "label": labels, "unit": unit})
+        view.run_method("show", content | options)
 
 
 def about(new: Ringing) -> str:
@@ -286,7 +296,7 @@ def _largest(shares: Mapping[str, float]) -> str:
     return f"{name}, {100.0 * share:.0f}\N{NO-BREAK SPACE}%"
 
 
-def _way(machine: Machine, name: str) -> Array:
+def _unit_screw(machine: Machine, name: str) -> Array:
     """Return a component, or the direction across the cut, as a unit wrench or twist [6]."""
     if name != CUT:
         return np.eye(len(COMPONENTS))[COMPONENTS.index(name)]
