@@ -44,9 +44,9 @@ def _add_options(command: "Parser") -> None:
         help="for grids of over 5 million points: continue the one in the output folder, and refuse if there "
         "is none; without this option the command continues or begins",
     )  # fmt: skip
-    where = command.add_mutually_exclusive_group()
-    where.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
-    where.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
+    place = command.add_mutually_exclusive_group()
+    place.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
+    place.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
 
 
 def _workers(text: str) -> int:

@@ -330,7 +330,7 @@ def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tu
     for start in range(0, size, slab):
         part = slice(start, min(start + slab, size))
         with np.errstate(all="ignore"):
-            here = {path: column[part] for path, column in columns.items()}
-            state = machine_state.states_at(machine, here, part.stop - start)
+            part_columns = {path: column[part] for path, column in columns.items()}
+            state = machine_state.states_at(machine, part_columns, part.stop - start)
             loads = numbers.states_of_rest(state).loads if judged_at_rest else ()
             yield part, (*state.free.checks, *load_checks(state.machine, state.configuration, loads))

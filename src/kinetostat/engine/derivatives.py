@@ -221,9 +221,9 @@ class _Routes:
         native: bool,
         modes: int = 0,
     ) -> None:
-        known = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
+        end_slopes = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
-        self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
+        self._known_slopes, self._differentiated = end_slopes, tuple(path for path in paths if path not in end_slopes)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._modes, self._joints = modes, machine.chains().size if machine.family.chains else 0
         names = [name for objective in weights for name, _ in objective]

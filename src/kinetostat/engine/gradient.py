@@ -182,10 +182,10 @@ class Interpreted:
             if node.number in rows:
                 gradients[:, rows[node.number]] = slope
             operation, operands = rule(node)
-            given = [_value(values, operand) for operand in operands]
+            operand_values = [_value(values, operand) for operand in operands]
             for place, operand in parents(node):
                 if operand.number in members:
-                    share = share_of(operation, given, values[node.number], place, slope)
+                    share = share_of(operation, operand_values, values[node.number], place, slope)
                     if operation in UNBOUNDED:
                         share = np.where(slope == 0.0, 0.0, share)
                     slopes[operand.number] = slopes[operand.number] + share if operand.number in slopes else share

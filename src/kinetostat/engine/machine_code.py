@@ -107,8 +107,8 @@ def _image(file: bytes) -> tuple[bytes, int]:
                 _, _, _, home, value, _ = symbols[what >> 32]
                 if what & 0xFFFFFFFF not in RELATIVE or home not in places:
                     raise ValueError("an object file refers to something that is not in it")
-                here = places[target] + at
-                struct.pack_into("<i", image, here, places[home] + value + added - here)
+                address = places[target] + at
+                struct.pack_into("<i", image, address, places[home] + value + added - address)
     (entry,) = (places[home] + value for _, info, _, home, value, _ in symbols if info == GLOBAL_FUNCTION)
     return bytes(image), entry
 

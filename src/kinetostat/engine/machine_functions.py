@@ -248,12 +248,12 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
             "found by iteration along a way; legs have one if three of their revolutes are parallel, or if a ball "
             "joint is at one end."
         )
-    known = values(machine)
-    pose = [name for name in known if name.startswith(POSE)]
-    chosen = [choice(name, [leaf for leaf in known if leaf not in pose], "--inputs") for name in inputs]
+    numbers = values(machine)
+    pose = [name for name in numbers if name.startswith(POSE)]
+    chosen = [choice(name, [leaf for leaf in numbers if leaf not in pose], "--inputs") for name in inputs]
     wanted = [choice(name, [q for q, row in QUANTITIES.items() if not row.cut], "--outputs") for name in outputs]
     paths = tuple(dict.fromkeys([*pose, *chosen]))
-    acting = any(value or path in paths for path, value in known.items() if LOADS.intersection(path.split(".")))
+    acting = any(value or path in paths for path, value in numbers.items() if LOADS.intersection(path.split(".")))
     rests = acting and cut_machine(machine, paths) is not None
     needing = [name for name in wanted if not _has_program(machine, paths, name, rests)]
     if needing:
@@ -286,11 +286,11 @@ def quantities_at(functions: MachineFunctions, columns: Mapping[str, Array], nam
 
 def sample_points(functions: MachineFunctions) -> dict[str, Array]:
     """Return the pose of the file and some near it, those at which the machine has an answer: values by leaf path."""
-    known = values(functions.machine)
+    numbers = values(functions.machine)
     drawn = np.random.default_rng(0).uniform(-AROUND, AROUND, (SAMPLES, len(functions.inputs)))
     drawn[0], drawn[:, functions.coordinates :] = 0.0, 0.0
     units = np.where(np.array(functions.kinds) == "length", functions.length, 1.0)
-    rows = np.array([float(known[path]) for path in functions.inputs]) + drawn * units
+    rows = np.array([float(numbers[path]) for path in functions.inputs]) + drawn * units
     columns = dict(zip(functions.inputs, rows.T, strict=True))
     wanted = ["singularity_margin", *(name for name in functions.quantities if not QUANTITIES[name].loaded)]
     answered = evaluate(functions.machine, PointTable(columns), wanted).status == Status.OK

@@ -125,8 +125,8 @@ def motion_of(
     status: Scalar = joints.status if joints else int(Status.OK)
     status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
     accepted = status < Status.OK + 0.5
-    shown = [result_of(where(accepted, value, math.nan)) for value in results]
-    return formula_of(given, columns, shown, result_of(status), coordinates=moving)
+    accepted_results = [result_of(where(accepted, value, math.nan)) for value in results]
+    return formula_of(given, columns, accepted_results, result_of(status), coordinates=moving)
 
 
 @dataclass(frozen=True)

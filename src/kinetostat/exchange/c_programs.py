@@ -96,11 +96,11 @@ def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
 def _axes(functions: MachineFunctions) -> list[str]:
     """Return the axis of LinuxCNC that each coordinate of the pose has."""
     names = [path.removeprefix(POSE) for path in functions.inputs]
-    taken = {AXES[name] for name in names if name in AXES}
+    used_axes = {AXES[name] for name in names if name in AXES}
     axes = []
     for name, kind in zip(names, functions.kinds, strict=True):
-        axis = AXES.get(name) or next(free for free in FREE_AXES[kind] if free not in taken)
-        taken.add(axis)
+        axis = AXES.get(name) or next(free for free in FREE_AXES[kind] if free not in used_axes)
+        used_axes.add(axis)
         axes.append(axis)
     return axes
 
@@ -113,10 +113,10 @@ def write_mex(
     Arguments and errors are those of `c_source.write`.
     """
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
-    given = [f"[{k}]: {in_comment(path)}" for k, path in enumerate(functions.inputs, 1)]
+    arguments = [f"[{k}]: {in_comment(path)}" for k, path in enumerate(functions.inputs, 1)]
     words = {
         "note": note(functions, "Made by"),
-        "given": listing(given),
+        "given": listing(arguments),
         "inputs": len(functions.inputs),
         "actuators": len(functions.actuators),
         "quantities": len(functions.quantities),
@@ -260,8 +260,8 @@ def _model_description(
 
 def _variable_line(reference: int, variable: ModelVariable) -> str:
     unit = f' unit="{variable.unit}"' if variable.unit else ""
-    about = DESCRIPTIONS.get(variable.group, "")
-    described = f" description={quoteattr(about)}" if about else ""
+    description = DESCRIPTIONS.get(variable.group, "")
+    described = f" description={quoteattr(description)}" if description else ""
     head = f'    <Float64 name={quoteattr(ascii_units(variable.name))} valueReference="{reference}"{unit}{described}'
     if variable.group == "time":
         return f'{head} causality="independent" variability="continuous"/>'

@@ -178,8 +178,8 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
 
 def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgram:
     """Print a body as a function that returns its code; columns after the inputs are the coordinates of a state."""
-    given = len(functions.inputs)
-    names = [f"in[{k}]" if k < given else f"state[{k - given}]" for k in range(len(body.columns))]
+    count = len(functions.inputs)
+    names = [f"in[{k}]" if k < count else f"state[{k - count}]" for k in range(len(body.columns))]
     printed = print_graph(body.columns, names, body.results, body.code)
     lines = [*printed.first]
     if printed.condition:
@@ -188,7 +188,7 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
         lines += [f"    return (int)({printed.code});", "}"]
     lines += [*printed.then, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results))]
     lines.append(f"return (int)({printed.code});")
-    state = "const double *state, " if len(body.columns) > given else ""
+    state = "const double *state, " if len(body.columns) > count else ""
     unused = [f"(void){word};" for word in ("in", "state") if not any(f"{word}[" in line for line in lines)]
     unused = [line for line in unused if state or "state" not in line]
     text = "".join(f"    {line}\n" for line in [*unused, *lines])
@@ -281,7 +281,9 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         poses = STEPS_OF_COMMAND + 2 * functions.coordinates
         work["command"] = poses * (work["rest"] + 2 * work["placement_at"])
     before = _operations_before(functions, work)
-    given = [f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.arguments)]
+    arguments = [
+        f"in[{k}]: {in_comment(path)}, {KINDS[kind].unit}" for k, (path, kind) in enumerate(functions.arguments)
+    ]
     driven = [f"[{k}]: {in_comment(a.name)}, {a.unit}: {a.meaning}" for k, a in enumerate(functions.actuators)]
     listed = [f"[{k}]: {name}, {QUANTITIES[name].unit}" for k, name in enumerate(functions.quantities)]
     sizes = (len(functions.inputs), functions.coordinates, len(functions.actuators), len(functions.quantities))
@@ -291,7 +293,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         "sizes": ", ".join(f"MACHINE_{name} = {size}" for name, size in zip(names, sizes, strict=True)),
         "statuses": ",\n    ".join(f"MACHINE_{status.name} = {int(status)}" for status in Status),
         "sentences": "\n".join(_wrap(f"{status.name}: {status.sentence}") for status in Status),
-        "given": listing(given),
+        "given": listing(arguments),
         "driven": listing(driven),
         "listed": listing(listed),
         "before": f"\n   At most {before} before them, for the states and modes that they are of." if before else "",

@@ -167,8 +167,8 @@ def choose(name: str | None, path: Path | None) -> Format:
         InputError: the name or suffix belongs to none.
     """
     if name is not None:
-        known = {form.name: form for form in KNOWN}
-        return known[choice(name, known, "--to")]
+        formats = {form.name: form for form in KNOWN}
+        return formats[choice(name, formats, "--to")]
     by_suffix = {suffix: form for form in reversed(KNOWN) for suffix in (form.suffix, *form.other_suffixes)}
     if path is not None and path.suffix.lower() in by_suffix:
         return by_suffix[path.suffix.lower()]

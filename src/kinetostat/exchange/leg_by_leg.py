@@ -182,20 +182,20 @@ def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
 def _load(machine: Machine, turn: Rotation) -> dict[str, Any]:
     """Return the table [load], with the loads that have names."""
     table, usual = machine.tables["load"], Load()
-    given = {name: getattr(table, name) for name in quantities(Load) if getattr(table, name) != getattr(usual, name)}
-    given = {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
-    given |= {"state": machine.state} if machine.loaded else {}
+    entries = {name: getattr(table, name) for name in quantities(Load) if getattr(table, name) != getattr(usual, name)}
+    entries = {name: list(value) if isinstance(value, tuple) else value for name, value in entries.items()}
+    entries |= {"state": machine.state} if machine.loaded else {}
     for name in machine.family.loads:
         entry = machine.tables[f"load.{name}"]
         point = _numbers(turn.apply(Vector(*entry.point)))
-        given[name] = {"point": point, "moment": list(entry.moment), "force": list(entry.force)}
-    return given
+        entries[name] = {"point": point, "moment": list(entry.moment), "force": list(entry.force)}
+    return entries
 
 
 def _pose(configuration: Configuration, point: Vector) -> dict[str, float]:
-    given = [SPATIAL_POSE[number] for number in task_coordinates(configuration, point)]
+    names = [SPATIAL_POSE[number] for number in task_coordinates(configuration, point)]
     home = dict(zip("xyz", _numbers(point), strict=True))
-    return {name: home.get(name, 0.0) for name in given}
+    return {name: home.get(name, 0.0) for name in names}
 
 
 @dataclass

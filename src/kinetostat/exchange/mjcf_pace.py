@@ -162,13 +162,13 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
     members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
     heavy = _parts_by_body(model, response, links(members, response.configuration), armatures)
-    known = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
-    if known == 0.0:
+    known_mass = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
+    if known_mass == 0.0:
         raise InputError(
             'Nothing of this machine has a mass, so that it cannot vibrate; give it one, e.g. --set tool.mass="5 kg".'
         )
     gyration = GYRATION * float(analysis.characteristic_length or 1.0)
-    light = LIGHT_SHARE * known
+    light = LIGHT_SHARE * known_mass
     places = {body.name: body.at for body in _moving_bodies(model)}
     places[model.platform.name] = np.array(reference_point(analysis))
     inertias = {
@@ -177,7 +177,7 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     }
     least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
     step = min([step_for(analysis, least, gyration), *_steps_for_springs(_moving_bodies(model), inertias, armatures)])
-    slowest = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known)
+    slowest = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known_mass)
     return Pace(step, 0.0, 10.0 * slowest, inertias, armatures, carried)
 
 

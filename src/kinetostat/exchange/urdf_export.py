@@ -79,8 +79,8 @@ class _Tree:
     def __init__(self, analysis: Analysis, configuration: Configuration) -> None:
         planar = configuration.plane is not None
         self.robot = ElementTree.Element("robot", name=one_line(analysis.machine.name))
-        about = {"space": "planar" if planar else "spatial", "platform": PLATFORM, "tool": TOOL}
-        SubElement(self.robot, "kinetostat", about)
+        attributes = {"space": "planar" if planar else "spatial", "platform": PLATFORM, "tool": TOOL}
+        SubElement(self.robot, "kinetostat", attributes)
         self._names: Counter[str] = Counter((BASE, PLATFORM, TOOL))
         self._size = float(configuration.length)
         self.motors: list[str] = []

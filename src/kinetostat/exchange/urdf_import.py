@@ -307,9 +307,9 @@ def _hinges(row: Sequence[FileJoint], bodies: Bodies) -> int:
             continue
         if any(bodies.links(joint.child) for joint in hinges[:-1]):
             continue
-        apart = max(float(np.linalg.norm(joint.frame[:3, 3] - hinges[0].frame[:3, 3])) for joint in hinges)
+        distance = max(float(np.linalg.norm(joint.frame[:3, 3] - hinges[0].frame[:3, 3])) for joint in hinges)
         spanned = np.linalg.svd(np.array([joint.axis for joint in hinges]), compute_uv=False).min()
-        if apart < COINCIDENT_HINGES and spanned > INDEPENDENT_AXES:
+        if distance < COINCIDENT_HINGES and spanned > INDEPENDENT_AXES:
             return count
     return 1
 

@@ -139,10 +139,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 def _unbound(name: str, signature: inspect.Signature, named: Mapping[str, Any], reason: str) -> str:
     """Say which argument is unknown or missing, and what there is."""
-    known = [argument for argument in signature.parameters if argument != "self"]
-    takes = f"{name} takes {', '.join(known) or 'no argument'}."
-    for unknown in (argument for argument in named if argument not in known):
-        near = difflib.get_close_matches(unknown, known, 1)
+    arguments = [argument for argument in signature.parameters if argument != "self"]
+    takes = f"{name} takes {', '.join(arguments) or 'no argument'}."
+    for unknown in (argument for argument in named if argument not in arguments):
+        near = difflib.get_close_matches(unknown, arguments, 1)
         return f"{name} has no argument {unknown}; " + (f"did you mean {near[0]}?" if near else takes)
     return f"{name}: {reason}; {takes}"
 
@@ -202,27 +202,27 @@ def _misfit(value: Any, kind: Any, name: str) -> Misfit:
 def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
     """Return what is not of a kind without alternatives."""
     origin, inside = get_origin(kind), get_args(kind)
-    here = name, value
+    misfit = name, value
     if kind in FREE or isinstance(kind, str | TypeVar) or origin is Literal:
         return None
     if origin is Callable:
-        return None if callable(value) else here
+        return None if callable(value) else misfit
     if _is_list(kind):
         if isinstance(value, str) and str in _parts(inside[0]):
             return None  # a text alone stands for a list of it
         if not _is_row(value, len(inside) if origin is tuple else None, origin is Collection):
-            return here
+            return misfit
         if float in _parts(inside[0]) and all(type(entry) is float for entry in value):
             return None  # thousands of numbers are not looked at one by one
         return _first(_misfit(entry, inside[0], f"{name}[{place}]") for place, entry in enumerate(value))
     if origin is not None:
         if not isinstance(value, Mapping):
-            return here
+            return misfit
         keys = (_misfit(key, str, f"a key of {name}") for key in value)
         return _first(keys) or _first(_misfit(entry, inside[1], f"{name}[{key!r}]") for key, entry in value.items())
     if kind is not bool and (isinstance(value, bool) or type(value).__name__ == "bool_"):
-        return here
-    return None if isinstance(value, ACCEPTED.get(kind, kind)) else here
+        return misfit
+    return None if isinstance(value, ACCEPTED.get(kind, kind)) else misfit
 
 
 def _first(misfits: Iterable[Misfit]) -> Misfit:

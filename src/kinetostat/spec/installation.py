@@ -22,8 +22,8 @@ QUOTED = re.compile(rf"(?m)(`|^ +){PACKAGE} (?=[a-z-])")
 def command() -> str:
     """Return what a user types in the shell for `kinetostat`: this word, or the path of the script."""
     script = Path(sysconfig.get_path("scripts"), PACKAGE)
-    known = shutil.which(PACKAGE, path=_path_of_shell())
-    if known and Path(known).resolve() == script.resolve():
+    command = shutil.which(PACKAGE, path=_path_of_shell())
+    if command and Path(command).resolve() == script.resolve():
         return PACKAGE
     return _short_path(script) if shutil.which(script) else f"{_python()} -m {PACKAGE}"
 
@@ -115,13 +115,13 @@ def _source_of_package() -> str:
     if root is not None:
         return str(root)
     try:
-        known = distribution(PACKAGE)
+        installed = distribution(PACKAGE)
     except PackageNotFoundError:
         return f"{PACKAGE}.whl"
-    origin = json.loads(known.read_text("direct_url.json") or "{}").get("url", "")
+    origin = json.loads(installed.read_text("direct_url.json") or "{}").get("url", "")
     path = Path(origin.removeprefix("file://"))
     there = origin.startswith("file://") and path.exists()
-    return str(path) if there else f"{PACKAGE}-{known.version}-py3-none-any.whl"
+    return str(path) if there else f"{PACKAGE}-{installed.version}-py3-none-any.whl"
 
 
 def _python() -> str:

@@ -189,9 +189,9 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
     if mistake["type"] == "missing":
         return f"{name} is missing ({_field(path)}); `kinetostat new study` prints a complete file."
     if mistake["type"] == "extra_forbidden":
-        known = _keys_at(path[:-1])
-        near = difflib.get_close_matches(path[-1], known, 1)
-        return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(known)}.")
+        keys = _keys_at(path[:-1])
+        near = difflib.get_close_matches(path[-1], keys, 1)
+        return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(keys)}.")
     if mistake["type"] in ("model_type", "model_attributes_type"):
         return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_keys_at(path))}."
     if mistake["type"] == "string_pattern_mismatch":
@@ -240,8 +240,8 @@ def _field(path: Sequence[str]) -> str:
 
 
 def _hint(path: Sequence[str]) -> str:
-    about = _field(path)
-    return f" ({about})" if about != "it is needed" else ""
+    entry = _field(path)
+    return f" ({entry})" if entry != "it is needed" else ""
 
 
 TABLES = ("set", "poses", "optimizer", "robustness")

@@ -265,11 +265,11 @@ def read_tolerances(written: object, origin: str = "") -> Tolerances:
 def _lines(table: Mapping[Any, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Give the lines of a table, and of tables in it: `geometry.base_radius` need not stand in quotes."""
     for key, value in table.items():
-        about = f"{before}{key}"
+        subject = f"{before}{key}"
         if isinstance(value, Mapping) and not {*LINE_KEYS} & value.keys():
-            yield from _lines(value, f"{about}.")
+            yield from _lines(value, f"{subject}.")
         else:
-            yield about, value
+            yield subject, value
 
 
 def _tolerance(about: str, value: object, place: str) -> Tolerance:

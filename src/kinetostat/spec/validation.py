@@ -118,7 +118,7 @@ class _Reader:
         if not isinstance(given, dict):
             yield Mistake("no table" if table and not within else "wrong", place, NO_TABLE.format(place[-1]))
             return
-        known = quantities(table) if table else {}
+        fields = quantities(table) if table else {}
         if table:
             yield from self._read_fields(given, place, table)
         for name in within:
@@ -127,7 +127,7 @@ class _Reader:
             elif not self._may_miss(".".join([*place, name])):
                 yield Mistake("missing", (*place, name))
         for key in given:
-            if key not in known and key not in within and (place or key not in HEAD):
+            if key not in fields and key not in within and (place or key not in HEAD):
                 yield Mistake("unknown", (*place, key))
 
     def _read_fields(self, given: Document, place: tuple[str, ...], table: type) -> Iterator[Mistake]:
@@ -157,11 +157,11 @@ def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
     path = [str(part) for part in mistake.place]
     name, last = ".".join(cut(part) for part in path), cut(path[-1])
     within = ".".join(path[:-1])
-    known = quantities(reader.tables[within]) if within in reader.tables else {}
+    fields = quantities(reader.tables[within]) if within in reader.tables else {}
     if mistake.kind == "missing":
-        return _missing(within, name, last, known, document.get("family"))
+        return _missing(within, name, last, fields, document.get("family"))
     if mistake.kind == "unknown":
-        allowed = list(known) or [*([] if within else HEAD), *reader.within.get(within, ())]
+        allowed = list(fields) or [*([] if within else HEAD), *reader.within.get(within, ())]
         close = difflib.get_close_matches(last, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
         return f"{name} is not known; {hint}"

@@ -299,8 +299,8 @@ def _frequencies(machine: Machine) -> dict[str, str]:
     if not weighs(machine):
         return {}
     group = "loaded_frequency" if machine.loaded else "frequency"
-    ways = [name for name in machine.family.component_names if name in "xyz"]
-    return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(ways) + 1)}
+    axes = [name for name in machine.family.component_names if name in "xyz"]
+    return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(axes) + 1)}
 
 
 POINTS, NEAR = 300, 40

@@ -203,10 +203,10 @@ def _pose(machine: Machine) -> dict[str, str]:
 
 def _geometry(machine: Machine, leg: str) -> dict[str, str]:
     """Lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
-    apart = ("pose.", "tool.", "load.", "limits.", "sections.", *VIBRATION_FIELDS)
+    other_tables = ("pose.", "tool.", "load.", "limits.", "sections.", *VIBRATION_FIELDS)
     written = machine.family.chains is not None
     mine = (f"legs.{leg}.", "geometry.")
-    return _fields(machine, lambda path: not path.startswith(apart) and (not written or path.startswith(mine)))
+    return _fields(machine, lambda path: not path.startswith(other_tables) and (not written or path.startswith(mine)))
 
 
 def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
@@ -221,10 +221,10 @@ def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
 def _motion(configuration: Configuration, goal: Displacement, length: float) -> Array:
     """Motion of a platform to a goal: translation in units of the machine's length, then the turn, rad (small)."""
     platform = configuration.platform
-    apart = (platform.translation - goal.translation) * (1.0 / length)
+    offset = (platform.translation - goal.translation) * (1.0 / length)
     now, wanted = platform.rotation, goal.rotation
     turn = (wanted.x.cross(now.x) + wanted.y.cross(now.y) + wanted.z.cross(now.z)) * 0.5
-    return np.array([*apart.components(), *turn.components()], dtype=float)
+    return np.array([*offset.components(), *turn.components()], dtype=float)
 
 
 def goal_of(start: Displacement, axis: str, amount: float) -> Displacement:

@@ -71,11 +71,11 @@ def line_of(message: str, text: str) -> int:
     if leg := _LEG.match(message):
         line_of_name = re.compile(rf'\s*name\s*=\s*"{re.escape(leg[1])}"')
         return next((i for i, line in enumerate(text.splitlines(), 1) if line_of_name.match(line)), 0)
-    known, paths = places(text), [path.rstrip(".") for path in _PATH.findall(message)]
-    wanted = next((path for path in paths if "." in path and path in known), paths[0] if paths else "")
+    value_places, paths = places(text), [path.rstrip(".") for path in _PATH.findall(message)]
+    wanted = next((path for path in paths if "." in path and path in value_places), paths[0] if paths else "")
     while wanted:
-        if wanted in known:
-            return known.index(wanted) + 1
+        if wanted in value_places:
+            return value_places.index(wanted) + 1
         wanted = wanted.rpartition(".")[0]
     return 0
 
@@ -175,8 +175,8 @@ class TextPane:
         if result.machine is None:
             text = f'<p class="text-problem">{escape(result.mistake)} {WRONG}</p>'
         else:
-            known = places(self._text)
-            path = known[self._place - 1] if 0 < self._place <= len(known) else ""
+            value_places = places(self._text)
+            path = value_places[self._place - 1] if 0 < self._place <= len(value_places) else ""
             lines = [explanation_of(result.machine, path) or RIGHT, *map(escape, doubts(result.machine))]
             text = f'<p class="text-good">{"<br>".join(lines)}</p>'
         self.message.set_content(text)

@@ -67,8 +67,8 @@ def full_label(parameter: Parameter) -> str:
 
     The pose and the geometry, where most numbers stand, are left out: "x", "base radius".
     """
-    where = table_of(parameter)
-    return label(parameter) if where in ("pose", "geometry") else f"{where}: {label(parameter)}"
+    table_name = table_of(parameter)
+    return label(parameter) if table_name in ("pose", "geometry") else f"{table_name}: {label(parameter)}"
 
 
 def table(

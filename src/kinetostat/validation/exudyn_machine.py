@@ -123,9 +123,9 @@ def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
     """
     arms = np.repeat([length, 1.0], 3)
     motion = np.max(np.abs(tangent) * np.repeat([1.0, 1.0 / length], 3)[:, None], axis=0) / arms
-    known = np.any(tangent != 0.0, axis=0)
+    exists = np.any(tangent != 0.0, axis=0)
     felt = motion > UNMOVED * np.max(motion)
-    return np.asarray(known / (np.where(felt, motion, np.max(motion)) * arms))
+    return np.asarray(exists / (np.where(felt, motion, np.max(motion)) * arms))
 
 
 def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> Array:

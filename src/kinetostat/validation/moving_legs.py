@@ -58,8 +58,8 @@ class LegPart:
         if isinstance(self.element, Parallelogram):
             span, normal = _bars(self.element)
             length = float(np.linalg.norm(span))
-            way = np.cross(normal, turn(normal, amount / length) @ span) / length
-            return np.concatenate([np.zeros(3), before[:3, :3] @ way])
+            direction = np.cross(normal, turn(normal, amount / length) @ span) / length
+            return np.concatenate([np.zeros(3), before[:3, :3] @ direction])
         joint = joint_in(self.element)
         axis = before[:3, :3] @ array(joint.axis)
         if joint.point is None:

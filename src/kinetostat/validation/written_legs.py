@@ -163,10 +163,10 @@ def _freedoms(joint: Numbers) -> list[Joint]:
         axes = [*both, unit(np.cross(*both))]
     slides = {"prismatic": (0,), "planar": (0, 1)}.get(kind, ())
     count = {"universal": 2, "planar": 3, "spherical": 3}.get(kind, 1)
-    ways = [vector(axis) for axis in axes[:count]]
+    directions = [vector(axis) for axis in axes[:count]]
     pitch = joint.get("pitch", 0.0)
-    freedoms = [Joint(way) if i in slides else Joint(way, point, pitch=pitch) for i, way in enumerate(ways)]
-    return [*freedoms, Joint(ways[0])] if kind == "cylindrical" else freedoms
+    freedoms = [Joint(way) if i in slides else Joint(way, point, pitch=pitch) for i, way in enumerate(directions)]
+    return [*freedoms, Joint(directions[0])] if kind == "cylindrical" else freedoms
 
 
 def _row(name: PartName, freedom: Joint, joint: Numbers, actuated: bool) -> list[LegPart]:
@@ -194,8 +194,8 @@ def _bearings(name: str, joint: Numbers) -> Sequence[Spring]:
     point = vector(joint["point"])
     if "compliance" in joint:
         return matrix_springs(name, joint["compliance"], point)
-    ways = {key.removeprefix("stiffness_"): joint[key] for key in joint if key.startswith("stiffness_")}
-    if not ways:
+    stiffnesses = {key.removeprefix("stiffness_"): joint[key] for key in joint if key.startswith("stiffness_")}
+    if not stiffnesses:
         return ()
     axis = unit(joint["axis"] if "axis" in joint else np.cross(unit(joint["first_axis"]), unit(joint["second_axis"])))
     along, *across = (vector(row) for row in _around(axis))
@@ -205,7 +205,7 @@ def _bearings(name: str, joint: Numbers) -> Sequence[Spring]:
         "torsion": [Joint(along, point)],
         "tilt": [Joint(way, point) for way in across],
     }
-    return [Spring(f"{name} {way}", freedom, k) for way, k in ways.items() for freedom in rows[way]]
+    return [Spring(f"{name} {way}", freedom, k) for way, k in stiffnesses.items() for freedom in rows[way]]
 
 
 def _link(name: PartName, link: Numbers, ends: tuple[Array, Array], document: Numbers) -> list[LegPart]:

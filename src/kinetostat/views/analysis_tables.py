@@ -340,8 +340,8 @@ def _internal_loads_sentence(undecided: int) -> str:
 
 def first_names(parts: Sequence[str]) -> str:
     """Return the names of parts, of many the first ones: "leg 1, leg 2, leg 3, leg 4 and 2 more"."""
-    more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
-    return f"{', '.join(parts[:MOST_NAMED])}{more}"
+    others = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
+    return f"{', '.join(parts[:MOST_NAMED])}{others}"
 
 
 def _mass_sentence(analysis: Analysis) -> str:

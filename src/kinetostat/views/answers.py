@@ -93,9 +93,9 @@ def kind_of(answer: object) -> Kind:
     """
     kind_of_answer = next((kind for kind in KINDS if _is(answer, kind.type)), None)
     if kind_of_answer is None or (kind_of_answer.name == "Dataset" and "status" not in answer):  # type: ignore[operator]
-        known = ", ".join(kind.name for kind in KINDS)
+        kinds = ", ".join(kind.name for kind in KINDS)
         raise InputError(
-            f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {known}."
+            f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {kinds}."
         )
     return kind_of_answer
 

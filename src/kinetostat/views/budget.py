@@ -186,10 +186,10 @@ def _allocation_table(answer: Budget) -> FittedTable:
     allocation = answer.allocation
     if allocation is None:
         raise ValueError("no allocation was asked for")
-    how = "root of the sum of squares" if allocation.by == "rss" else "worst case"
+    rule = "root of the sum of squares" if allocation.by == "rss" else "worst case"
     where = "along the direction" if allocation.measure == "along" else "at the tool point"
     wanted = answer.machine.display.show_deflection(allocation.wanted, "m")
-    table = text_table(f"Tolerances of least cost for {wanted} {where} ({how})", "line", "now", "least cost", "so")
+    table = text_table(f"Tolerances of least cost for {wanted} {where} ({rule})", "line", "now", "least cost", "so")
     table.add_column("factor", justify="right", no_wrap=True)
     table.add_column("cost\n%", justify="right", no_wrap=True)
     texts = {line.about: line.text for line in answer.tolerances}

@@ -65,9 +65,9 @@ def budget_dataset(answer: Budget) -> xr.Dataset:
     variables: dict[str, Any] = {"status": (dims, answer.status.reshape(shape), ABOUT_STATUS)}
     for statistic, title in STATISTICS.items():
         for measure, unit in zip(answer.measures, answer.units, strict=True):
-            about = {"units": unit, "symbol": f"{measure}, {title}", "long_name": f"{measure} error"}
+            attributes = {"units": unit, "symbol": f"{measure}, {title}", "long_name": f"{measure} error"}
             sizes = answer.size(statistic, measure).reshape(shape)
-            variables[f"{statistic}_{measure.replace(' ', '_')}"] = (dims, sizes, about)
+            variables[f"{statistic}_{measure.replace(' ', '_')}"] = (dims, sizes, attributes)
     return labels.assign(variables)
 
 

@@ -56,8 +56,8 @@ def _along(answer: Capability) -> str:
     """Return the greatest amounts both ways of the direction that was asked for."""
     phrases = []
     for part in (part for part in answer.sets if part.least >= 0.0):
-        ways = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
-        shown = list(dict.fromkeys(_amount_text(answer, way, part.unit) for way in ways))
+        amounts = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
+        shown = list(dict.fromkeys(_amount_text(answer, way, part.unit) for way in amounts))
         phrases.append(f"{part.name} {' and, the other way, '.join(shown)}")
     return f"Along or about {direction_words(answer.direction)}: {'; '.join(phrases)}." if phrases else ""
 

@@ -52,12 +52,12 @@ def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
     heads += ["status"] if lost else []
     table = numeric_table("Commands: where each actuator must stand", "pose", heads)
     for i, row in enumerate(answer.coordinates):
-        known = bool(answer.settled[i])
+        settled = bool(answer.settled[i])
         cells = [
-            coordinate_text(float(v), unit, display) if known else DASH
+            coordinate_text(float(v), unit, display) if settled else DASH
             for v, unit in zip(row, answer.units, strict=True)
         ]
-        errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
+        errors = [display.show_deflection(float(e[i]), "m") if settled else DASH for e in (answer.before, answer.left)]
         status = [Status(int(answer.status[i])).word.replace("_", " ")] if lost else []
         table.add_row(str(i + 1), *cells, *errors, *status)
     yield table

@@ -96,10 +96,10 @@ def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
     panels: dict[str, Bars] = {}
     for name, bar, dot in pairs:
         stem, _, member = name.rpartition("_") if "_" in name else name.rpartition(" ")
-        known = stem and (member.isdigit() or member in COMPONENTS)
-        title, label = (stem.replace("_", " "), member) if known else (name.replace("_", " "), "")
+        is_member = stem and (member.isdigit() or member in COMPONENTS)
+        title, label = (stem.replace("_", " "), member) if is_member else (name.replace("_", " "), "")
         title = "compliance" if title == "C" else title
-        if known and member in COMPONENTS:
+        if is_member and member in COMPONENTS:
             title = f"{title} {'about' if member.startswith('r') else 'along'} axes"
         panels.setdefault(title, []).append((label, bar, dot))
     lone = {title: bars[0][0] for title, bars in panels.items() if len(bars) == 1 and bars[0][0].isdigit()}
@@ -153,8 +153,8 @@ def _say_missing(panel: Axes, place: float, row: DesignRow, i: int) -> None:
     if value is None or not math.isfinite(value):
         absent = "not known" if row.unit == "kg" else "none"
         text = absent if value is None or math.isnan(value) else "infinite"
-        where = panel.get_xaxis_transform()
-        panel.text(place, 0.02, text, transform=where, rotation=90, ha="center", fontsize=6.5, color="#666666")
+        transform = panel.get_xaxis_transform()
+        panel.text(place, 0.02, text, transform=transform, rotation=90, ha="center", fontsize=6.5, color="#666666")
 
 
 def _numbers(row: DesignRow) -> list[float]:

@@ -248,8 +248,8 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
             figure.set_figheight(1.5 + LEGEND_ROW * len(named) + 3.6 * float(np.ptp(y) / np.ptp(x)))
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
         patches += [Patch(color="#eeeeee", label="no result")] if (codes < 0).any() else []
-        about = "\n".join(line for line in setting_lines(dataset) if line)
-        figure.legend(handles=patches, loc="outside lower center", ncols=1, title=about, title_fontsize=6.5)
+        setting = "\n".join(line for line in setting_lines(dataset) if line)
+        figure.legend(handles=patches, loc="outside lower center", ncols=1, title=setting, title_fontsize=6.5)
     return figure
 
 

@@ -78,8 +78,8 @@ def _left_out(answer: Guidelines) -> Iterator[str]:
 
 
 def _few(paths: Sequence[str]) -> str:
-    rest = len(paths) - MOST_NAMED_PATHS
-    return ", ".join(paths[:MOST_NAMED_PATHS]) + (f" and {rest} more" if rest > 0 else "")
+    others = len(paths) - MOST_NAMED_PATHS
+    return ", ".join(paths[:MOST_NAMED_PATHS]) + (f" and {others} more" if others > 0 else "")
 
 
 def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
@@ -174,11 +174,11 @@ def _arrow(percent: float) -> Text:
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
     """Return the elements with their roles at the pose and over the grid, by direction."""
-    here, over = answer.here, answer.over_grid
-    if here is None:
+    at_pose, over = answer.here, answer.over_grid
+    if at_pose is None:
         return []
     by_direction = partial(_by_direction, answer)
-    shares, rigid, gains = map(_at_pose, (here.shares, here.rigid, here.gains))
+    shares, rigid, gains = map(_at_pose, (at_pose.shares, at_pose.rigid, at_pose.gains))
     rows = []
     for k, element in enumerate(answer.elements):
         limits = [None if element.stiffness is None else limit_of(element.stiffness, factor) for factor in rigid[k]]

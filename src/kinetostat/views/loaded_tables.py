@@ -86,9 +86,9 @@ def actuator_sentence(state: LoadedState) -> str:
         driven = [(name, load) for name, turning, load in actuator_loads(state) if turning is turns]
         if driven:
             name, load = max(driven, key=lambda pair: abs(pair[1]))
-            way = "" if turns or not load else ", which pulls" if load > 0.0 else ", which pushes"
+            direction = "" if turns or not load else ", which pulls" if load > 0.0 else ", which pushes"
             size = show(abs(load), load_unit(turns))
-            parts.append(f"the greatest {kind} of an actuator is {size} ({name}{way})")
+            parts.append(f"the greatest {kind} of an actuator is {size} ({name}{direction})")
     if not parts:
         return ""
     text, use = "; ".join(parts), state.limit_use

@@ -46,8 +46,8 @@ def usual_range(values: Array) -> tuple[float, float]:
     """
     finite = values[np.isfinite(values)]
     least, low, high, greatest = np.percentile(finite, [0.0, *USUAL_PERCENTILES, 100.0])
-    far = FAR_EXTREME * (high - low)
-    return float(low if low - least > far else least), float(high if greatest - high > far else greatest)
+    margin = FAR_EXTREME * (high - low)
+    return float(low if low - least > margin else least), float(high if greatest - high > margin else greatest)
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,8 @@ def html_of(answer: object) -> str:
     kind_of(answer).tell(console, answer)
     tables = "".join(console.parts)
     if isinstance(answer, Machine):
-        about = f"<p><b>{escape(answer.name)}</b> <span class='dim'>{escape(answer.family.summary)}</span></p>"
-        tables = f"{about}{_picture(answer)}<details><summary>all fields</summary>{tables}</details>"
+        heading = f"<p><b>{escape(answer.name)}</b> <span class='dim'>{escape(answer.family.summary)}</span></p>"
+        tables = f"{heading}{_picture(answer)}<details><summary>all fields</summary>{tables}</details>"
     elif isinstance(answer, Analysis):
         tables = _picture(answer.machine, "aside") + tables
     else:

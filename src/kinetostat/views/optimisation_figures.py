@@ -76,14 +76,14 @@ def comparison(result: Result, title: str) -> Figure:
 
 
 def _gains(panel: Axes, result: Result) -> None:
-    known = [direction for direction in result.directions if np.isfinite(direction.gain) and direction.gain > 0.0]
-    places, gains = np.arange(len(known)), np.array([direction.gain for direction in known])
+    compared = [direction for direction in result.directions if np.isfinite(direction.gain) and direction.gain > 0.0]
+    places, gains = np.arange(len(compared)), np.array([direction.gain for direction in compared])
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
     panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
     panel.axvline(1.0, color="#444444", linewidth=0.8)
     wide = gains.size and gains.max() / gains.min() > 30.0
     panel.set(xscale="log" if wide else "linear", xlabel="times as stiff as before")
-    panel.set_yticks(places, [direction.name.removeprefix("compliance_") for direction in known])
+    panel.set_yticks(places, [direction.name.removeprefix("compliance_") for direction in compared])
     panel.invert_yaxis()
     panel.grid(visible=False, axis="y")
     for place, gain in zip(places, gains, strict=True):

@@ -111,8 +111,8 @@ def figures(reproduction: Reproduction) -> dict[str, Drawing]:
 def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path], full: bool = False) -> None:
     """Print the reproduction, where its files are, and what to try next; every number and statement if `full`."""
     tell_answer(console, REPRODUCTION, reproduction, full)
-    more = "" if full else "; --full prints every number, equation and statement"
-    console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{more}", highlight=False)
+    hint = "" if full else "; --full prints every number, equation and statement"
+    console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{hint}", highlight=False)
     console.print("next:", highlight=False)
     for line in (f"{command()} analyze tripteron", start_command("studio", "studio")):
         console.print(f"  {line}", highlight=False, soft_wrap=True)
@@ -253,15 +253,15 @@ def misprints(reproduction: Reproduction) -> Iterator[str]:
     """Write a sentence on the misprints of each place of the paper: what is printed, what it should say, and why."""
     wrong_numbers = [number for number in reproduction.comparisons if number.verdict is PrintVerdict.MISPRINT]
     for place, group in groupby(wrong_numbers, key=attrgetter("place")):
-        wrong = list(group)
+        failures = list(group)
         pairs = [
             f"{_symbol(place, each.component)} {each.printed} should read "
             f"{printed.ERRATA[place, each.component].corrected}"
-            for each in wrong
+            for each in failures
         ]
-        count = COUNTS[len(wrong)] if len(wrong) < len(COUNTS) else str(len(wrong))
-        are = "number is a misprint" if len(wrong) == 1 else "numbers are misprints"
-        reason = printed.ERRATA[place, wrong[0].component].reason
+        count = COUNTS[len(failures)] if len(failures) < len(COUNTS) else str(len(failures))
+        are = "number is a misprint" if len(failures) == 1 else "numbers are misprints"
+        reason = printed.ERRATA[place, failures[0].component].reason
         yield f"{place}: {count} {are} of the paper. {'; '.join(pairs)}. Reason: {reason}."
 
 

@@ -195,8 +195,8 @@ def _pixels(machine: Float32s, shadow: Float32s, ink: Float32s, paper: Paper, tr
     under = np.zeros(3, np.float32) if transparent else np.array(paper.color, np.float32)
     color = under * (1.0 - shadow) * (1.0 - ink) + np.array(paper.ink, np.float32) * ink
     alpha = shadow * (1.0 - ink) + ink if transparent else np.ones_like(shadow)
-    rest = 1.0 - machine[..., 3:]
-    color, alpha = machine[..., :3] + rest * color, machine[..., 3:] + rest * alpha
+    background_share = 1.0 - machine[..., 3:]
+    color, alpha = machine[..., :3] + background_share * color, machine[..., 3:] + background_share * alpha
     color = color / np.maximum(alpha, 1.0 / 255.0)
     shares = np.clip(np.concatenate([color, alpha], axis=2), 0.0, 1.0)
     return np.round(255.0 * shares).astype(np.uint8)

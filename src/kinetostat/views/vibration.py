@@ -143,10 +143,10 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTabl
     table = numeric_table(title, "", [str(place) for place in range(1, len(shares) + 1)])
     for name in shown:
         table.add_row(name, *(percent(mode.get(name, 0.0)) for mode in shares))
-    rest = order[len(shown) :]
-    left = [sum(mode.get(name, 0.0) for name in rest) for mode in shares]
+    omitted = order[len(shown) :]
+    left = [sum(mode.get(name, 0.0) for name in omitted) for mode in shares]
     if any(abs(share) >= LEAST_PERCENT for share in left):
-        table.add_row(rest[0] if len(rest) == 1 else f"{len(rest)} others", *map(percent, left))
+        table.add_row(omitted[0] if len(omitted) == 1 else f"{len(omitted)} others", *map(percent, left))
     return table
 
 
@@ -164,13 +164,13 @@ def _lines(answer: Vibration) -> Lines:
         ("Masses", masses_of(answer)),
         ("Damping", damping_of(answer)),
     ]
-    more = [
+    further_lines = [
         ("Loads", loads_of(answer)),
         ("Loops", loops_of(answer)),
         ("Tool", tool_of(answer.tool, answer.machine.display)),
         ("Cutting", cut_of(answer)),
     ]
-    return [*lines, *((word, sentence) for word, sentence in more if sentence)]
+    return [*lines, *((word, sentence) for word, sentence in further_lines if sentence)]
 
 
 def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:

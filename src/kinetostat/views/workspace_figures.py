@@ -250,8 +250,8 @@ def _surface_values(triangles: Array, values: Array, inside: np.ndarray, axes: S
     """Interpolate values of nodes at the middle of each triangle; nodes outside have that of the nearest one inside."""
     if not len(triangles):
         return np.zeros(0)
-    known = inside & np.isfinite(values)
-    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    has_value = inside & np.isfinite(values)
+    nearest = ndimage.distance_transform_edt(~has_value, return_distances=False, return_indices=True)
     steps = [(triangles[:, :, k].mean(axis=1) - axis[0]) / (axis[1] - axis[0]) for k, axis in enumerate(axes)]
     return np.asarray(ndimage.map_coordinates(values[tuple(nearest)], steps, order=1, mode="nearest"))
 

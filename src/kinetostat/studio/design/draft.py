@@ -116,7 +116,7 @@ def _count_in_words(count: int, noun: str) -> str:
 def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
     """Return a draft of a study that has been read; `machine` None stands for the machine of the session."""
     tables = study.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
-    known = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
+    shown_parts = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
     search = {key: getattr(study.optimizer, key) for key in ("population", "generations", "seed")}
     return Draft(
         study.name,
@@ -126,7 +126,7 @@ def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
         tables.get("constraints", []),
         tables.get("poses", {}),
         {**search, **tables.get("optimizer", {})},
-        {key: value for key, value in tables.items() if key not in known},
+        {key: value for key, value in tables.items() if key not in shown_parts},
     )
 
 

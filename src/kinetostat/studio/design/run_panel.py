@@ -124,8 +124,8 @@ class RunPanel:
         if run is None:
             return Searches(runs)
         try:
-            known = request.follower
-            follower = known if known is not None and known.number == number else Follower(run)
+            former = request.follower
+            follower = former if former is not None and former.number == number else Follower(run)
             return Searches(runs, follower, follower.progress(run), failure(run))
         except InputError as error:
             return Searches(runs, problem=str(error))

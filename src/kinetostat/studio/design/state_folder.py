@@ -69,8 +69,8 @@ def numbered_entries(folder: Path) -> dict[int, Path]:
         paths = list(folder.iterdir())
     except OSError:
         paths = []
-    known = {int(path.name[:4]): path for path in paths if path.name[:4].isdecimal() and path.name[4:5] == "-"}
-    return dict(sorted(known.items(), reverse=True))
+    numbered = {int(path.name[:4]): path for path in paths if path.name[:4].isdecimal() and path.name[4:5] == "-"}
+    return dict(sorted(numbered.items(), reverse=True))
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ class Favourites:
         number = max(present, default=0) + 1
         path = self._folder / f"{number:04d}-{slug(name, 'machine')}.toml"
         lines = as_file(replace(machine, name=name)).splitlines(keepends=True)
-        rest = lines[1:] if lines[0].startswith(REMARK) else lines
-        write_text(path, "".join([f"{REMARK} {note}".rstrip() + "\n", *rest]))
+        content = lines[1:] if lines[0].startswith(REMARK) else lines
+        write_text(path, "".join([f"{REMARK} {note}".rstrip() + "\n", *content]))
         return Favourite(number, path, name, note)
 
     def delete(self, number: int) -> None:

@@ -139,10 +139,10 @@ class StudyForm:
         with self._body:
             ui.label(f"Machine: {self._machine.name}").classes("form-about").mark("study-about")
             ui.html("<h3>Variables</h3>", sanitize=False)
-            known = self._controls()
+            machine_controls = self._controls()
             for place, table in enumerate(self.draft.variables):
-                self._variable(place, table, known)
-            self._more_variables(known)
+                self._variable(place, table, machine_controls)
+            self._more_variables(machine_controls)
             ui.html("<h3>Objectives</h3>", sanitize=False)
             for place, table in enumerate(self.draft.objectives):
                 self._objective(place, table)
@@ -207,8 +207,8 @@ class StudyForm:
 
     def _more_variables(self, known: dict[str, Control]) -> None:
         """Offer the other numbers of the machine; loads and limits are not part of a design."""
-        taken = {str(table.get("path")) for table in self.draft.variables}
-        free = [c for path, c in known.items() if c.slides and path not in taken and c.panel != "Load"]
+        used_paths = {str(table.get("path")) for table in self.draft.variables}
+        free = [c for path, c in known.items() if c.slides and path not in used_paths and c.panel != "Load"]
         offered = {control.path: full_label(control.parameter) for control in free if not control.joined}
         if offered:
             add = choice(offered, "add a variable", self._add_variable, "study-add-variable", searchable=True)
@@ -326,8 +326,12 @@ class StudyForm:
         table["direction"] = [_number(part) for part in parts]
 
     def _add_objective(self) -> None:
-        taken = {table["quantity"] for table in self.draft.objectives}
-        usual = (name for name in ("compliance_z", "compliance_sum", *known_terms(self._machine)) if name not in taken)
+        used_quantities = {table["quantity"] for table in self.draft.objectives}
+        usual = (
+            name
+            for name in ("compliance_z", "compliance_sum", *known_terms(self._machine))
+            if name not in used_quantities
+        )
         self.draft.objectives.append({"quantity": next(usual)})
         self._drop_other_method()
         self._fill()

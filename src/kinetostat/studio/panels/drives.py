@@ -129,8 +129,8 @@ class DrivesPanel(Panel):
         label, unit, lines = curves_of(answer, str(self.kind.value), times)
         shown = [{"name": name, "values": finite(row)} for name, row in lines]
         labels = {"x": "time (s)", "y": label}
-        more = {"signed": True, "here": self._time_shown, "across": "s", "unit": unit}
-        self.curves.run_method("show", {"x": finite(times), "lines": shown, "label": labels, **more})
+        options = {"signed": True, "here": self._time_shown, "across": "s", "unit": unit}
+        self.curves.run_method("show", {"x": finite(times), "lines": shown, "label": labels, **options})
 
     @property
     def _time_shown(self) -> float:
@@ -179,8 +179,8 @@ def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, li
         rows = [np.interp(times, moments, row) for row in answer.deflection[:, 3:].T]
         lines = [("at rest", np.linalg.norm(rows, axis=0) * scale.factor)]
         if answer.along_modes is not None and answer.along_modes.modes:
-            more = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
-            lines.append(("modes", np.linalg.norm(np.add(rows, more), axis=0) * scale.factor))
+            surplus = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
+            lines.append(("modes", np.linalg.norm(np.add(rows, surplus), axis=0) * scale.factor))
         return scale.label("deflection of the tool"), scale.unit, lines
     if answer.curves is None:
         return "", "", []

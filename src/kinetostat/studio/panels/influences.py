@@ -136,15 +136,15 @@ class SensitivityPanel(Panel):
 def ranking_text(answer: Sensitivity) -> str:
     """Return the bars of the parameters that influence the first quantity of a sensitivity study."""
     percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents.size]
-    known = [(path, percent) for path, percent in percents if not math.isnan(percent)]
-    largest = max((abs(percent) for _, percent in known), default=1.0)
-    rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST_PARAMETERS]]
+    pairs = [(path, percent) for path, percent in percents if not math.isnan(percent)]
+    largest = max((abs(percent) for _, percent in pairs), default=1.0)
+    rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in pairs[:MOST_PARAMETERS]]
     if not rows:
         return paragraph(answer.message or "No parameter changes this quantity at this pose.")
     note = "Change of the quantity in percent, per percent of the parameter; of an angle, per 0.01 rad."
     more = (
-        f" {len(known) - MOST_PARAMETERS} parameters with less effect are omitted."
-        if len(known) > MOST_PARAMETERS
+        f" {len(pairs) - MOST_PARAMETERS} parameters with less effect are omitted."
+        if len(pairs) > MOST_PARAMETERS
         else ""
     )
     return bars("sensitivities", rows) + paragraph(note + more)

@@ -239,8 +239,8 @@ def about(new: Ringing) -> str:
     answer = new.answer
     if not answer.modes:
         return paragraph(answer.message, "lead")
-    more = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_of(answer)}"
-    return paragraph(answer.message, "lead") + paragraph(more.rstrip())
+    details = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_of(answer)}"
+    return paragraph(answer.message, "lead") + paragraph(details.rstrip())
 
 
 def direction_phrase(name: str) -> str:
@@ -284,9 +284,9 @@ def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
         order = ranking_of({name: abs(share) for name, share in shares.items()})
         rows = [(name, shares[name], f"{percent(shares[name])} %") for name, size in order if size >= LEAST_SHARE]
         of_leg = {name: leg for name in shares for part, leg in legs.items() if f"{name} ".startswith(f"{part} ")}
-        more = f"{len(rows) - MOST_PARTS} parts with less are omitted."
+        note = f"{len(rows) - MOST_PARTS} parts with less are omitted."
         text += heading(title) + bars(title, rows[:MOST_PARTS], of_leg)
-        text += paragraph(more) if len(rows) > MOST_PARTS else ""
+        text += paragraph(note) if len(rows) > MOST_PARTS else ""
     return text
 
 

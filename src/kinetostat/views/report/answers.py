@@ -66,8 +66,8 @@ def answer_sections(answers: Answers) -> Iterator[Section]:
         if name in WRITTEN_SECTIONS:
             yield WRITTEN_SECTIONS[name](answer, answers)
         else:
-            more = _frequencies(answers) if name == "vibration" else ()
-            yield described_section(description_of(answer), answer, more)
+            further_blocks = _frequencies(answers) if name == "vibration" else ()
+            yield described_section(description_of(answer), answer, further_blocks)
     if answers.fit:
         yield _fit_section(answers.machine, answers.fit)
 

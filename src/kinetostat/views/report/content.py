@@ -149,8 +149,8 @@ def typeset(text: str) -> str:
 
 def _scientific(digits: str, zeros: int) -> str:
     """A large whole number, given by its leading digits and the number of zeros that follow, with a power of ten."""
-    rest = f".{digits[1:]}" if digits[1:] else ""
-    return f"{digits[0]}{rest}e{zeros + len(digits) - 1}"
+    decimals = f".{digits[1:]}" if digits[1:] else ""
+    return f"{digits[0]}{decimals}e{zeros + len(digits) - 1}"
 
 
 def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:

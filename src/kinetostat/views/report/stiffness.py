@@ -39,13 +39,13 @@ NO_LOAD = (
 def stiffness_section(analysis: Analysis) -> Section:
     """Write the section with K and C at the pose, the attribution to parts, and the indices."""
     split = 3 if len(analysis.components) == 6 else 1
-    about = (
+    meaning = (
         f"Components {' '.join(analysis.components)} at the {analysis.machine.reference}, {analysis.axes} axes; "
         "rotation first. A load w (moment, force) and the small motion t (rotation, translation) that it causes are "
         "related by"
     )
     matrices: list[Block] = [
-        Paragraph(about),
+        Paragraph(meaning),
         MOTION,
         as_table(stiffness_table(analysis), f"Stiffness K. {_blocks('stiffness', analysis)}", split),
         as_table(compliance_table(analysis), f"Compliance C. {_blocks('compliance', analysis)}", split),
@@ -91,8 +91,8 @@ def _indices(analysis: Analysis) -> tuple[Block, ...]:
         units = display.names(["N/m", "N·m/rad"])
         caption = f"Principal stiffnesses ({units}) and their directions x y z, the other motions free or held."
         blocks.append(as_table(principal, caption))
-    known = analysis.indices.eigenscrews if analysis.indices else ()
-    screws = eigenscrew_table(known, analysis.machine.reference, display)
+    eigenscrews = analysis.indices.eigenscrews if analysis.indices else ()
+    screws = eigenscrew_table(eigenscrews, analysis.machine.reference, display)
     if screws.row_count:
         blocks.append(as_table(screws, f"Eigenscrews of the stiffness; points from the {analysis.machine.reference}."))
     return tuple(blocks)
@@ -138,12 +138,12 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
     ]
     count = " by ".join(str(maps.sizes[dim]) for dim in dims)
     outcome = missing_line(failures(maps), maps["status"].size) or "every pose has an answer"
-    about = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
+    setting = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
     if (maps["status"] != int(Status.OK)).all():
-        return [Paragraph(about)]
+        return [Paragraph(setting)]
     draw = contour_maps if len(dims) == 2 else grid_curves
     return [
-        Paragraph(about),
+        Paragraph(setting),
         figure_of(draw(maps, names, ""), "Compliance in each direction over the poses."),
         _extremes(maps, names),
     ]
@@ -153,8 +153,8 @@ def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
     """Return the least and the greatest value of each quantity."""
     rows, display = [], display_of(maps)
     for name in names:
-        known = maps[name].where(maps["status"] == int(Status.OK)).values
-        if (known == known).any():
+        values = maps[name].where(maps["status"] == int(Status.OK)).values
+        if (values == values).any():
             least, most = float(maps[name].min()), float(maps[name].max())
             ratio = number(most / least) if least > 0.0 else "–"
             unit = maps[name].attrs["units"]

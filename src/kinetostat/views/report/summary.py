@@ -50,8 +50,8 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     answer[1:1] = [verdict_of(state)] if state else []
     answer += [_demands(answers, state)] if loaded else []
     for label, name in (("Vibration", "vibration"), ("As built", "budget")):
-        known = answers.of(name)
-        answer += [Paragraph(typeset(known.message), f"{label}:")] if known else []
+        part = answers.of(name)
+        answer += [Paragraph(typeset(part.message), f"{label}:")] if part else []
     return Section("Summary", (*answer, *_requirements(answers), portrait, Bullets(points), _directions(answers)))
 
 
@@ -197,9 +197,9 @@ def data_section(analysis: Analysis) -> Section:
     """Write the section with every number of the machine file."""
     table = as_table(machine_table(analysis.machine), "All values of the machine with their units; angles in degrees.")
     unset = [row[0].removeprefix("limits.") for row in table.rows if row[1] == NO_LIMIT]
-    rest = replace(table, rows=tuple(row for row in table.rows if row[1] != NO_LIMIT))
+    limits_set = replace(table, rows=tuple(row for row in table.rows if row[1] != NO_LIMIT))
     remarks = (Paragraph(f"{', '.join(unset)}.", "Limits that are not set:"),) if unset else ()
-    return Section("Data sheet", (rest, *remarks))
+    return Section("Data sheet", (limits_set, *remarks))
 
 
 def _first_upper(text: str) -> str:

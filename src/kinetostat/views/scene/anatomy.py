@@ -185,14 +185,14 @@ class _Reading:
     def reach(self, point: Vector, linked: bool = False) -> None:
         """Go on to a point. What lies between is a link, unless one was read already, or a slide along a rail."""
         start, slide = self.at, self.slide
-        apart = start is not None and not linked and not together(start, point)
-        if apart and slide is not None and _along(slide[1], point - (start or point)):
+        leaves_point = start is not None and not linked and not together(start, point)
+        if leaves_point and slide is not None and _along(slide[1], point - (start or point)):
             pulls = any(spring.acts == "pulls" for spring in self.leg.springs)
             kind: LinkKind = "cable" if pulls else "telescope"
             self.links.append(LinkPart(slide[0], kind, start or point, point, slide[2]))
         elif slide is not None:
             self.rails.append(RailPart(slide[0], start or point, slide[1], slide[2]))
-        if apart and (slide is None or not _along(slide[1], point - (start or point))):
+        if leaves_point and (slide is None or not _along(slide[1], point - (start or point))):
             self.links.append(LinkPart(self._name_of(""), "bar", start or point, point))
         middle = (start or point) * 0.35 + point * 0.65
         self.springs += [_spring_part(spring, middle) for spring in self.waiting]
@@ -318,8 +318,8 @@ def diagonal(configuration: Configuration) -> float:
 
 def leg_radius(machine: Machine, size: float) -> float:
     """Return the radius of the legs, m: half their diameter in [limits], if it is there."""
-    given = machine.tables["limits"].leg_diameter
-    return 0.5 * given if is_set(given) else LEG_RADIUS * size
+    diameter = machine.tables["limits"].leg_diameter
+    return 0.5 * diameter if is_set(diameter) else LEG_RADIUS * size
 
 
 def cross_sections_of(machine: Machine) -> dict[str, Profile]:

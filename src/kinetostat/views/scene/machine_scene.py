@@ -116,9 +116,9 @@ def tool_solids(machine: Machine, configuration: Configuration, platform: Plate,
     solids = []
     near = (point - platform.place.translation).norm()
     if near > 4.0 * radius and platform.block is None:
-        way = point - platform.place.translation
-        shape = shapes.shaft(1.3 * radius, way.norm(), 0.2 * radius)
-        solids.append(Solid("platform/neck", shape, "platform", upright(platform.place.translation, way)))
+        offset = point - platform.place.translation
+        shape = shapes.shaft(1.3 * radius, offset.norm(), 0.2 * radius)
+        solids.append(Solid("platform/neck", shape, "platform", upright(platform.place.translation, offset)))
     if not together(tip, point):
         shape = shapes.cone(1.5 * radius, 0.3 * radius, (tip - point).norm())
         solids.append(Solid("platform/tool", shape, "tool", upright(point, tip - point)))

@@ -86,8 +86,8 @@ def _revolved_mesh(shape: Turned) -> Mesh:
     profile = np.array(shape.profile)
     profile = profile[[True, *(np.linalg.norm(np.diff(profile, axis=0), axis=1) > 0.0)]]
     profile[profile[:, 0] < NO_CIRCLE * profile[:, 0].max(), 0] = 0.0
-    ways = np.diff(profile, axis=0)
-    outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / np.linalg.norm(ways, axis=1, keepdims=True)
+    edges = np.diff(profile, axis=0)
+    outward = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1, keepdims=True)
     closed = bool(np.all(profile[0] == profile[-1]))
     starts, ends = _ends_of_faces(outward, closed)
     angles = [math.tau * k / REVOLVED_SIDES for k in range(REVOLVED_SIDES)]
@@ -261,14 +261,14 @@ def _swept_mesh(shape: Swept) -> Mesh:
 
 
 def _tangents(path: Array, closed: bool) -> Array:
-    ways = np.diff(path, axis=0, append=path[:1])
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    edges = np.diff(path, axis=0, append=path[:1])
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     if not closed:
-        ways[-1] = ways[-2]
-    arriving = np.roll(ways, 1, axis=0)
+        edges[-1] = edges[-2]
+    arriving = np.roll(edges, 1, axis=0)
     if not closed:
-        arriving[0] = ways[0]
-    both = ways + arriving
+        arriving[0] = edges[0]
+    both = edges + arriving
     return both / np.linalg.norm(both, axis=1, keepdims=True)
 
 

@@ -57,9 +57,9 @@ def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Pro
 
 def _three(directions: Array) -> Rotation:
     """Return right-handed axes along up to three directions."""
-    given = [Vector(*direction) for direction in directions]
-    first = given[0]
-    second = given[1] if len(given) > 1 else upright(ZERO, first).rotation.x
+    axes = [Vector(*direction) for direction in directions]
+    first = axes[0]
+    second = axes[1] if len(axes) > 1 else upright(ZERO, first).rotation.x
     return Rotation(first, second, first.cross(second))
 
 
