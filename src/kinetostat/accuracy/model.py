@@ -436,24 +436,3 @@ def _flexible_springs(response: Response, count: int) -> tuple[tuple[FlexibleSpr
         flexible.append(FlexibleSpring(stacked_columns(twist.components(), count), size))
         names.append(MachineError(f"legs.{leg}.{part}.compliance", "share", "compliances", words, leg))
     return tuple(flexible), names
-
-
-@dataclass(frozen=True)
-class PossibleErrors:
-    """Every number of a machine that may be off, with the machine and its tolerances."""
-
-    machine: Machine
-    errors: tuple[MachineError, ...]
-
-
-def possible_errors(machine: Machine | MachineState) -> PossibleErrors:
-    """List every number of a machine that may be off.
-
-    Args:
-        machine: as drawn, with or without tolerances; or its state, as `state_of` returns it.
-
-    Raises:
-        InputError: it has no place at its pose.
-    """
-    state = state_of(machine)
-    return PossibleErrors(state.machine, error_model(state, {}, 1).errors)

@@ -19,7 +19,9 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from kinetostat.accuracy.errors import MachineError
+from kinetostat.accuracy.model import error_model
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
@@ -372,3 +374,24 @@ def _unpressed_block(number: int, part: TolerancedPart, rates: Array, bears: Mas
     of_ball = 1.0 / (len(places) + 2.0)
     variance = SIGMAS**-2 if part.normal and not part.free else of_ball
     return _Block(number, variance, columns, errors)
+
+
+@dataclass(frozen=True)
+class PossibleErrors:
+    """Every number of a machine that may be off, with the machine and its tolerances."""
+
+    machine: Machine
+    errors: tuple[MachineError, ...]
+
+
+def possible_errors(machine: Machine | MachineState) -> PossibleErrors:
+    """List every number of a machine that may be off.
+
+    Args:
+        machine: as drawn, with or without tolerances; or its state, as `state_of` returns it.
+
+    Raises:
+        InputError: it has no place at its pose.
+    """
+    state = state_of(machine)
+    return PossibleErrors(state.machine, error_model(state, {}, 1).errors)

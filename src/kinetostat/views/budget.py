@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.accuracy.model import PossibleErrors, possible_errors
-from kinetostat.accuracy.toleranced_parts import is_about
+from kinetostat.accuracy.toleranced_parts import PossibleErrors, is_about, possible_errors
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status

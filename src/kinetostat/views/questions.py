@@ -102,7 +102,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.lobes.Lobes": "views.lobes.LOBES",
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.Budget": "views.budget.BUDGET",
-    "accuracy.model.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
+    "accuracy.toleranced_parts.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
     "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
     "validation.comparison.Validation": "views.validation.VALIDATION",
     "studies.optimisation.result.Result": "views.optimisation.RESULT",
