@@ -133,7 +133,7 @@ def _spring_unit(spring: Spring) -> str:
 
 
 def _indices(analysis: Analysis) -> dict[str, Variable]:
-    """Scalars of the pose that have a number, and the principal compliances."""
+    """Return the scalars of the pose that have a number, and the principal compliances."""
     indices, length = analysis.indices, analysis.characteristic_length
     condition = indices.stiffness_condition if indices else None
     scalars = {

@@ -226,7 +226,7 @@ def _word(name: str) -> str:
 
 
 def _n(*numbers: float) -> str:
-    """Numbers with all their digits."""
+    """Return the numbers with all their digits."""
     return " ".join(repr(float(number)) for number in numbers)
 
 

@@ -240,7 +240,7 @@ def take_tolerances(document: Document, settings: Sequence[str], origin: str) ->
 
 
 def joined_tolerances(tolerances: Mapping[str, Tolerance], further: Mapping[str, Tolerance]) -> Tolerances:
-    """Tolerances with further ones after them, which hold where both are about the same number."""
+    """Return the tolerances with further ones after them, which hold where both are about the same number."""
     return {**{about: line for about, line in tolerances.items() if about not in further}, **further}
 
 

@@ -202,7 +202,7 @@ def _pose(machine: Machine) -> dict[str, str]:
 
 
 def _geometry(machine: Machine, leg: str) -> dict[str, str]:
-    """Lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
+    """Return the lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
     other_tables = ("pose.", "tool.", "load.", "limits.", "sections.", *VIBRATION_FIELDS)
     written = machine.family.chains is not None
     mine = (f"legs.{leg}.", "geometry.")

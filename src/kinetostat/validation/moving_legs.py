@@ -49,7 +49,7 @@ class LegPart:
         return placement(rotation, point - rotation @ point + amount * float(joint.pitch) * axis)
 
     def rate(self, before: Array, amount: float) -> Array:
-        """Twist of what follows about the origin per unit of its coordinate, rotation first [6].
+        """Return the twist of what follows about the origin per unit of its coordinate, rotation first [6].
 
         Args:
             before: placement of what carries the part.
@@ -165,7 +165,7 @@ class MovingLeg:
         return rows
 
     def rates(self, placements: Sequence[Array], coordinates: Sequence[float]) -> Array:
-        """Twists of the platform end about the origin per unit of each coordinate [6 x size]."""
+        """Return the twists of the platform end about the origin per unit of each coordinate [6 x size]."""
         given = iter(coordinates)
         pairs = zip(self.parts, placements, strict=False)
         return np.array([part.rate(before, next(given)) for part, before in pairs if part.moves]).reshape(-1, 6).T
@@ -195,7 +195,7 @@ class MovingLeg:
 
 
 def turn(axis: Array, angle: float) -> Array:
-    """Rotation about a unit vector by an angle (rad), by Rodrigues' formula [3 x 3]."""
+    """Return the rotation about a unit vector by an angle (rad), by Rodrigues' formula [3 x 3]."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
@@ -224,7 +224,7 @@ def turned_direction(place: Array, direction: Vector) -> Vector:
 
 
 def vector(numbers: Any) -> Vector:
-    """Three numbers as a vector."""
+    """Return three numbers as a vector."""
     return Vector(*(float(c) for c in numbers))
 
 

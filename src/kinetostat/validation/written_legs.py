@@ -40,7 +40,7 @@ TENSOR_PLACES = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
 
 
 def written_legs(machine: Machine) -> list[MovingLeg]:
-    """Legs of a machine written leg by leg, at the home pose, in the order of its file."""
+    """Return the legs of a machine written leg by leg, at the home pose, in the order of its file."""
     document = _document(machine)
     legs = []
     for name, parts in _by_leg(document).items():
@@ -238,6 +238,6 @@ def _body(
 
 
 def _around(axis: Array) -> Array:
-    """Three unit vectors as rows: an axis and two across it."""
+    """Return three unit vectors as rows: an axis and two across it."""
     y = unit(np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis))
     return np.array([axis, y, np.cross(axis, y)])

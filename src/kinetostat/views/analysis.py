@@ -69,7 +69,7 @@ def analyze_in_state(
 
 
 def _free_parts(analysis: Analysis, full: bool) -> Iterator[Table | str]:
-    """Reasons in tables, remarks, K and C last; all springs if `full`."""
+    """Give the reasons as tables and remarks, K and C last; all springs if `full`."""
     if analysis.platform is None or not analysis.compliance_diagonal.size:
         return
     display, names = analysis.machine.display, analysis.components
@@ -120,7 +120,7 @@ def _loaded_parts(state: "LoadedState", full: bool) -> Iterator[Table | str]:
 
 
 def _filled_parts(parts: Iterator[Table | str]) -> list[Table | str]:
-    """Sentences, and the tables that have a row."""
+    """Return the sentences, and the tables that have a row."""
     return [part for part in parts if part and (isinstance(part, str) or part.row_count)]
 
 

@@ -119,7 +119,7 @@ def _tables(answer: Elevation, full: bool) -> Iterator[FittedTable]:
 
 
 def _columns(answer: Elevation, full: bool = False) -> dict[str, tuple[str, Array]]:
-    """Columns of the main table: head, unit and values."""
+    """Return the columns of the main table: head, unit and values."""
     columns = {"sag": ("m", answer.sag), "rotation": ("rad", answer.rotation)}
     if full:
         units = component_units(answer.components)

@@ -108,7 +108,7 @@ def actuator_loads(state: LoadedState) -> list[tuple[str, bool, float]]:
 
 
 def displacement_table(state: LoadedState, display: Display) -> FittedTable:
-    """Displacement of the tool under its loads, beside that of linear equations."""
+    """Return the displacement of the tool under its loads, beside that of linear equations."""
     units = component_units(state.components)
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
     table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
@@ -187,7 +187,7 @@ def spring_table(state: LoadedState, display: Display) -> FittedTable:
 
 
 def strut_table(state: LoadedState, display: Display) -> FittedTable:
-    """Compression of each strut, and the load at which it would buckle."""
+    """Return the compression of each strut, and the load at which it would buckle."""
     table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
     for strut in state.struts:
         reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"

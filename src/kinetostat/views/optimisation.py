@@ -79,13 +79,13 @@ def _unit(unit: str, display: Display) -> str:
 MOST_ROWS = 25
 """Designs of a front that are printed, on one screen; result.json has all."""
 LEAST_PERCENT = 1e-4
-"""Percent per percent below which a 0 is printed."""
+"""Percent per percent below which a 0 is printed: differences leave round-off of this size."""
 LEAST_STIFFNESS_LEFT = 0.01
-"""Share of the initial stiffness of a direction; a sentence says so if less than this is left."""
+"""Share of its initial stiffness below which a direction has been given up for the others, and a sentence says so."""
 
 
 def worth_table(result: Result) -> Table:
-    """Objectives and constraints before and after."""
+    """Return the objectives and constraints before and after."""
     display = result.problem.machine.display
     best = "knee of the front" if len(result.problem.objectives) > 1 else "best"
     table = numeric_table(
@@ -162,7 +162,7 @@ def failing(robustness: Robustness) -> str:
 
 
 def front_table(result: Result) -> Table:
-    """Designs of the front, the knee among them."""
+    """Return the designs of the front, the knee among them."""
     problem, outcome = result.problem, result.log.outcome(result.front)
     shown = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {result.knee}
     units = [objective.term.unit for objective in problem.objectives]
@@ -257,7 +257,7 @@ def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
 
 
 def _numbers_of(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
-    """Objectives, constraints and verdict of one design of an outcome."""
+    """Return the objectives, constraints and verdict of one design of an outcome."""
     objectives = zip(problem.objectives, outcome.objectives[k].tolist(), strict=True)
     constraints = zip(problem.constraints, outcome.constraints[k].tolist(), strict=True)
     return {

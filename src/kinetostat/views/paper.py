@@ -125,7 +125,7 @@ def _lines(reproduction: Reproduction) -> Lines:
 
 
 def _tables(reproduction: Reproduction, full: bool) -> Iterator[Table | str]:
-    """Numbers that differ; if `full`, every number next to the printed one, then equations and statements."""
+    """Give the numbers that differ; if `full`, every number next to the printed one, then equations and statements."""
     if not full:
         differing = [number for number in reproduction.comparisons if number.verdict is PrintVerdict.DIFFERS]
         if differing:

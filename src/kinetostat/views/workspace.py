@@ -23,7 +23,7 @@ def _lines(answer: Workspace) -> Lines:
 
 
 def _volume_lines(answer: Workspace) -> Lines:
-    """Sentences on the size of the workspace, and on what is not known of it."""
+    """Give the sentences on the size of the workspace, and on what is not known of it."""
     volume = answer.volume
     name = "Area" if len(answer.dataset["verdict"].dims) == 2 else "Volume"
     if volume.cells < FEWEST_CELLS:
@@ -51,7 +51,7 @@ def _volume_lines(answer: Workspace) -> Lines:
 
 
 def _border_lines(answer: Workspace) -> Lines:
-    """Sentences on the borders of the workspace, and on the part of it that can be reached."""
+    """Give the sentences on the borders of the workspace, and on the part of it that can be reached."""
     if "assembly_mode" in answer.dataset.attrs:
         yield (
             "Mode",

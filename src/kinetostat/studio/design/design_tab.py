@@ -228,7 +228,7 @@ class FavouritesPanel:
 
 
 def _entries_of(text: str) -> list[str]:
-    """Entries of a list that is written with commas."""
+    """Return the entries of a list that is written with commas."""
     return [part.strip() for part in text.split(",") if part.strip()]
 
 

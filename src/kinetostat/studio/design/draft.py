@@ -103,7 +103,7 @@ class Draft:
         return f"{slug(self.name, 'study')}.toml", (head + study_toml(study)).encode()
 
     def hidden_parts(self) -> list[str]:
-        """Short descriptions of what the study has but the form does not show."""
+        """Return short descriptions of what the study has but the form does not show."""
         parts = ["conditions of the workspace"] if self.poses.get("where") else []
         tolerances = sum("tolerance" in table for table in self.variables)
         return parts + ([_count_in_words(tolerances, "tolerance")] if tolerances else [])

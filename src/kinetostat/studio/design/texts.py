@@ -28,10 +28,7 @@ from kinetostat.views.comparison import (
     softest_texts,
     verdict_text,
 )
-from kinetostat.views.optimisation import percent_text
-
-SACRIFICED = 0.01
-"""Share of its initial stiffness below which a direction has been given up for the others, so that a remark says so."""
+from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, percent_text
 
 
 def result_text(progress: Progress) -> str:
@@ -116,7 +113,7 @@ def _remarks(result: dict[str, Any]) -> list[str]:
     remarks = [f"At a bound: {', '.join(bounded)}. Wider bounds would allow a better design."] if bounded else []
     for direction in result["directions"]:
         gain, name = direction["gain"], direction["name"].removeprefix("compliance_")
-        if gain is not None and gain < SACRIFICED:
+        if gain is not None and gain < LEAST_STIFFNESS_LEFT:
             remarks.append(f"In the direction {name}, the best design keeps only {gain:.2g} of the initial stiffness.")
     return remarks + (result["ridges_text"] if result["front"] is None else [])
 

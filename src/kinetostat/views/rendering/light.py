@@ -139,7 +139,7 @@ def _sun_directions() -> Array:
 
 
 def _sky_directions() -> Array:
-    """Lamps on the upper half of a sphere, as dense as the cosine from the zenith: an overcast sky."""
+    """Return the lamps on the upper half of a sphere, as dense as the cosine from the zenith: an overcast sky."""
     flat = _disc(SKIES)
     return np.column_stack([flat, np.sqrt(1.0 - np.sum(flat**2, axis=1))])
 
@@ -176,7 +176,7 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
 
 
 def _room(direction: Float32s, roughness: Float32s) -> Float32s:
-    """Brightness [n x 1] of the room in a direction: walls, ground and soft boxes."""
+    """Return the brightness [n x 1] of the room in a direction: walls, ground and soft boxes."""
     brightness = GROUND + (WALL - GROUND) * smooth_step(direction[:, 2:], -_blur(roughness), _blur(roughness))
     return sum((_box(direction, roughness, *box) for box in BOXES), start=brightness)
 
@@ -192,7 +192,7 @@ def _blur(roughness: Float32s) -> Float32s:
 
 
 def smooth_step(value: Array | Float32s, low: Array | Float32s | float, high: Array | Float32s | float) -> Float32s:
-    """Rise from 0 at `low` to 1 at `high`, level at both ends."""
+    """Return the rise from 0 at `low` to 1 at `high`, level at both ends."""
     share = np.clip((value - low) / (high - low), 0.0, 1.0)
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
@@ -271,7 +271,7 @@ def _missing(ground: Ground, light: Light) -> Float32s:
 
 
 def _inside(share: Array) -> Float32s:
-    """Rise from 0 at either edge of the picture to 1 well inside."""
+    """Return the rise from 0 at either edge of the picture to 1 well inside."""
     return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE_FADE)
 
 

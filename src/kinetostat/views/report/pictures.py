@@ -98,7 +98,7 @@ def figure_of(drawing: Drawing, caption: str) -> Figure:
 
 @cache
 def renderer() -> dict[str, str] | None:
-    """Source of the renderer's modules by name; None where their libraries are not installed."""
+    """Return the source of the renderer's modules by name; None where their libraries are not installed."""
     return browser.modules()
 
 

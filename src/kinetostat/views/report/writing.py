@@ -69,7 +69,7 @@ class ReportOptions:
     elevations: str = ""
 
     def words(self) -> list[str]:
-        """Words of the command line that give the same options."""
+        """Return the words of the command line that give the same options."""
         single = [(name, getattr(self, name)) for name in ("engine", "author", "date", "fit", "motion", "elevations")]
         pairs = [("--over", self.ranges), ("--without", self.without)]
         pairs += [(f"--{name}", [str(value)]) for name, value in single if value]

@@ -63,7 +63,7 @@ def joint_radius(leg: Anatomy, sizes: Proportions) -> float:
 
 
 def _neighbours(joint: JointPart, leg: Anatomy, base: Plate | None, platform: Plate) -> tuple[Vector, Vector]:
-    """Vectors from a joint to the part before it and to the part after it in its leg: a link, or a plate."""
+    """Return the vectors from a joint to the part before it and to the part after it in its leg: a link, or a plate."""
     before = next((link.start - joint.point for link in leg.links if together(link.end, joint.point)), None)
     after = next((link.end - joint.point for link in leg.links if together(link.start, joint.point)), None)
     if before is None and base is not None and not leg.on_rail:

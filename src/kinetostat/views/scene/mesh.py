@@ -117,7 +117,7 @@ def _shared_normals(normals: Array, others: Array) -> Array:
 
 
 def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
-    """Bands of quadrilaterals, each between its two lines.
+    """Return the bands of quadrilaterals, each between its two lines.
 
     Args:
         points, normals: [bands x 2 x count x 3], along each band's first and second line; to the left of the way along
