@@ -164,13 +164,8 @@ class Reduced:
             "compliance": [compliance[i][i] * units[i, i] for i in range(6)],
         }
         if "stiffness" in wanted:
-            parts = [part for part in self.components if not is_zero(compliance[part][part])]
-            moving = [[compliance[i][j] for j in parts] for i in parts]
-            by_form = isinstance(tangent, Tangent)
-            stiffness, sure = (_inverse_diagonal if by_form else _free_inverse_diagonal)(moving, tangent.rank)
-            by_part = dict.fromkeys(self.components, math.inf)
-            by_part |= {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
-            result["stiffness"], good = [by_part.get(part, math.nan) for part in range(6)], good & sure
+            result["stiffness"], sure = self._stiffness_diagonal(tangent, compliance, units)
+            good = good & sure
         if "factor" in wanted and isinstance(tangent, Tangent):
             result["factor"], sure = tangent.factor()
             good = good & sure
@@ -184,6 +179,18 @@ class Reduced:
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
         status = where(response.place_status > Status.OK + 0.5, response.place_status, code)
         return result, status_with_rest(self.machine, names, response.status, status)
+
+    def _stiffness_diagonal(
+        self, tangent: "Tangent | LegwiseTangent", compliance: list[Row], units: Array
+    ) -> tuple[Row, Scalar]:
+        """The diagonal of K at the tool [6], and whether it is sure: infinite if rigid parts hold a component."""
+        parts = [part for part in self.components if not is_zero(compliance[part][part])]
+        moving = [[compliance[i][j] for j in parts] for i in parts]
+        by_form = isinstance(tangent, Tangent)
+        stiffness, sure = (_inverse_diagonal if by_form else _free_inverse_diagonal)(moving, tangent.rank)
+        by_part = dict.fromkeys(self.components, math.inf)
+        by_part |= {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
+        return [by_part.get(part, math.nan) for part in range(6)], sure
 
 
 def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, Scalar]:

@@ -164,10 +164,10 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
     drives = _drives(response)
     sets = []
     for block in ("translation", "rotation"):
-        loads = _wrenches(response, drives, block) if "load" in kinds else None
-        rates = _twists(response, drives, block) if "speed" in kinds else None
-        gains = _accelerations(response, drives, block) if "load" in kinds else None
-        sets += [each for each in (loads, rates, gains) if each is not None]
+        wrenches = _wrenches(response, drives, block) if "load" in kinds else None
+        twists = _twists(response, drives, block) if "speed" in kinds else None
+        accelerations = _accelerations(response, drives, block) if "load" in kinds else None
+        sets += [each for each in (wrenches, twists, accelerations) if each is not None]
     return Capability(state, Status.OK, _message(state.machine, sets), drives, tuple(sets), direction)
 
 
@@ -229,12 +229,12 @@ def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> Ca
     if moving is None:
         return None
     directions, rates = moving
-    felt = np.linalg.norm(rates, axis=1) > DEPENDENT * np.linalg.norm(rates, axis=1).max(initial=0.0)
+    moves = np.linalg.norm(rates, axis=1) > DEPENDENT * np.linalg.norm(rates, axis=1).max(initial=0.0)
     speeds = np.array([drive.speed for drive in drives])
-    names = [(drive.name,) for drive, seen in zip(drives, felt, strict=True) if seen]
+    names = [(drive.name,) for drive, takes_part in zip(drives, moves, strict=True) if takes_part]
     least = float(greatest_speed(response.transmission, speeds.tolist(), BLOCKS[block]))
     name, unit = ("speed", "m/s") if block == "translation" else ("rate", "rad/s")
-    matrix, bounds = np.vstack([rates[felt], -rates[felt]]), np.tile(speeds[felt], 2)
+    matrix, bounds = np.vstack([rates[moves], -rates[moves]]), np.tile(speeds[moves], 2)
     return _set(name, unit, least, matrix, bounds, directions, names * 2)
 
 
@@ -249,12 +249,12 @@ def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str
     whole = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)[:, BLOCKS[block]]
     rows = whole @ directions @ directions.T
     sizes = np.linalg.norm(rows, axis=1)
-    felt = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
-    if not len(felt):
+    met = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
+    if not len(met):
         return None
-    faces = [response.acceleration_faces[number] for number in felt]
+    faces = [response.acceleration_faces[number] for number in met]
     names = [tuple(drives[drive].name for drive in face.drives) for face in faces]
-    matrix = np.vstack([rows[felt], -rows[felt]])
+    matrix = np.vstack([rows[met], -rows[met]])
     bounds = np.array([float(face.upper) for face in faces] + [-float(face.lower) for face in faces])
     least = float(greatest_acceleration(response.acceleration_faces, response.transmission, BLOCKS[block]))
     unit = "m/s**2" if block == "translation" else "rad/s**2"
@@ -271,6 +271,15 @@ def _set(
     directions: Array,
     names: Sequence[tuple[str, ...]],
 ) -> CapabilitySet:
+    """The set of all amounts a with normals a <= bounds, and how far it reaches.
+
+    Args:
+        name, unit: of the amounts.
+        least: radius of the largest ball in it.
+        normals, bounds: of its faces [faces x 3], [faces].
+        directions: an orthonormal basis of the directions that it extends in [3 x k].
+        names: of the drives that are at their bounds in each face.
+    """
     sizes = np.linalg.norm(normals, axis=1)
     reaches = bounds / sizes
     has_room = least > 0.0

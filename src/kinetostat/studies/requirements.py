@@ -6,7 +6,7 @@ A pose that has no result fails its requirement: a machine that cannot get there
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -196,6 +196,7 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
 
 
 def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> list[Verdict]:
+    """Judge a requirement: a verdict for each of its conditions, at the worst of its poses, or that of its motor."""
     if requirement.fits:
         return [_motor_verdict(state.machine, name, requirement)]
     machine, show = state.machine, state.machine.display.show
@@ -204,33 +205,31 @@ def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> li
     names = list(dict.fromkeys(condition.quantity for condition in conditions))
     refuse_absent(state, names, varied)
     answer = evaluate(machine, points, names) if varied or needs_state(machine, names) else _at_the_pose(state, names)
-    judged = []
-    for condition in conditions:
+
+    def verdict(condition: PoseCondition) -> Verdict:
         amounts = answer.values[condition.quantity]
         i = _worst(condition, amounts)
         pose = {path: float(column[0]) for path, column in points.columns(i, i + 1).items()} if varied else {}
-        place = ", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied)
         worst = None if np.isnan(amounts[i]) else float(amounts[i])
         holds = condition.holds(amounts)
-        judged.append(
-            Verdict(
-                name=name,
-                condition=condition.text,
-                quantity=condition.quantity,
-                unit=QUANTITIES[condition.quantity].unit,
-                bound=condition.value,
-                poses=points.size,
-                where=where,
-                met=bool(holds.all()),
-                worst=worst,
-                margin=_margin(condition, worst),
-                worst_pose=pose,
-                place=place,
-                status=Status(int(answer.status[i])).word,
-                failed=int((~holds).sum()),
-            )
+        return Verdict(
+            name=name,
+            condition=condition.text,
+            quantity=condition.quantity,
+            unit=QUANTITIES[condition.quantity].unit,
+            bound=condition.value,
+            poses=points.size,
+            where=where,
+            met=bool(holds.all()),
+            worst=worst,
+            margin=_margin(condition, worst),
+            worst_pose=pose,
+            place=", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied),
+            status=Status(int(answer.status[i])).word,
+            failed=int((~holds).sum()),
         )
-    return judged
+
+    return [verdict(condition) for condition in conditions]
 
 
 def _at_the_pose(state: MachineState, names: Sequence[str]) -> Evaluation:
@@ -245,25 +244,9 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
     if requirement.over and requirement.poses:
         raise InputError("it has both over and poses; give one of them, or make two requirements.")
     if requirement.over:
-        ranges = [parse_range(text) for text in requirement.over]
-        fields = [find(machine.family, span.field) for span in ranges]
-        grid = grid_of([*zip(ranges, fields, strict=True)])
-        if grid.size > MOST_POSES:
-            raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
-        for path in grid.paths:
-            if list(grid.paths).count(path) > 1:
-                raise InputError(f"{path} has two ranges; give it one.")
-        return grid, fields, f"over {', '.join(f.shown for f in fields)}"
+        return _poses_of_box(machine, requirement.over)
     if requirement.poses:
-        here = values(machine)
-        paths = {name: find(machine.family, name).path for row in requirement.poses for name in row}
-        rows = [{paths[name]: value for name, value in row.items()} for row in requirement.poses]
-        columns = [
-            GivenColumn(path, np.array([row.get(path, float(here[path])) for row in rows], object))
-            for path in dict.fromkeys(paths.values())
-        ]
-        read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
-        return PointTable(read.leaves), list(read.fields), "of the list"
+        return _poses_of_list(machine, requirement.poses)
     # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
     coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
     return (
@@ -271,6 +254,32 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
         [],
         "at the pose of the file",
     )
+
+
+def _poses_of_box(machine: Machine, over: Sequence[str]) -> tuple[Points, list[Parameter], str]:
+    """The poses of all combinations of some ranges."""
+    ranges = [parse_range(text) for text in over]
+    fields = [find(machine.family, span.field) for span in ranges]
+    grid = grid_of([*zip(ranges, fields, strict=True)])
+    if grid.size > MOST_POSES:
+        raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
+    for path in grid.paths:
+        if list(grid.paths).count(path) > 1:
+            raise InputError(f"{path} has two ranges; give it one.")
+    return grid, fields, f"over {', '.join(f.shown for f in fields)}"
+
+
+def _poses_of_list(machine: Machine, poses: Sequence[Mapping[str, Any]]) -> tuple[Points, list[Parameter], str]:
+    """The poses of a list; coordinates that one does not name are those of the file."""
+    of_file = values(machine)
+    paths = {name: find(machine.family, name).path for row in poses for name in row}
+    rows = [{paths[name]: value for name, value in row.items()} for row in poses]
+    columns = [
+        GivenColumn(path, np.array([row.get(path, float(of_file[path])) for row in rows], object))
+        for path in dict.fromkeys(paths.values())
+    ]
+    read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
+    return PointTable(read.leaves), list(read.fields), "of the list"
 
 
 def _worst(condition: PoseCondition, amounts: Array) -> int:
