@@ -24,19 +24,21 @@ PLATFORM, BASE, HEAD = "platform", "base", "head"
 """Of what a handle is: the whole platform, a joint on the base, or a joint on the platform."""
 HOLD = 0.03
 """Weight of what should stay (the orientation under a push, the place under a turn) against what is pulled."""
-LEAST, ASIDE = 0.5, 5.0
+LEAST_FOLLOWED, MOST_ASIDE = 0.5, 5.0
 """A platform is free along or about an axis if it can follow a unit pull by this share, and moves aside by less than
 this (in units of the machine's length, and rad)."""
-FAINT = 1e-3
+FAINT_EFFECT = 1e-3
 """Share of the largest effect on a part from which a number counts as one that moves it."""
 DIFFERENCE = 1e-6
-"""Step of finite differences, in units of the machine's length or in rad."""
+"""Step of finite differences, in units of the machine's length or in rad: half of the digits are left to slopes."""
 ITERATIONS, HALVINGS = 6, 4
-DONE = 1e-7
-"""Residual, in units of the machine's length, at which the part is where it was pulled."""
+"""Steps of a pull, and halvings of a step, at most: the next position of the pointer goes on from where these have
+led."""
+REACHED = 1e-7
+"""Residual, in units of the machine's length, at which the part is where it was pulled: far less than a pixel."""
 DECIMALS = 9
-"""Of metres and radians: finer than anybody can pull, and without the digits of round-off."""
-RANK = 1e-6
+"""Decimals of metres and radians: finer than anybody can pull, and without the digits of round-off."""
+NO_MOTION = 1e-6
 """Singular values below this share of the largest count as zero: motions that no number can make."""
 
 
@@ -99,8 +101,8 @@ def free_axes(machine: Machine) -> tuple[str, ...]:
 def _follows(slopes: Array, k: int, weights: Array) -> bool:
     """Return whether the pose can follow a unit pull along or about the axis `k`, without running away aside."""
     wish = np.eye(6)[k]
-    motion = slopes @ np.linalg.lstsq(weights[:, None] * slopes, weights * wish, rcond=RANK)[0]
-    return bool(motion[k] > LEAST and np.abs(motion - wish).max() < ASIDE)
+    motion = slopes @ np.linalg.lstsq(weights[:, None] * slopes, weights * wish, rcond=NO_MOTION)[0]
+    return bool(motion[k] > LEAST_FOLLOWED and np.abs(motion - wish).max() < MOST_ASIDE)
 
 
 def _weights(axis: str) -> Array:
@@ -163,11 +165,11 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
     numbers, units = problem.start, problem.units
     residual, effective = problem.at(numbers), np.zeros(len(numbers), dtype=bool)
     for _ in range(ITERATIONS):
-        if not np.isfinite(residual).all() or np.abs(residual).max() < DONE:
+        if not np.isfinite(residual).all() or np.abs(residual).max() < REACHED:
             break
         slopes = _slopes(problem, numbers, residual)
         effective = effective | slopes.any(axis=0)
-        step = units * np.linalg.lstsq(slopes, -residual, rcond=RANK)[0]
+        step = units * np.linalg.lstsq(slopes, -residual, rcond=NO_MOTION)[0]
         for _ in range(HALVINGS):
             trial = problem.at(numbers + step)
             if np.isfinite(trial).all() and np.linalg.norm(trial) < np.linalg.norm(residual):
@@ -178,7 +180,7 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
         numbers, residual = numbers + step, trial
     # What has moved less than a residual may be left is round-off: it stays as it was written, to the last digit.
     start = problem.start
-    numbers = np.where(np.abs(numbers - start) > DONE * units, np.round(numbers, DECIMALS), start)
+    numbers = np.where(np.abs(numbers - start) > REACHED * units, np.round(numbers, DECIMALS), start)
     # All numbers that have an effect, changed or not: a whole pull changes the same ones, and is one step to undo.
     return {path: float(n) for path, n, counts in zip(problem.unknowns, numbers, effective, strict=True) if counts}
 
@@ -194,7 +196,7 @@ def _slopes(problem: _Problem, numbers: Array | None = None, residual: Array | N
         columns.append((problem.at(ahead) - residual) / DIFFERENCE)
     slopes = np.nan_to_num(np.array(columns, dtype=float).T.reshape(len(residual), len(columns)))
     effects = np.linalg.norm(slopes, axis=0)
-    return slopes * (effects > FAINT * effects.max(initial=0.0))
+    return slopes * (effects > FAINT_EFFECT * effects.max(initial=0.0))
 
 
 def _pose(machine: Machine) -> dict[str, str]:

@@ -41,6 +41,13 @@ SUN_POWER, SKY_POWER, BOUNCE_POWER = 1.55, 0.75, 0.3
 DIELECTRIC = 0.04
 """Reflectance of paint at normal incidence: that of a refractive index of 1.5."""
 EXPOSURE = 0.82
+"""Factor on all light before it is compressed: white paint in the sun stays just below white."""
+FILM_CURVE = ((2.51, 0.03), (2.43, 0.59, 0.14))
+"""Numerator and denominator of the curve by which film compresses bright light (Narkowicz 2016)."""
+LEAST_FACING = 0.02
+"""Least cosine between a normal and the way to the eye: at edges, normals are turned away from it."""
+BLUR_OF_POLISH, BLUR_OF_ROUGHNESS = 0.06, 0.55
+"""Width over which a mirrored edge is blurred, as a cosine: on polished metal, and in addition on a rough surface."""
 BOXES = (
     ((0.0, 0.0, 1.0), 0.8, 2.4),
     ((-0.74, -0.56, 0.37), 0.86, 2.6),
@@ -159,11 +166,11 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
         light: on the points.
     """
     looks = LOOKS.values()
-    color = np.array([linear(each.color) for each in looks], dtype=np.float32)[look]
-    metal = np.array([[each.metalness] for each in looks], dtype=np.float32)[look]
-    roughness = np.array([[each.roughness] for each in looks], dtype=np.float32)[look]
+    color = np.array([linear(entry.color) for entry in looks], dtype=np.float32)[look]
+    metal = np.array([[entry.metalness] for entry in looks], dtype=np.float32)[look]
+    roughness = np.array([[entry.roughness] for entry in looks], dtype=np.float32)[look]
     mirrored = DIELECTRIC * (1.0 - metal) + color * metal
-    facing = np.maximum(np.sum(normals * to_eye, axis=1, keepdims=True), 0.02)
+    facing = np.maximum(np.sum(normals * to_eye, axis=1, keepdims=True), LEAST_FACING)
     open_to, sun = light.openness[:, None], light.sun[:, None]
     bounce = BOUNCE_POWER * (0.5 - 0.5 * normals[:, 2:]) * (0.35 + 0.65 * open_to)
     diffuse = color * (1.0 - metal) * (SUN_POWER * sun + SKY_POWER * light.sky[:, None] + bounce)
@@ -172,7 +179,8 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
     mirror = 2.0 * facing * normals - to_eye
     room = (0.3 + 0.7 * open_to) * _room(mirror, roughness) + sun * _box(mirror, roughness, *GLINT)
     x = EXPOSURE * (diffuse + reflectance * room)
-    return np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0)
+    (a, b), (c, d, e) = FILM_CURVE
+    return np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0.0, 1.0)
 
 
 def _room(direction: Float32s, roughness: Float32s) -> Float32s:
@@ -188,7 +196,7 @@ def _box(direction: Float32s, roughness: Float32s, centre: Sequence[float], edge
 
 
 def _blur(roughness: Float32s) -> Float32s:
-    return 0.06 + 0.55 * roughness
+    return BLUR_OF_POLISH + BLUR_OF_ROUGHNESS * roughness
 
 
 def smooth_step(value: Array | Float32s, low: Array | Float32s | float, high: Array | Float32s | float) -> Float32s:
