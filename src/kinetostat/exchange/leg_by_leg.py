@@ -114,24 +114,29 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     document |= {"space": "planar"} if machine.family.planar else {}
     document |= {"platform": {"point": _numbers(point)}, "pose": _pose(configuration, point)}
     document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
-    tool, load_given = _tool(machine, turn), _load(machine, turn)
-    document |= {"tool": tool} if tool else {}
-    for name in ("drives", "servo", "damping", "cutting"):
-        usual = vars(COMMON[name]())
-        given = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
-        paths = [path for path, _ in machine.family.own_drives if path.startswith(f"{name}.")]
-        given |= {path.partition(".")[2]: dict(vars(machine.tables[path])) for path in paths}
-        document |= {name: given} if given else {}
-    document |= {"load": load_given} if load_given else {}
-    upright = _numbers(turn.z) == [0.0, 0.0, 1.0]
+    tables = {"tool": _tool(machine, turn)}
+    tables |= {name: _changed_entries(machine, name) for name in ("drives", "servo", "damping", "cutting")}
+    tables |= {"load": _load(machine, turn), "limits": _limits(machine, turn, built)}
+    return document | {name: table for name, table in tables.items() if table}
+
+
+def _changed_entries(machine: Machine, name: str) -> Document:
+    """Return the entries of a common table that are not the usual ones, and those of single drives."""
+    usual = vars(COMMON[name]())
+    entries = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
+    paths = [path for path, _ in machine.family.own_drives if path.startswith(f"{name}.")]
+    return entries | {path.partition(".")[2]: dict(vars(machine.tables[path])) for path in paths}
+
+
+def _limits(machine: Machine, turn: Rotation, built: Configuration | None) -> dict[str, float]:
+    """Return the limits that the file leg by leg can say, SI."""
     table = machine.tables["limits"]
     limits = {limit.name: getattr(table, limit.name) for limit in limits_set(table)}
-    if not upright:  # the platform's z axis is that of the base at the home pose of a file leg by leg
+    if _numbers(turn.z) != [0.0, 0.0, 1.0]:  # the platform's z axis is that of the base at the home pose of such a file
         limits.pop("platform_joint_angle", None)
     if built:
         limits = _limits_as_built(limits, machine, built)
-    limits |= {name: getattr(table, name) for name in OF_DRIVES if is_set(getattr(table, name))}
-    return document | ({"limits": limits} if limits else {})
+    return limits | {name: getattr(table, name) for name in OF_DRIVES if is_set(getattr(table, name))}
 
 
 def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configuration) -> dict[str, float]:

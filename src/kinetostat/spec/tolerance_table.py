@@ -95,6 +95,7 @@ def _range_of(size: float, ends: Sequence[float], name: str) -> int:
 
 TABLE = "tolerances"
 MOST_LINES = 200
+"""Lines of the table at most: one for each number of a large machine; a file with more is no machine's."""
 MOST_VALUES = 3
 """Values of a line: one for each kind of number, length, angle and ratio."""
 LINE_WIDTH = 120
@@ -226,10 +227,10 @@ def take_tolerances(document: Document, settings: Sequence[str], origin: str) ->
     Raises:
         InputError: names the line, its value, what is allowed, and how to write it.
     """
-    meant = [text for text in several(settings) if re.match(rf"\s*{TABLE}\s*[.=]", text)]
-    others = [text for text in several(settings) if text not in meant]
+    overrides = [text for text in several(settings) if re.match(rf"\s*{TABLE}\s*[.=]", text)]
+    others = [text for text in several(settings) if text not in overrides]
     tolerances = read_tolerances(document.get(TABLE, {}), f'"{origin}": ')
-    for setting in meant:
+    for setting in overrides:
         path, equals, value = setting.partition("=")
         if not equals:
             raise InputError(f'{shorten(setting)} must be {TABLE}.WHAT=VALUE, e.g. {TABLE}.joints="0.05 mm".')
