@@ -95,7 +95,7 @@ def _range_of(size: float, ends: Sequence[float], name: str) -> int:
 
 TABLE = "tolerances"
 MOST_LINES = 200
-"""Lines of the table at most: one for each number of a large machine; a file with more is no machine's."""
+"""Lines of the table at most: one for each number of a large machine, so that more are a mistake."""
 MOST_VALUES = 3
 """Values of a line: one for each kind of number, length, angle and ratio."""
 LINE_WIDTH = 120
