@@ -36,6 +36,8 @@ MARKERS = {
     "attack": ("test_attack", "test_judge"),
     "packaging": ("test_packaging",),
     "numbers": (
+        "test_any_scalar",
+        "test_balance_of_work",
         "test_closed_legs",
         "test_derivatives",
         "test_derivatives_leg_by_leg",
@@ -51,9 +53,12 @@ MARKERS = {
         "test_motion_routes",
         "test_optimisers",
         "test_printer_calibration",
+        "test_process_forces",
+        "test_random_planar_machines",
         "test_reach_leg_by_leg",
         "test_scalars",
         "test_struts",
+        "test_wrench_sets",
     ),
     "reports": ("test_report",),
     "folders": (

@@ -201,6 +201,7 @@ def test_gravity_without_any_mass_is_refused():
 
 
 @pytest.mark.parametrize("name", ["hexapod", "planar-3rrr", "delta", "tripteron"])
+@pytest.mark.numbers
 def test_a_table_of_loaded_states_is_each_of_them(name):
     planar = name.startswith("planar")
     machine = load_without_limits(name, [f"load.force={[20, 30, 0] if planar else [20, 30, -50]}"])

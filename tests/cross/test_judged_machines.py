@@ -47,6 +47,7 @@ def test_files_that_were_wrong_agree_with_the_exact_engine(name):
 
 
 @pytest.mark.parametrize("name", [name for name, wrong in MENDED.items() if wrong])
+@pytest.mark.numbers
 def test_the_command_line_tells_the_same(name, capsys):
     expected, length = exact(name)
     assert main(["analyze", str(CASES / f"{name}.toml"), "--json"]) == 0

@@ -92,6 +92,7 @@ def test_a_turning_machine_begins_to_chatter_at_the_width(speed):
     ("entry", "leaving", "teeth", "agreed"), [(0.0, math.pi, 4, 0.03), (math.pi / 2, math.pi, 3, 0.15)]
 )
 @pytest.mark.parametrize("speed", [1300.0, 2000.0, 3500.0])
+@pytest.mark.numbers
 def test_a_milling_machine_begins_to_chatter_at_the_width(entry, leaving, teeth, agreed, speed):
     """Four edges in a slot push the same at any time, so that the mean is exact; half a slot is near it."""
     machine = load("hexapod", HEXAPOD)

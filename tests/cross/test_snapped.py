@@ -18,6 +18,7 @@ def scaled(share):
     return machine.with_values(loads)
 
 
+@pytest.mark.numbers
 def test_a_grid_says_what_an_analysis_says():
     """The machine stands up to 0.528 times its load: below it has not snapped, above it has."""
     for share, expected in ((0.4, False), (1.0, True)):

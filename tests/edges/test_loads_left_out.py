@@ -76,6 +76,7 @@ def test_a_folder_of_results_says_it(capsys, tmp_path, command):
         assert SAID in setting_lines(dataset)
 
 
+@pytest.mark.reports
 def test_every_section_of_a_report_that_is_about_the_free_machine_says_it(tmp_path, monkeypatch):
     page = tmp_path / "report.html"
     no_pictures(monkeypatch)

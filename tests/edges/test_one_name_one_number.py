@@ -178,6 +178,7 @@ def cells(page):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tripteron", "planar-3rrr"])
+@pytest.mark.numbers
 def test_a_key_of_json_has_one_number_in_all_answers_about_a_pose(capsys, name):
     """The free machine, the machine under load, its vibration, sensitivities and guidelines; old keys do not count."""
     changes = settings(name)

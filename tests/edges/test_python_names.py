@@ -292,6 +292,7 @@ def test_a_machine_is_exported_as_by_the_command(tmp_path, monkeypatch):
     assert not (tmp_path / "far.csv").exists()
 
 
+@pytest.mark.reports
 def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     no_pictures(monkeypatch)

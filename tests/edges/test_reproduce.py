@@ -75,6 +75,7 @@ def test_a_misprint_is_excused_only_if_the_correction_is_reached():
     assert compare("Table IV, row 2", "y", "2223.51", 2223.5602, "N/m").verdict is PrintVerdict.DIFFERS
 
 
+@pytest.mark.reports
 def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_path, capsys):
     folder = tmp_path / "reproduce"
     assert main(["reproduce", "-o", str(folder)]) == DONE
@@ -96,6 +97,7 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
     assert json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))["explained"] is True
 
 
+@pytest.mark.reports
 def test_a_wrong_model_is_found_out(monkeypatch, tmp_path, capsys):
     wrong = (printed.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed.TABLE_4[0].values), *printed.TABLE_4[1:])
     monkeypatch.setattr(printed, "TABLE_4", wrong)

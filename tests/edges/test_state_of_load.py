@@ -58,6 +58,7 @@ def test_without_a_quantity_a_loaded_machine_shows_how_far_it_moves(capsys, comm
     assert answer(capsys, *words, *LOADED, *chosen)[1]["variables"] == answer(capsys, *words, *chosen)[1]["variables"]
 
 
+@pytest.mark.numbers
 def test_the_workspace_of_a_loaded_machine_is_where_it_comes_to_rest(capsys, tmp_path):
     """Beside x = 0, all upright cables pull back to it, so that no tensions hold the machine there."""
     path = tmp_path / "cables.toml"

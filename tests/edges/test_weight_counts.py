@@ -52,6 +52,7 @@ def test_an_actuator_that_the_weight_overloads_is_refused(capsys, state):
 
 
 @pytest.mark.parametrize("state", STATES)
+@pytest.mark.numbers
 def test_no_pose_of_a_path_or_a_workspace_bears_it(capsys, tmp_path, state):
     poses = tmp_path / "poses.csv"
     poses.write_text("x,y,z\n0 mm,0 mm,-450 mm\n1 mm,0 mm,-450 mm\n")
@@ -120,6 +121,7 @@ def test_loads_at_rest_are_the_same_in_all_arithmetics(name):
 
 
 @pytest.mark.parametrize("state", STATES)
+@pytest.mark.numbers
 def test_the_slope_of_the_greatest_load_is_that_of_differences(state):
     machine = load("hexapod", [f"load.state={state}", "tool.mass=20 kg", "load.gravity=[0, 0, -9.81]", "pose.x=3 mm"])
     slopes = {row.path: row.derivatives[0] for row in sensitivity(machine, ["actuator_force"]).parameters}

@@ -188,6 +188,7 @@ def test_the_units_of_length_and_of_force(case, metre, newton, data):
 
 @every_machine
 @pytest.mark.parametrize("end", [0.0, math.inf], ids=["free", "rigid"])
+@pytest.mark.numbers
 def test_what_is_rigid_or_free_does_not_depend_on_units(case, end):
     """At the reference design, spring by spring: no threshold compares metres with radians (DESIGN section 1)."""
     for path in stiffness_paths(case.machine):

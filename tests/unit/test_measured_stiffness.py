@@ -121,6 +121,7 @@ def test_deflections_at_poses_are_those_of_the_compliance_there(tmp_path):
     assert answer.rows[1].entry.line == 3
 
 
+@pytest.mark.numbers
 def test_differences_over_their_uncertainty_are_as_large_as_they_should_be(tmp_path):
     """Machines with springs drawn by their tolerance, measured with noise: chi-square of 5 entries is 5 on average."""
     machine, rng = load_without_limits("hexapod", [SOFT]), np.random.default_rng(3)

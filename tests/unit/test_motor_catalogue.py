@@ -177,6 +177,7 @@ def test_a_file_requires_that_a_motor_fits_its_motion(motion, tmp_path, capsys):
         load(paths[0])
 
 
+@pytest.mark.reports
 def test_every_command_about_drives_judges_it_and_takes_its_motion(motion, tmp_path, capsys):
     for name, code in (("yaskawa-sgmp-03b", DONE), ("yaskawa-sgm7d-02k", NO_ANSWER)):
         path = required(tmp_path, f'fits = "{name}", motion = "motion.csv"')

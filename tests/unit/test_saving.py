@@ -55,6 +55,7 @@ def test_what_is_not_changed_is_saved_as_it_was_written(name):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tripteron", "zhang-gosselin-4dof", "delta"])
+@pytest.mark.numbers
 def test_one_changed_number_changes_one_place(name):
     """Every parameter in turn; the file reads back as exactly the machine that was saved."""
     machine, tried = load(name), 0

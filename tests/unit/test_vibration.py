@@ -59,6 +59,7 @@ def test_energies_add_up_and_the_receptance_begins_with_the_compliance(name):
 
 @pytest.mark.parametrize("links", [False, True], ids=["platform", "links and rotors"])
 @pytest.mark.parametrize("name", [*bundled()])
+@pytest.mark.numbers
 def test_the_quick_route_and_the_modes_give_the_same_frequencies(name, links):
     """Sums over scalars where there are any, for grids of the others matrices without shapes."""
     machine = heavy(name, links)
@@ -122,6 +123,7 @@ def test_machine_code_finds_modes_of_massive_legs_beside_other_quantities(monkey
         ("tripteron", True),
     ],
 )
+@pytest.mark.numbers
 def test_derivatives_are_those_of_differences(name, links):
     machine = heavy(name, links, **{"tool.centre_of_mass.0": 0.01, "tool.centre_of_mass.2": 0.02})
     pose = {path: value + 0.002 * (1 + k) for k, (path, value) in enumerate(_pose(machine).items())}
@@ -133,6 +135,7 @@ def test_derivatives_are_those_of_differences(name, links):
     _compare_slopes(machine, paths)
 
 
+@pytest.mark.numbers
 def test_derivatives_by_the_bodies_of_links():
     """A machine leg by leg whose links are rigid bodies: by what they weigh and where."""
     machine = with_bodies("tripteron", ["tool.mass=5", "tool.inertia=[0.05, 0.06, 0.07, 0, 0, 0]"])

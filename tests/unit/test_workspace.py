@@ -175,6 +175,7 @@ class TestVerdicts:
         assert abs(other.volume.value - found.volume.value) < ERRORS * 1.5 * found.volume.standard_error
 
 
+@pytest.mark.numbers
 def test_a_grid_has_the_verdicts_that_it_has_within_a_larger_one():
     """The same grid, once alone and once as a part of one of several slabs."""
     settings = (*TestVerdicts.SETTINGS, "limits.leg_diameter=20 mm", "limits.platform_joint_angle=54 deg")
