@@ -12,6 +12,7 @@ The imports stay at the head of the file, and `tests/architecture` reads them as
 
 import sys
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 
@@ -44,6 +45,22 @@ def show_array_libraries(*names: str) -> None:
     for name in names:
         if sys.modules.get(name, sys) is None:
             del sys.modules[name]
+
+
+def postpone_glyph_names() -> None:
+    """Let Matplotlib import its table of all names of glyphs when a text is set by TeX, and not before."""
+    name = "fontTools.agl"
+    if name in sys.modules:
+        return
+    stand_in = ModuleType(name)
+
+    def load(attribute: str) -> Any:
+        if sys.modules.get(name) is stand_in:
+            del sys.modules[name]
+        return getattr(import_module(name), attribute)
+
+    vars(stand_in)["__getattr__"] = load
+    vars(import_module("fontTools"))["agl"] = sys.modules[name] = stand_in
 
 
 def leave_out_property_lists() -> None:

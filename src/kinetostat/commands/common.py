@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from kinetostat.late import leave_out_property_lists
+from kinetostat.late import leave_out_property_lists, postpone_glyph_names
 from kinetostat.spec.installation import as_typed
 
 if TYPE_CHECKING:
@@ -167,6 +167,7 @@ def drawings_of(description: "Description", answer: object) -> "dict[str, Drawin
     """Return the figures of an answer, in a process that writes them and ends."""
     if description.figures:
         leave_out_property_lists()
+        postpone_glyph_names()
     return description.drawings(answer)
 
 
