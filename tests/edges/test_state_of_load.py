@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from kinetostat import analyze, build, evaluate, load, save
+from kinetostat import analyze, build, evaluate, guidelines, load, save, sensitivity
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
 from kinetostat.kinematics.status import Status
@@ -88,6 +88,17 @@ def test_what_follows_from_wrenches_has_one_number_whatever_is_asked_beside_it(c
         np.testing.assert_allclose(alone[name], beside[name], rtol=1e-9, err_msg=name)
     known = analyze(machine.with_values(x=0.0))
     assert (known.status, known.singularity_margin < 1e-12) == (Status.SINGULAR, True)
+
+
+def test_a_pose_whose_limits_are_judged_at_rest_has_one_status_where_there_is_none():
+    """Loads of actuators are limited and nobody knows them: maps had said no_rest, and `analyze` and others ok."""
+    machine = build(CABLES + "[limits]\nactuator_force = 1e6\n")
+    beside = machine.with_values(x=0.2)
+    assert evaluate(machine, {"x": [0.2]}, ["stiffness_x"]).status.values.tolist() == [Status.NO_REST]
+    for question in (analyze, sensitivity, guidelines):
+        answer = question(beside)
+        assert answer.status is Status.NO_REST, question.__name__
+        assert "comes to no rest" in answer.message
 
 
 def test_requirements_are_judged_and_decide_the_exit_code(capsys, tmp_path):

@@ -109,8 +109,9 @@ class MachineState(Immutable):
     def response(self) -> Response:
         """The response of the free machine, with the limits of actuators' loads compared in the state that is meant.
 
-        It is `free` itself if nothing limits these loads, if the machine comes to no rest, and if masses or bounds are
-        missing in the file: the answer under load then says so.
+        Where the machine comes to no rest, nothing says what actuators carry, and the status is NO_REST. The response is
+        `free` itself if nothing limits these loads, or if masses or bounds are missing in the file: the answer under
+        load then says so.
         """
         if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.place_status) != Status.OK:
             return self.free
@@ -119,7 +120,7 @@ class MachineState(Immutable):
         except InputError:
             return self.free
         if not stands:
-            return self.free
+            return replace(self.free, status=Status.NO_REST) if int(self.free.status) == Status.OK else self.free
         checks = load_checks(self.machine, self.configuration, self.actuator_loads)
         beyond = int(self.free.status) == Status.OK and not within(checks)
         status = Status.JOINT_LIMIT if beyond else self.free.status

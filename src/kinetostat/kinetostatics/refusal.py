@@ -49,10 +49,10 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
 
 
 def _without_numbers(response: Response, nearby: Sequence[Configuration]) -> str:
-    """Explain why K and C do not exist at a pose, which is singular or undecided."""
+    """Explain why K and C do not exist at a pose, which is singular or undecided, or why nothing is known of its rest."""
     configuration = response.configuration
-    if int(response.status) == Status.UNDECIDED:
-        return Status.UNDECIDED.sentence
+    if int(response.status) in (Status.UNDECIDED, Status.NO_REST):
+        return Status(int(response.status)).sentence
     motion = known_mobility(response, nearby)
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)

@@ -209,8 +209,8 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     refuse_absent(state, names)
     uncounted = uncounted_loads(state, names)
     response = state.response
-    if int(response.status) == Status.JOINT_LIMIT:
-        return Sensitivity(machine, Status.JOINT_LIMIT, state.refusal, loads_left_out=uncounted)
+    if state.status in (Status.JOINT_LIMIT, Status.NO_REST):
+        return Sensitivity(machine, state.status, state.refusal, loads_left_out=uncounted)
     here = values(machine)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
