@@ -251,6 +251,30 @@ def test_states_of_rest_frequencies_and_shares_are_those_of_python(tmp_path, new
 
 
 @needs_chromium
+def test_what_drives_carry_at_rest_is_found_there_in_a_page(tmp_path, new_tab):
+    """In a machine that is meant loaded: such pages had been written and did not open."""
+    limits = ["limits.actuator_force=500 N", "limits.actuator_speed=1 m/s"]
+    machine = load("hexapod", ["load.state=loaded", "load.force=[20, -30, -100]", "tool.mass=2 kg", *limits])
+    names = ["actuator_force", "least_wrench_force", "least_acceleration", "singularity_margin", "least_twist_speed"]
+    rows, table = poses_of(machine, 5, 0.01)
+    page = export(machine, tmp_path / "pkm.html", outputs=names)[0]
+    watched = new_tab()
+    ready(watched, page.as_uri())
+    found = watched.tab.evaluate(
+        """rows => rows.map(row => {
+            const { data, programs } = opened, free = new Float64Array(2), loaded = new Float64Array(9);
+            programs.quantities(row, free, stateOf("quantities", row, data, programs));
+            programs.loaded(row, loaded, stateOf("loaded", row, data, programs));
+            return [...loaded.subarray(6), ...free];
+        })""",
+        rows.tolist(),
+    )
+    for column, name in zip(np.array(found).T, names, strict=True):
+        np.testing.assert_allclose(column, evaluate(machine, table, [name]).values[name], rtol=1e-9, err_msg=name)
+    assert not watched.complaints
+
+
+@needs_chromium
 def test_machines_whose_legs_close_loops_rest_in_a_page(tmp_path, new_tab):
     names = [f"displacement_{component}" for component in ("rx", "ry", "rz", "x", "y", "z")]
     for name in ("delta", "tripteron", "hexapod-rus"):

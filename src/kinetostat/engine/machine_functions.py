@@ -36,7 +36,7 @@ from kinetostat.kinematics.closure import CLOSED_FORMS
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import compliance_shares
-from kinetostat.kinetostatics.quantities import QUANTITIES, MapQuantity
+from kinetostat.kinetostatics.quantities import QUANTITIES, MapQuantity, rest_numbers
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
 from kinetostat.machine.leg import Leg
@@ -224,10 +224,14 @@ class MachineFunctions:
         """Leaf path and kind of each input."""
         return list(zip(self.inputs, self.kinds, strict=True))
 
+    def at_rest(self, name: str) -> bool:
+        """Whether a quantity is found at rest: one of the loaded state, or what drives carry in a machine meant so."""
+        return bool(rest_numbers(self.machine, [name], limited=False))
+
     @property
     def needs_state(self) -> bool:
-        """Whether a quantity is about the machine at rest."""
-        return any(QUANTITIES[name].loaded for name in self.quantities)
+        """Whether a quantity is found at rest."""
+        return any(self.at_rest(name) for name in self.quantities)
 
 
 def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]) -> MachineFunctions:

@@ -109,9 +109,9 @@ class MachineState(Immutable):
     def response(self) -> Response:
         """The response of the free machine, with the limits of actuators' loads compared in the state that is meant.
 
-        Where the machine comes to no rest, nothing says what actuators carry, and the status is NO_REST. The response is
-        `free` itself if nothing limits these loads, or if masses or bounds are missing in the file: the answer under
-        load then says so.
+        Where the machine comes to no rest, nothing says what actuators carry, and the status is NO_REST. The response
+        is `free` itself if nothing limits these loads, or if masses or bounds are missing in the file: the answer
+        under load then says so.
         """
         if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.place_status) != Status.OK:
             return self.free

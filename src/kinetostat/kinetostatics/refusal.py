@@ -49,7 +49,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
 
 
 def _without_numbers(response: Response, nearby: Sequence[Configuration]) -> str:
-    """Explain why K and C do not exist at a pose, which is singular or undecided, or why nothing is known of its rest."""
+    """Explain why K and C do not exist at a pose, which is singular or undecided, or that there is no rest."""
     configuration = response.configuration
     if int(response.status) in (Status.UNDECIDED, Status.NO_REST):
         return Status(int(response.status)).sentence

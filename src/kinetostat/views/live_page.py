@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.engine.form import each_alone, objectives_of, step_of
+from kinetostat.engine.form import each_alone, objectives_of, plan_for, step_of
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
@@ -184,9 +184,11 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         "shares": functions.shares.formula.body,
     }
     counts = functions.mode_counts or ModeCounts()
-    if free := [name for name in functions.quantities if not QUANTITIES[name].loaded]:
+    plan = plan_for(functions.machine, functions.quantities, functions.inputs)
+    if free := [name for name in functions.quantities if not functions.at_rest(name)]:
         modes = ModeCounts(free=counts.free) if counts.free else None
-        formula = objectives_of(kind, form, each_alone(free), closed=closed, limited=False, mode_counts=modes)
+        wanted = each_alone(free)
+        formula = objectives_of(kind, form, wanted, closed=closed, limited=False, plan=plan, mode_counts=modes)
         bodies["quantities"] = formula.body
         if modes:
             bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
@@ -195,11 +197,11 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
         bodies["slopes"] = with_gradients(body, placement.inputs)
     if functions.rests:
-        loaded = [name for name in functions.quantities if QUANTITIES[name].loaded]
+        wanted = each_alone([*DISPLACEMENTS, *filter(functions.at_rest, functions.quantities)])
         bodies["first"] = step_of(kind, form, closed, True).body
         bodies["step"] = step_of(kind, form, closed).body
         modes = replace(counts, free=0) if counts.at_rest else None
-        formula = objectives_of(kind, form, each_alone([*DISPLACEMENTS, *loaded]), closed=closed, mode_counts=modes)
+        formula = objectives_of(kind, form, wanted, closed=closed, plan=plan, mode_counts=modes)
         bodies["loaded"] = formula.body
         if modes:
             bodies["springsAtRest"] = spring_parts_of(kind, form, closed, at_rest=True).body
@@ -247,7 +249,7 @@ def _sliders(functions: MachineFunctions) -> list[dict[str, Any]]:
 def _quantity(functions: MachineFunctions, name: str) -> dict[str, Any]:
     """Return what the page must know of a quantity: whether it needs a state of rest, and whether it takes long."""
     row = QUANTITIES[name]
-    return {"name": name, "si": row.unit, "loaded": bool(row.loaded), "slow": functions.needs_modes(row)}
+    return {"name": name, "si": row.unit, "loaded": functions.at_rest(name), "slow": functions.needs_modes(row)}
 
 
 def _drawing(machine: Machine) -> dict[str, Any]:
