@@ -77,27 +77,30 @@ class RestFill:
         """Evaluate a slab, see `Fill`."""
         given = program_columns(self._machine, self.form, columns, len(status), self._closed)
         if self._states is None:
-            self.solve(given, results, status, np.empty((self.size, len(status))))
+            self.solve(given, results, status)
             return
         given += self._states.rest_coordinates(self.fixed, given, len(status))
         self._step.run(self.fixed, given, results, status)
 
-    def solve(self, given: list[Array], results: Array, status: Codes, states: Array) -> None:
+    def solve(self, given: list[Array], results: Array, status: Codes, states: Array | None = None) -> None:
         """Evaluate a slab of a machine whose legs close loops.
 
         Args:
             given: columns of the programs before those of the states.
             results, status: see `Fill`.
-            states: where the coordinates of the states of rest go [size x points].
+            states: where the coordinates of the states of rest go [size x points], if they are wanted.
         """
         count = len(status)
         together = min(count, NUMBERS_TOGETHER // self._step.rows)
         memory = [np.empty((self._step.rows, together)) for _ in range(2)]
         for start in range(0, count, max(together, 1)):
             part = slice(start, start + together)
-            self._fill([column[part] for column in given], results[:, part], status[part], states[:, part], memory)
+            reached = None if states is None else states[:, part]
+            self._fill([column[part] for column in given], results[:, part], status[part], reached, memory)
 
-    def _fill(self, given: list[Array], results: Array, status: Codes, reached: Array, memory: list[Array]) -> None:
+    def _fill(
+        self, given: list[Array], results: Array, status: Codes, reached: Array | None, memory: list[Array]
+    ) -> None:
         """Evaluate some points, with memory for what two steps give."""
         rows = np.arange(len(status))
         self._first.run(self.fixed, given, memory[0][self._count :, : len(rows)], np.empty_like(status))
@@ -107,9 +110,10 @@ class RestFill:
             stepped, codes = memory[1][:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
             self._step.run(self.fixed, [*given, states[:-1]], stepped, codes)
             if len(rows) == len(status):
-                results[:], status[:], reached[:] = stepped[: self._count], codes, stepped[self._count : -1]
+                results[:], status[:] = stepped[: self._count], codes
             else:
                 results[:, rows], status[rows] = stepped[: self._count], codes
+            if reached is not None:
                 reached[:, rows] = stepped[self._count : -1]
             moving = stepped[-1] > LAST_STEP**2
             if not moving.any():
