@@ -214,7 +214,6 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
     columns = sample_points(functions)
     points = np.array(list(columns.values())).T
     forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
-    steps_to_rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
     return {
         "name": machine.name,
         "inputs": _sliders(functions),
@@ -226,7 +225,9 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "components": machine.family.components,
         "length": functions.length,
         "forward": forward if functions.square else None,
-        "rest": steps_to_rest if functions.rests else None,
+        "rest": {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
+        if functions.rests
+        else None,
         "springs": asdict(functions.mode_counts) | asdict(functions.springs) if functions.mode_counts else None,
         "samples": [_sample(functions, row.tolist()) for row in points],
         "file": as_toml(machine),
