@@ -286,6 +286,9 @@ ROUND_OFF_OF_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue or singular value below which one stands for 0: some dozen units of round-off."""
 ROUND_OFF_OF_COMPLEMENT = 1e-12
 """The same share after the subtraction in a Schur complement, which loses two more digits."""
+ROUND_OFF_OF_FREE = 1e-10
+"""The same share where an infinite C says that some direction is free: what round-off leaves of it is then not taken
+for a stiffness, also where springs of one machine are seven decades apart."""
 EQUAL_STIFFNESSES = 1e-9
 """Relative difference of principal stiffnesses below which they are equal, and their directions are arbitrary."""
 EQUAL_FREQUENCIES = 1e-6

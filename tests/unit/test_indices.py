@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elastic import PLANE, cross, directions, spring_matrix, stiffnesses, turns, wrench_moved
+from kinetostat import analyze, load
 from kinetostat.algebra.symmetric import POSITIONS, Symmetric6
 from kinetostat.kinetostatics.indices import (
     finite,
@@ -17,6 +18,7 @@ from kinetostat.kinetostatics.indices import (
     guided_stiffnesses,
     principal_compliances,
 )
+from kinetostat.machine.parameters import with_values
 
 BLOCKS = (("rotation", slice(0, 3)), ("translation", slice(3, 6)))
 SENSES = (free_stiffnesses, guided_stiffnesses)
@@ -201,3 +203,17 @@ def test_a_matrix_of_another_shape_is_refused():
 
 def test_cross_is_the_vector_product():
     assert np.allclose(cross([1, 2, 3]) @ [4, 5, 6], np.cross([1, 2, 3], [4, 5, 6]))
+
+
+def test_a_free_direction_is_free_where_springs_are_seven_decades_apart():
+    """A ram that twists freely lets the tool beside it go sideways: round-off of stiff springs is no stiffness."""
+    springs = {f"stiffness.actuator.{i}": 10.0 for i in range(3)} | {"stiffness.ram_actuator": 0.0}
+    springs |= {"stiffness.ram.0": 1e8, "stiffness.ram.1": 100.0, "stiffness.ram.2": 0.0}
+    springs |= {"stiffness.leg_axial": 10.0, "stiffness.ram_bending": 1e6, "stiffness.ram_torsion": 10.0}
+    places = {"geometry.base_radius": 0.21875, "geometry.platform_radius": 0.125}
+    places |= {f"geometry.base_angles.{i}": angle for i, angle in enumerate((0.4375, 2.625, 4.75))}
+    places |= {f"geometry.platform_angles.{i}": angle for i, angle in enumerate((0.5, 2.625, 4.75))}
+    pose = {"pose.z": 0.6171875, "pose.theta1": 0.25, "pose.theta2": 0.0, "tool.offset.0": 0.0625}
+    machine = with_values(load("passive-leg-3dof-pu-driven"), springs | places | pose)
+    for softest in analyze(machine).softest.values():
+        assert (softest.stiffness, softest.shares) == (0.0, ())

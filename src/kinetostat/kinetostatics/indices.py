@@ -24,7 +24,12 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.spec.immutable import ImmutableAnswer
-from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
+from kinetostat.tolerances import (
+    AT_RIGHT_ANGLES,
+    ROUND_OFF_OF_COMPLEMENT,
+    ROUND_OFF_OF_EIGENVALUE,
+    ROUND_OFF_OF_FREE,
+)
 
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
 Block: TypeAlias = Literal["rotation", "translation"]
@@ -106,7 +111,8 @@ def free_stiffnesses(
 ) -> dict[str, PrincipalStiffness] | None:
     """Principal stiffnesses against a pure force (moment) while the rotations (translations) follow: 1 / eig(C_bb).
 
-    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob).
+    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob). Where there
+    is no finite C a direction is free: of two stiffnesses ten decades apart, the lesser then counts as none.
 
     Args:
         stiffness, compliance: K and C at P, base axes [n x n]; C is used where it is finite.
@@ -119,7 +125,7 @@ def free_stiffnesses(
         ValueError: if a matrix has another shape.
     """
     soft, stiff = finite(compliance, components), finite(stiffness, components)
-    return _ellipsoids(soft, stiff, components, inverse=soft is not None)
+    return _ellipsoids(soft, stiff, components, inverse=soft is not None, known_free=soft is None)
 
 
 def guided_stiffnesses(
@@ -189,9 +195,12 @@ def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int]
 
 
 def _ellipsoids(
-    direct: Array | None, dual: Array | None, components: Sequence[int], inverse: bool
+    direct: Array | None, dual: Array | None, components: Sequence[int], inverse: bool, known_free: bool = False
 ) -> dict[str, PrincipalStiffness] | None:
-    """From the blocks of `direct`, or else Schur complements of `dual`; `inverse` says that C is what is used."""
+    """From the blocks of `direct`, or else Schur complements of `dual`; `inverse` says that C is what is used.
+
+    Where it is `known_free` that some direction has no stiffness, more round-off is taken for that.
+    """
     matrix = dual if direct is None else direct
     if matrix is None:
         return None
@@ -200,7 +209,8 @@ def _ellipsoids(
         block = matrix[np.ix_(inside, inside)]
         size, share = float(np.linalg.norm(block, 2)), ROUND_OFF_OF_EIGENVALUE
         if direct is None and other:
-            coupling, share = matrix[np.ix_(inside, other)], ROUND_OFF_OF_COMPLEMENT
+            coupling = matrix[np.ix_(inside, other)]
+            share = ROUND_OFF_OF_FREE if known_free else ROUND_OFF_OF_COMPLEMENT
             block = (
                 block
                 - coupling
