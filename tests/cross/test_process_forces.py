@@ -81,7 +81,7 @@ def test_a_force_that_stays_is_that_of_the_file(name, tmp_path):
     by_hand = load(name, [*settings, "load.force.x=25 N", "load.moment.y=2 N*m"])
     first, second = drives(given, read(tmp_path, given, text)), drives(by_hand, read(tmp_path, by_hand, plain))
     pairs = [
-        (getattr(first.curves, n), getattr(second.curves, n)) for n in ("force", "parts", "motor_torque", "energy")
+        (getattr(first.curves, n), getattr(second.curves, n)) for n in ("force", "parts", "motor_torque", "net_energy")
     ]
     pairs += [([j.force for j in first.joints], [j.force for j in second.joints])]
     pairs += [(first.deflection, second.deflection), (first.along_modes.surplus, second.along_modes.surplus)]

@@ -1,11 +1,13 @@
 """Drives along a motion: by hand where a hexapod moves upright, and what holds of every answer."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from kinetostat.display import number
 from kinetostat.engine.moving import Path
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, load
@@ -17,7 +19,8 @@ from kinetostat.studies.motion_deflection import swings_under
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.report import REPORT_PARTS, gather
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.drives import DRIVES, speed_torque_figure
+from kinetostat.views.drive_figures import over_time_figure, speed_torque_figure
+from kinetostat.views.drives import DRIVES
 from kinetostat.views.report.writing import ReportOptions
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"
@@ -48,10 +51,27 @@ def test_six_legs_lift_a_platform_as_by_hand(tmp_path):
 def test_motors_without_losses_get_all_energy_back(tmp_path):
     """And with a screw that loses a fifth either way, they give more at every moment."""
     ideal, real = (answer_of(tmp_path, MOVES, *MASS, *MOTORS[:2], *more) for more in ((), MOTORS[3:]))
-    whole, moved = ideal.curves.energy[:, -1].sum(), np.abs(ideal.curves.energy).max()
+    whole, moved = ideal.curves.net_energy[:, -1].sum(), np.abs(ideal.curves.net_energy).max()
     assert abs(whole) < 1e-4 * moved
     assert (real.curves.power - ideal.curves.power).min() > -1e-12 * np.abs(ideal.curves.power).max()
-    assert real.curves.energy[:, -1].sum() > 0.1 * moved
+    assert real.curves.net_energy[:, -1].sum() > 0.1 * moved
+
+
+def test_net_energy_is_what_motors_give_less_what_they_take_back(tmp_path):
+    """In the file, in the table and in the sentence; from the power, which changes evenly between two points."""
+    answer = answer_of(tmp_path, MOVES, *MASS, *MOTORS)
+    work = 0.5 * (answer.curves.power[:, 1:] + answer.curves.power[:, :-1]) * np.diff(answer.motion.times)
+    given, back = np.maximum(work, 0.0).sum(axis=1), -np.minimum(work, 0.0).sum(axis=1)
+    written = json_of(DRIVES, answer)
+    assert [drive["net_energy"] for drive in written["drives"]] == pytest.approx(given - back, rel=1e-10)
+    assert [drive["braking_energy"] for drive in written["drives"]] == pytest.approx(back, rel=1e-10)
+    assert back.min() > 0.0
+    amounts = (number(part.sum()) for part in (given, back, given - back))
+    sentence = "All motors together give {} J, and take back {} J while they brake: {} J net."
+    assert dict(DRIVES.lines(answer))["Energy"] == sentence.format(*amounts)
+    _, motors, *_ = DRIVES.tables(answer, False)
+    (column,) = (column for column in motors.columns if column.header == "net energy")
+    assert list(column.cells) == [f"{number(amount)} J" for amount in given - back]
 
 
 def test_a_motor_feels_its_drive_through_the_screw(tmp_path):
@@ -228,6 +248,18 @@ def test_the_diagram_of_a_motion_marks_peak_and_mean_squares(tmp_path):
     _, peak, mean, *_ = panel.lines
     assert peak.get_ydata() == pytest.approx([answer.drives[0].motor_torque])
     assert mean.get_ydata() == pytest.approx([answer.drives[0].rms_torque])
+
+
+def test_marks_are_explained_also_where_drives_are_too_many_to_be_named(tmp_path):
+    answer = answer_of(tmp_path, MOVES, *MASS, *MOTORS)
+    doubled = {name: np.concatenate([rows, rows]) for name, rows in vars(answer.curves).items()}
+    many = replace(answer, drives=answer.drives * 2, curves=replace(answer.curves, **doubled))
+    texts = [
+        [text.get_text() for legend in figure.legends for text in (legend.get_title(), *legend.get_texts())]
+        for figure in (speed_torque_figure(answer), speed_torque_figure(many), over_time_figure(many))
+    ]
+    marks = "\N{MULTIPLICATION SIGN} peak\n\N{BLACK CIRCLE} RMS"
+    assert texts == [[marks, *(drive.name for drive in answer.drives)], [marks], []]
 
 
 def test_without_a_motion_both_limits_are_needed():

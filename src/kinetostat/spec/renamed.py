@@ -21,6 +21,8 @@ RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "compliance": "tangent_compliance",
             "leg_distance": "leg_least_singular_value",
             "platform_distance": "platform_least_singular_value",
+            "energy": "net_energy",
+            "energy_over_time": "net_energy_over_time",
         },
         "attribute": {"sections": "tables", "own_sections": "family_tables", "every_section": "every_table"},
     }

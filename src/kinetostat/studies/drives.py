@@ -32,6 +32,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
@@ -58,7 +59,8 @@ class DriveLoad:
         parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
         motor_speed, motor_torque, rms_torque: values at the motor, rad/s and N·m; of a linear motor m/s and N.
         power: greatest power of the motor, W, and the least, which is negative where it brakes.
-        energy: energy that the motor gives in the whole motion, and energy that it takes back while it brakes, J.
+        energy: net energy of the motor in the whole motion, J: what it gives, less what it takes
+            back; and the energy that it takes back while it brakes, J.
         reflected: greatest inertia that the motor accelerates beside its rotor, while the other drives stand still:
             kg·m², or kg of a linear motor; None where drives cannot move one by one.
         inertia_ratio: ratio of that inertia to the rotor's; None without a rotor.
@@ -102,6 +104,7 @@ class JointLoad:
     moment: float | None
 
 
+@former_names(energy="net_energy")
 @dataclass(frozen=True)
 class DriveCurves:
     """Drives at all points of a motion [drives x n], SI.
@@ -109,7 +112,7 @@ class DriveCurves:
     Attributes:
         coordinate, speed, acceleration, force: values at the drive.
         parts: parts of the force [drives x parts x n].
-        motor_speed, motor_torque, power, energy: values at the motor; the energy counts from the beginning, J.
+        motor_speed, motor_torque, power, net_energy: values at the motor; the energy counts from the beginning, J.
     """
 
     coordinate: Array
@@ -120,7 +123,7 @@ class DriveCurves:
     motor_speed: Array
     motor_torque: Array
     power: Array
-    energy: Array
+    net_energy: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,7 +393,7 @@ def _summary(k: int, motors: _Motors, motion: Motion, forces: PathForces, curves
         motor_torque=_size(curves.motor_torque[k]),
         rms_torque=float(root_mean_square(motion.times, curves.motor_torque[k])),
         power=(float(power.max()), float(min(power.min(), 0.0))),
-        energy=(np.nan, np.nan) if motion.timeless else (float(curves.energy[k, -1]), float(-braking.sum())),
+        energy=(np.nan, np.nan) if motion.timeless else (float(curves.net_energy[k, -1]), float(-braking.sum())),
         reflected=reflected,
         inertia_ratio=reflected / rotor if reflected is not None and rotor else None,
     )

@@ -6,37 +6,26 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.closing import POINT
-from kinetostat.machine.machine import Machine, setting_of
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import find_field
 from kinetostat.motion.forces import PARTS
-from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives, root_mean_square
+from kinetostat.studies.drives import DriveLoad, DriveLoads, drives
 from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.units import load_unit, motion_unit
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+from kinetostat.units import motion_unit
 from kinetostat.views.data_forms import columns_csv
-from kinetostat.views.figures import COLOURS, new_figure, note_setting
+from kinetostat.views.drive_figures import PER_MINUTE, over_time_figure, parts_figure, speed_torque_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 
-PER_MINUTE = 30.0 / np.pi
-"""Turns per minute of 1 rad/s."""
 MOST_MODES = 6
 """Excited modes that are named: the lowest ones move the tool most."""
-MOST_LEGEND = 8
-"""Drives that a legend names: a longer one would be taller than the figure."""
-MARKS = "\N{MULTIPLICATION SIGN} peak\n\N{BLACK CIRCLE} RMS"
-"""Meaning of the marks in a speed-torque diagram."""
-
-
-def _curves(answer: DriveLoads) -> DriveCurves:
-    if answer.curves is None:
-        raise ValueError("an answer without curves has none to show")
-    return answer.curves
 
 
 def _lines(answer: DriveLoads) -> Lines:
@@ -53,9 +42,11 @@ def _lines(answer: DriveLoads) -> Lines:
     if names := ", ".join(answer.motion.loads):
         yield "Loads", f"The motion says {names}, in the place of what the file has there."
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
-    taken, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
-    whole = number(max(taken + back, 0.0))
-    yield "Energy", f"All motors together give {whole} J, and take back {number(back)} J while they brake."
+    net, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
+    given = max(net + back, 0.0)
+    net = net if abs(net) > ROUND_OFF_OF_ENTRY * given else 0.0
+    text = f"All motors together give {number(given)} J, and take back {number(back)} J while they brake"
+    yield "Energy", f"{text}: {number(net)} J net."
     if answer.greatest_deflection is not None:
         size, place = answer.greatest_deflection
         shown, moment = answer.machine.display.show_deflection(size, "m"), f"{answer.motion.times[place]:.4g} s"
@@ -90,7 +81,7 @@ def _direction(part: Mapping[str, Array], point: int) -> str:
 
 def _pose(answer: DriveLoads, point: int) -> str:
     show = answer.machine.display.show
-    units = {p: "m" if p in ("x", "y", "z", "length") else "rad" for p in answer.motion.path.pose}
+    units = {name: find_field(answer.machine.family, f"pose.{name}").unit for name in answer.motion.path.pose}
     return ", ".join(
         f"{name} {show(float(rows[point]), units[name])}" for name, rows in answer.motion.path.pose.items()
     )
@@ -124,7 +115,7 @@ def _drive_table(answer: DriveLoads) -> FittedTable:
 
 def _motor_table(answer: DriveLoads) -> FittedTable:
     """Return what each motor must give, and the inertia that it feels."""
-    table = numeric_table("Motors", "motor", ["speed", "torque", "RMS", "power", "energy", "load inertia", "ratio"])
+    table = numeric_table("Motors", "motor", ["speed", "torque", "RMS", "power", "net energy", "load inertia", "ratio"])
     for drive in answer.drives:
         inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
         ratio = DASH if drive.inertia_ratio is None else number(drive.inertia_ratio)
@@ -160,140 +151,16 @@ def _motor_speed(drive: DriveLoad) -> str:
     return f"{number(drive.motor_speed * PER_MINUTE)} 1/min" if drive.rotary else f"{number(drive.motor_speed)} m/s"
 
 
-def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the motion") -> Figure:
-    """Draw speed, force and power of all drives over time."""
-    curves, display = _curves(answer), answer.machine.display
-    rows: list[tuple[Array, str, list[bool]]] = []
-    for turning, kind in ((False, "force"), (True, "torque")):
-        chosen = [drive.slides is not turning for drive in answer.drives]
-        if any(chosen):
-            scale, force = display.scale(motion_unit(turning)), display.scale(load_unit(turning))
-            rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
-            rows.append((curves.force * force.factor, force.label(kind), chosen))
-    rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
-    with new_figure((6.6, 0.9 + 1.7 * len(rows)), title.format(answer.machine.name)) as figure:
-        panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
-        for panel, (values, label, chosen) in zip(panels, rows, strict=True):
-            _lines_over_time(panel, answer, values, chosen)
-            panel.set_ylabel(label)
-        panels[-1].set_xlabel("time (s)")
-        name_drives(figure, answer)
-        note_motion(figure, answer)
-    return figure
-
-
-def note_motion(figure: Figure, answer: DriveLoads, *further: str) -> None:
-    """Write below a figure where its machine is but for what moves, and along which motion it goes."""
-    moving, names = setting_of(answer.machine, answer.motion.path.columns), ", ".join(answer.motion.loads)
-    note_setting(figure, moving, answer.motion.kind + (f", with {names}" if names else ""), *further)
-
-
-def _lines_over_time(panel: Axes, answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
-    panel.axhline(0.0, color="#b0b0b0", linewidth=0.8)
-    for k, drive in enumerate(answer.drives):
-        if chosen[k]:
-            dashed = "--" if k >= len(COLOURS) else "-"
-            panel.plot(
-                answer.motion.times, values[k], dashed, color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=drive.name
-            )
-
-
-def draw_motion(panel: Axes, answer: DriveLoads, rotary: bool) -> None:
-    """Draw the torque of each motor over its speed, its peak as a cross, and its mean squares as a point.
-
-    In all directions at once there is no line through points; what they ask for most is drawn.
-
-    Args:
-        panel: the panel whose axes are labelled as well.
-        answer: along a motion.
-        rotary: whether motors that turn are drawn, in turns per minute, or those that are linear drives themselves.
-    """
-    curves, times = _curves(answer), answer.motion.times
-    scale = answer.machine.display.scale(load_unit(rotary))
-    factor = PER_MINUTE if rotary else 1.0
-    timeless = times[-1] == times[0]
-    width, opacity = (1.2, 1.0) if timeless else (0.7, 0.6)
-    for k, drive in enumerate(answer.drives):
-        if drive.rotary is not rotary:
-            continue
-        colour, torque = COLOURS[k % len(COLOURS)], np.abs(curves.motor_torque[k]) * scale.factor
-        speed, peak = np.abs(curves.motor_speed[k]) * factor, int(np.argmax(torque))
-        line = _most_at_speeds(speed, torque) if timeless else (speed, torque)
-        panel.plot(*line, color=colour, linewidth=width, alpha=opacity)
-        panel.plot(
-            speed[peak], torque[peak], "x", color=colour, markersize=6, markeredgewidth=1.5, zorder=3, clip_on=False
-        )
-        if not timeless:
-            mean, rms = float(root_mean_square(times, speed)), drive.rms_torque * scale.factor
-            panel.plot(mean, rms, "o", color=colour, markersize=6, markeredgecolor="white", zorder=4)
-        panel.plot([], [], color=colour, linewidth=3.0, label=drive.name)
-    panel.set_xlabel("speed (1/min)" if rotary else "speed (m/s)")
-    panel.set_ylabel(scale.label("torque" if rotary else "force"))
-    panel.set_xlim(left=0.0)
-    panel.set_ylim(bottom=0.0)
-
-
-def _most_at_speeds(speed: Array, torque: Array) -> tuple[Array, Array]:
-    """Return the greatest torque at each speed or above it, as a line from the axis of torques to that of speeds."""
-    order = np.argsort(-speed)
-    greatest = np.maximum.accumulate(torque[order])
-    ahead = np.flatnonzero(np.diff(greatest, prepend=-1.0) > 0.0)
-    speeds, torques = speed[order][ahead], greatest[ahead]
-    return np.array([speeds[0], *speeds, 0.0]), np.array([0.0, *torques, torques[-1]])
-
-
-def name_drives(figure: Figure, answer: DriveLoads, meaning: str = "") -> None:
-    """Name the colours of the drives beside a figure, if they are few enough, and say what its marks mean."""
-    pairs = [panel.get_legend_handles_labels() for panel in figure.axes]
-    named = {name: handle for handles, names in pairs for handle, name in zip(handles, names, strict=True)}
-    if len(answer.drives) <= MOST_LEGEND:
-        figure.legend(
-            named.values(), named.keys(), loc="outside right upper", frameon=False, fontsize="small",
-            title=meaning, title_fontsize="small", alignment="left",
-        )  # fmt: skip
-
-
-def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> Figure:
-    """Draw the torque of each motor over its speed, with peaks and mean squares."""
-    shown = [rotary for rotary in (True, False) if any(drive.rotary is rotary for drive in answer.drives)]
-    with new_figure((6.6, 0.9 + 3.4 * len(shown)), title.format(answer.machine.name)) as figure:
-        for panel, rotary in zip(figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True):
-            draw_motion(panel, answer, rotary)
-        name_drives(figure, answer, MARKS if answer.motion.duration else MARKS.partition("\n")[0])
-        note_motion(figure, answer)
-    return figure
-
-
-def parts_figure(answer: DriveLoads, title: str = "{}: parts of the force of {}") -> Figure:
-    """Draw the parts of the force of the drive that does most."""
-    curves, display = _curves(answer), answer.machine.display
-    name = "" if answer.worst is None else answer.worst[1]
-    k = next(i for i, drive in enumerate(answer.drives) if drive.name == name)
-    scale = display.scale(answer.drives[k].unit)
-    with new_figure((6.6, 3.2), title.format(answer.machine.name, name)) as figure:
-        panel = figure.add_subplot()
-        times = answer.motion.times
-        for i, part in enumerate(PARTS):
-            if np.any(curves.parts[k, i]):
-                panel.plot(times, curves.parts[k, i] * scale.factor, color=COLOURS[i], linewidth=1.1, label=part)
-        panel.plot(times, curves.force[k] * scale.factor, color="black", linewidth=1.4, label="whole")
-        panel.set_xlabel("time (s)")
-        panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
-        panel.legend(frameon=False, fontsize="small", ncols=3)
-        note_motion(figure, answer)
-    return figure
-
-
 def _figures(answer: DriveLoads) -> dict[str, Drawing]:
-    if not answer.drives:
+    if answer.worst is None:
         return {}
     if answer.motion.timeless:
         return {"speed_torque": Drawing("Torque and speed in all directions.", partial(speed_torque_figure, answer))}
-    hardest = "" if answer.worst is None else answer.worst[1]
+    _, name = answer.worst
     return {
         "drives": Drawing("Speed, force and power of the drives along the motion.", partial(over_time_figure, answer)),
         "speed_torque": Drawing("Torque and speed that the motors must give.", partial(speed_torque_figure, answer)),
-        "parts": Drawing(f"Parts of the force of {hardest}, which does most.", partial(parts_figure, answer)),
+        "parts": Drawing(f"Parts of the force of {name}, which does most.", partial(parts_figure, answer, name)),
     }
 
 
@@ -301,7 +168,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
     """Write all drives over time as CSV, SI: a row for each point of the motion."""
     if answer.curves is None or answer.motion.timeless:
         return None
-    curves, columns = _curves(answer), {"time [s]": answer.motion.times}
+    curves, columns = answer.curves, {"time [s]": answer.motion.times}
     columns |= answer.motion.path.pose
     columns |= {f"{name} [{load['units']}]": load["values"] for name, load in answer.motion.loads.items()}
     for k, drive in enumerate(answer.drives):
@@ -313,7 +180,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
             ("force", drive.unit, curves.force),
             ("motor torque", drive.motor_unit, curves.motor_torque),
             ("power", "W", curves.power),
-            ("energy", "J", curves.energy),
+            ("net energy", "J", curves.net_energy),
         )
         columns |= {f"{drive.name} {what} [{unit}]": part[k] for what, unit, part in rows_of}
     return columns_csv(columns)
@@ -322,6 +189,13 @@ def curves_csv(answer: DriveLoads) -> str | None:
 def _of_modes(name: str) -> Callable[[DriveLoads], Any]:
     """Return a number of the modes along the motion; None where they are not known."""
     return lambda answer: getattr(answer.along_modes, name, None)
+
+
+def _loads_over_time(answer: DriveLoads) -> Array:
+    """Forces and moments that the motion says [components x n]; without times where there is no answer."""
+    loads = answer.motion.path.loads
+    count = 0 if answer.curves is None else len(answer.motion.times)
+    return np.array([rows[:count] for rows in loads.values()]).reshape(len(loads), count)
 
 
 def _over_time(name: str, unit: str, meaning: str) -> Field:
@@ -347,7 +221,7 @@ DRIVES = Description(
         Field("loads", lambda a: a.motion.loads or None, forms=("json",), optional=True),
         Field(
             "loads_over_time",
-            lambda a: np.stack([a.motion.times, *a.motion.path.loads.values()])[1:, : 0 if a.curves is None else None],
+            _loads_over_time,
             "",
             "forces and moments that the motion says, N or N·m",
             ("load_component", "time"),
@@ -380,8 +254,8 @@ DRIVES = Description(
                 Field("rms_torque", long_name="root of the mean square of that"),
                 Field("power", lambda d: d.power[0], "W", "greatest power of the motor"),
                 Field("braking_power", lambda d: d.power[1], "W", "least power of the motor, where it brakes"),
-                Field("energy", lambda d: d.energy[0], "J", "energy that the motor gives"),
-                Field("braking_energy", lambda d: d.energy[1], "J", "energy that it takes back while it brakes"),
+                Field("net_energy", lambda d: d.energy[0], "J", "what the motor gives, less what it takes back"),
+                Field("braking_energy", lambda d: d.energy[1], "J", "energy that the motor takes back while it brakes"),
                 Field("reflected_inertia", "reflected", "", "of the load at the motor, kg·m², or kg"),
                 Field("inertia_ratio", long_name="of the load to the rotor"),
             ),
@@ -402,7 +276,7 @@ DRIVES = Description(
         _over_time("force", "", "N or N·m"),
         _over_time("motor_torque", "", "N·m, or N of a linear motor"),
         _over_time("power", "W", "power of the motor"),
-        _over_time("energy", "J", "energy that the motor has given"),
+        _over_time("net_energy", "J", "what the motor has given, less what it has taken back"),
         Field(
             "deflection",
             lambda a: np.zeros((0, 6)) if a.deflection is None else a.deflection,
@@ -417,7 +291,7 @@ DRIVES = Description(
     axes=(
         Axis("time", lambda a: np.zeros(0) if a.curves is None else a.motion.times, "s"),
         Axis("load_component", lambda a: np.array(list(a.motion.loads), dtype=str)),
-        Axis("component", lambda _a: np.array(["rx", "ry", "rz", "x", "y", "z"])),
+        Axis("component", lambda _a: np.array(COMPONENTS)),
     ),
     answered=lambda answer: bool(answer.drives),
     kept=lambda answer: all(verdict.met for verdict in answer.requirements),

@@ -14,7 +14,14 @@ from kinetostat.display import DASH, number
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.motors import MotorChoice, MotorFit, motors
 from kinetostat.studies.requirements import motor_requirements
-from kinetostat.views.drives import MARKS, PER_MINUTE, draw_motion, name_drives, note_motion
+from kinetostat.views.drive_figures import (
+    PEAK_MARK,
+    PER_MINUTE,
+    RMS_MARK,
+    draw_torque_over_speed,
+    name_drives,
+    note_motion,
+)
 from kinetostat.views.figures import new_figure
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -69,7 +76,7 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
             _diagram(panel, answer, fit)
         for panel in figure.axes[len(shown) :]:
             panel.set_visible(False)
-        name_drives(figure, shown[0].loads, MARKS)
+        name_drives(figure, shown[0].loads, f"{PEAK_MARK}\n{RMS_MARK}")
         note_motion(figure, shown[0].loads, note)
     return figure
 
@@ -81,7 +88,7 @@ def _diagram(panel: Axes, answer: MotorChoice, fit: MotorFit) -> None:
         limit = fit.motor.limit(peak, speeds) * scale.factor
         panel.fill_between(speeds * PER_MINUTE, limit, color="#0072b2", alpha=opacity, linewidth=0.0)
     if fit.loads.curves is not None:
-        draw_motion(panel, fit.loads, rotary=True)
+        draw_torque_over_speed(panel, fit.loads, rotary=True)
     panel.set_title(f"{fit.name}: {'fits' if fit.fits else 'does not fit'}", loc="left", parse_math=False)
 
 
