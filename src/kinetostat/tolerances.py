@@ -133,7 +133,7 @@ HANGING = 1e-13
 """Share of a cable's length below which a step towards its shape is round-off; as level a cable hangs straight down."""
 SURELY_HANGING = 1e-10
 """The same below which the shape is good after the last step that was allowed, with three digits less."""
-SAME_DIRECTION = 1e-13
+SETTLED_CABLE = 1e-13
 """Change of a cable's direction, or of where it leaves its pulley, m, below which it is round-off."""
 DEGENERATE_FACE = 1e-10
 """Product of unit wrenches below which they are dependent and span no face: their round-off is then its direction."""

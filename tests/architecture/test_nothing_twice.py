@@ -1,10 +1,10 @@
-"""Nothing in the package is dead, and no function is written twice."""
+"""Nothing in the package is dead, no function is written twice, and no constant has two values."""
 
 import ast
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 
-from source import modules
+from source import modules, wrong_in
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 SMALL = 35
@@ -51,15 +51,30 @@ def taken_from_others():
     return imported, read
 
 
+def constants_of(tree):
+    """Names to which a module itself assigns, as often as it does."""
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        targets = [each for target in targets for each in getattr(target, "elts", [target])]
+        yield from (one.id for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
+
+
 def defined_in(tree):
     """Functions, classes, methods and constants of a module; what Python calls by itself apart."""
     for node in ast.walk(tree):
         if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("__"):
             yield node.name
-    for node in tree.body:
-        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        targets = [each for target in targets for each in getattr(target, "elts", [target])]
-        yield from (one.id for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
+    yield from constants_of(tree)
+
+
+def given_twice(module):
+    """Constants to which a module assigns more than once: the last value would hold, also where another is meant."""
+    return [name for name, count in Counter(constants_of(modules()[module])).items() if count > 1]
+
+
+def test_no_constant_has_two_values():
+    assert [*constants_of(ast.parse("A = 1\nB, A = 2, 3\nC: int = 4\nfor D in A: pass"))] == ["A", "B", "A", "C", "D"]
+    assert not wrong_in(given_twice)
 
 
 def test_every_name_is_used():

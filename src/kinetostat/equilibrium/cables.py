@@ -29,7 +29,7 @@ from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.numerics.polytopes import capacity, wrench_closure
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import SAME_DIRECTION
+from kinetostat.tolerances import SETTLED_CABLE
 
 MOST_CHANGES = 60
 """Steps at most that find directions and tensions of hanging cables: each changes little of what the last has."""
@@ -199,7 +199,7 @@ def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> 
     for _ in range(MOST_CHANGES):
         last, hung = hung, _cables_with_tensions_of(hung, cables, up, weight, radius)
         changes = hung.directions - last.directions, hung.near - last.near
-        if max(np.nan_to_num(np.abs(change)).max() for change in changes) < SAME_DIRECTION:
+        if max(np.nan_to_num(np.abs(change)).max() for change in changes) < SETTLED_CABLE:
             break
     return hung
 
