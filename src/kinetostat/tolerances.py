@@ -120,6 +120,11 @@ AT_REST = 1e-10
 are round-off: the next one is the square of it."""
 ROUND_OFF_AT_REST = 1e-13
 """The same for the step that Newton's method foresees: one that would be smaller is not taken."""
+ONE_STEP_AWAY = 1e-7
+"""Size of a step of a program, in the same units, after which another one is exact to round-off: its square is."""
+LAST_STEP = 1e-12
+"""Size of such a step up to which the stiffness is the same before and after it: that of slender machines changes by a
+thousand times as much as their shape."""
 
 NEARLY_AT_REST = 1e-6
 """Step of a descent, in the same units, from which Newton's steps take over: half of the digits, as far as differences

@@ -49,7 +49,7 @@ def both_ways(machine, columns, quantities):
     count = len(next(iter(columns.values())))
     answers = []
     for each in (Way.NATIVE, Way.ANY_MACHINE):
-        results, status = np.empty((len(quantities), count)), np.empty(count, dtype=np.int8)
+        results, status = np.full((len(quantities), count), np.nan), np.full(count, -1, dtype=np.int8)
         loaded_fill(machine, list(columns), quantities, each)(columns, results, status)
         answers.append((results, status))
     return answers
@@ -181,6 +181,14 @@ def test_the_chord_method_leads_so_near_that_a_step_of_newton_is_repeated_at_few
     assert (status == Status.OK).all()
     assert counted[max(counted)] <= 1.5 * 64  # the program with the quantities has the most results; three times before
     assert counted[min(counted)] <= 6 * 64  # the first step and those of the chord method
+
+
+def test_programs_with_more_results_than_are_kept_together_evaluate_point_by_point(monkeypatch):
+    from kinetostat.engine import rest
+
+    monkeypatch.setattr(rest, "NUMBERS_TOGETHER", 1)
+    machine = moved_by_about("planar-3rrr", 1e-3)
+    assert (compare(machine, poses_near(machine, 3), quantities_of(machine)) == Status.OK).all()
 
 
 def test_legs_with_rigid_links_share_what_rigid_parts_hold():

@@ -17,21 +17,32 @@ from kinetostat.engine.trace import Runnable
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.written.family import at_home
 from kinetostat.numerics.iteration import SHRINKING
+from kinetostat.tolerances import LAST_STEP, ONE_STEP_AWAY
 
 MOST_NEWTON_STEPS = 8
-"""Of Newton's method after the first ones; each point takes as many as it needs, whatever its neighbours need."""
+"""Most steps of Newton's method per point after the program of the first step, whatever other points need."""
 MOST_CHORD_STEPS = 6
-"""Of the chord method before these: at a tenth of a step each, as many lead from the longest one to `LAST_STEP`."""
-ONE_STEP_AWAY = 1e-7
-"""Size of a step, rad or in units of the machine's length, after which another one is exact to round-off."""
-LAST_STEP = 1e-12
-"""Size of a step, in the same units, by which what resists at its two ends does not differ: the stiffness of slender
-machines changes by a thousand times as much."""
-
-
+"""Most steps of the chord method per point: each leaves less than a tenth (`SHRINKING`) of the one before it, so that
+six lead from 1e-6 to `LAST_STEP`. Newton's method goes on where that was not enough."""
 NUMBERS_TOGETHER = 2**17
 """Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
 step takes them, and there are enough points for the call of a program to cost nothing beside them."""
+
+
+class StepMemory:
+    """Memory for two steps of some points, which change places after each step: a program cannot write what it reads.
+
+    Attributes:
+        last: results of the last step [rows x points].
+        next: room for those of the next one [rows x points].
+    """
+
+    def __init__(self, rows: int, points: int) -> None:
+        self.last, self.next = np.empty((rows, points)), np.empty((rows, points))
+
+    def swap(self) -> None:
+        """Take what was the next step for the last one."""
+        self.last, self.next = self.next, self.last
 
 
 class RestFill:
@@ -91,67 +102,69 @@ class RestFill:
             states: where the coordinates of the states of rest go [size x points], if they are wanted.
         """
         count = len(status)
-        together = min(count, NUMBERS_TOGETHER // self._step.rows)
-        memory = [np.empty((self._step.rows, together)) for _ in range(2)]
-        for start in range(0, count, max(together, 1)):
+        together = max(1, min(count, NUMBERS_TOGETHER // self._step.rows))
+        memory = StepMemory(self._step.rows, together)
+        for start in range(0, count, together):
             part = slice(start, start + together)
             reached = None if states is None else states[:, part]
             self._fill([column[part] for column in given], results[:, part], status[part], reached, memory)
 
     def _fill(
-        self, given: list[Array], results: Array, status: Codes, reached: Array | None, memory: list[Array]
+        self, given: list[Array], results: Array, status: Codes, reached: Array | None, memory: StepMemory
     ) -> None:
-        """Evaluate some points, with memory for what two steps give."""
-        rows = np.arange(len(status))
-        self._first.run(self.fixed, given, memory[0][self._count :, : len(rows)], np.empty_like(status))
-        self._approach(given, memory, len(rows))
-        states = memory[0][self._count :, : len(rows)]
+        """Evaluate some points; `reached` takes the coordinates of their states, if it is given.
+
+        A step gives the quantities, then the coordinates of the states, and in its last row the squares of its sizes.
+        """
+        count = len(status)
+        self._first.run(self.fixed, given, memory.last[self._count :, :count], np.empty(count, dtype=np.int8))
+        if self._chord is not None:
+            self._approach(self._chord, given, memory, count)
+        states, points = memory.last[self._count :, :count], np.arange(count)
         for _ in range(MOST_NEWTON_STEPS):
-            stepped, codes = memory[1][:, : len(rows)], np.empty(len(rows), dtype=status.dtype)
+            stepped, codes = memory.next[:, : len(points)], np.empty(len(points), dtype=np.int8)
             self._step.run(self.fixed, [*given, states[:-1]], stepped, codes)
-            if len(rows) == len(status):
-                results[:], status[:] = stepped[: self._count], codes
-            else:
-                results[:, rows], status[rows] = stepped[: self._count], codes
+            places = slice(None) if len(points) == count else points  # a slice is copied much faster
+            results[:, places], status[places] = stepped[: self._count], codes
             if reached is not None:
-                reached[:, rows] = stepped[self._count : -1]
+                reached[:, places] = stepped[self._count : -1]
             moving = stepped[-1] > LAST_STEP**2
             if not moving.any():
                 break
-            if moving.all():
-                states = stepped[self._count :]
-            else:
-                rows, given = rows[moving], [part[moving] for part in given]
-                states = np.compress(moving, stepped[self._count :], axis=1)
-            memory.reverse()
+            states = stepped[self._count :]
+            if not moving.all():
+                points, given = points[moving], [column[moving] for column in given]
+                states = states.compress(moving, axis=1)
+            memory.swap()
 
-    def _approach(self, given: list[Array], memory: list[Array], count: int) -> None:
+    def _approach(self, chord: Runnable, given: list[Array], memory: StepMemory, count: int) -> None:
         """Take steps of the chord method towards the states of rest, as long as they shrink fast.
 
         Args:
+            chord: program of a step.
             given: columns of the programs before those of the states.
-            memory: the first part holds the states, and in its last row the squares of the sizes of their last steps.
+            memory: its last step has the states, before and after.
             count: number of points.
         """
-        if self._chord is None:
-            return
-        rows = np.arange(count)
+        points = np.arange(count)
         for _ in range(MOST_CHORD_STEPS):
-            states, after = (part[self._count :, :count] for part in memory)
-            every = len(rows) == count
-            at, here = (states, given) if every else (states.take(rows, axis=1), [part[rows] for part in given])
-            stepped, codes = after[:, : len(rows)], np.empty(len(rows), dtype=np.int8)
-            self._chord.run(self.fixed, [*here, at[:-1]], stepped, codes)
-            before, size = at[-1], stepped[-1]
-            shrinking = size < SHRINKING**2 * before
-            # The next step is shorter by the same ratio.
-            further = rows[shrinking & (size * size > LAST_STEP**2 * before)]
-            if every and not (~shrinking & (before >= 0.0)).any():  # where there is no state, nothing is lost
-                memory.reverse()
+            states = memory.last[self._count :, :count]
+            every = len(points) == count
+            before = states if every else states.take(points, axis=1)
+            columns = given if every else [column[points] for column in given]
+            stepped, codes = memory.next[self._count :, : len(points)], np.empty(len(points), dtype=np.int8)
+            chord.run(self.fixed, [*columns, before[:-1]], stepped, codes)
+            square_before, square = before[-1], stepped[-1]
+            shrinking = square < SHRINKING**2 * square_before
+            # The next step will be shorter by the same ratio: size * (size / size before).
+            going_on = shrinking & (square * square > LAST_STEP**2 * square_before)
+            stalled = ~shrinking & (square_before >= 0.0)  # not where the size is NaN: there is no state to be lost
+            if every and not stalled.any():
+                memory.swap()
             else:
-                states[:, rows[shrinking]] = stepped.compress(shrinking, axis=1)
-            rows = further
-            if not len(rows):
+                states[:, points[shrinking]] = stepped.compress(shrinking, axis=1)
+            points = points[going_on]
+            if not len(points):
                 break
 
 
@@ -162,7 +175,7 @@ class StatePrograms:
         """Trace the first steps.
 
         Args:
-            machine: whose loops can be cut.
+            machine: a machine whose loops can be cut.
             form: how its parameters enter.
             closed: whether joints are closed inside the programs.
             native: whether to compile.
@@ -171,7 +184,7 @@ class StatePrograms:
         self._form, self._closed, self._native = form, closed, native
         self._making = Lock()
         self._first = self._step(first=True)
-        self._size = self._first.rows - 1  # the last result is how long the step is
+        self._size = self._first.rows - 1  # the last result is the square of the size of the step
 
     def _step(self, first: bool) -> Runnable:
         with self._making:  # threads that need a program at the same time wait until it is there
@@ -184,22 +197,23 @@ class StatePrograms:
         Args:
             fixed: values of the parameters that are the same at all points.
             given: columns of the others, and of joints if they are not closed inside the programs.
-            count: of points.
+            count: number of points.
         """
         result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
         self._first.run(fixed, given, result, codes)
         for _ in range(MOST_NEWTON_STEPS):
             moving = result[-1] > ONE_STEP_AWAY**2
-            rows = np.flatnonzero(moving)
-            if not len(rows):
+            points = np.flatnonzero(moving)
+            if not len(points):
                 break
-            step = self._step(first=False)
-            most = 2 * len(rows) > count  # then picking them out would take longer than computing the others as well
-            at = [*given, *result[:-1]] if most else [part[rows] for part in (*given, *result[:-1])]
-            stepped = np.empty((self._size + 1, len(at[0])))
-            step.run(fixed, at, stepped, codes[: len(at[0])])
-            if most:
+            step, columns = self._step(first=False), [*given, *result[:-1]]
+            every = 2 * len(points) > count  # then picking them out would take longer than computing the others as well
+            if not every:
+                columns = [column[points] for column in columns]
+            stepped = np.empty((self._size + 1, len(columns[0])))
+            step.run(fixed, columns, stepped, codes[: len(columns[0])])
+            if every:
                 np.copyto(result, stepped, where=moving)
             else:
-                result[:, rows] = stepped
+                result[:, points] = stepped
         return [*result[:-1]]

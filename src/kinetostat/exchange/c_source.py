@@ -34,7 +34,7 @@ from kinetostat.engine.machine_functions import (
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
-from kinetostat.engine.rest import MOST_NEWTON_STEPS, ONE_STEP_AWAY
+from kinetostat.engine.rest import MOST_NEWTON_STEPS
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.state import state_of
@@ -50,7 +50,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.commanding import actuator_targets
 from kinetostat.studies.storage import write_text
-from kinetostat.tolerances import CLOSED, COMMANDED
+from kinetostat.tolerances import CLOSED, COMMANDED, ONE_STEP_AWAY
 from kinetostat.units import KINDS
 from kinetostat.vibration.springwise import ModeCounts, SpringSizes
 

@@ -34,7 +34,7 @@ from kinetostat.engine.machine_functions import (
 )
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.printed import NOTATION, pack_graph
-from kinetostat.engine.rest import MOST_NEWTON_STEPS, ONE_STEP_AWAY
+from kinetostat.engine.rest import MOST_NEWTON_STEPS
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -44,7 +44,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
-from kinetostat.tolerances import CLOSED
+from kinetostat.tolerances import CLOSED, ONE_STEP_AWAY
 from kinetostat.units import KINDS
 from kinetostat.vibration.springwise import ModeCounts
 from kinetostat.views.page import whole_page
