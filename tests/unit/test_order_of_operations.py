@@ -54,3 +54,11 @@ def test_what_a_formula_knows_leaves_no_code_for_infinity():
     assert (finite(math.inf), ordinary(0.0)) == (math.inf, 0.0)
     assert is_bounded(1.0)
     assert not is_bounded(math.inf)
+
+
+def test_only_a_factor_that_is_zero_by_form_drops_what_may_be_infinite():
+    number = Graph().input()
+    assert (number * 0.0, 0.0 * number, -number * 0.0) == (0.0, 0.0, 0.0)
+    assert isinstance(number - number, Node)
+    assert isinstance(number / number, Node)
+    assert (ordinary(number) - number, number / number) == (0.0, 1.0)

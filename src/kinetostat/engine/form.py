@@ -12,7 +12,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array
-from kinetostat.engine.trace import ORDINARY_SIZE, Body, Graph, Operand, Traced
+from kinetostat.engine.trace import ORDINARY_BOUNDS, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, closing_equations
@@ -88,7 +88,7 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
         if place == len(numbers):
             numbers.append(value if alone else abs(value))
         uses.append((path, place, value < 0.0 and not alone))
-    ordinary = tuple(ORDINARY_SIZE[0] < number < ORDINARY_SIZE[1] for number in numbers)
+    ordinary = tuple(ORDINARY_BOUNDS[0] < number < ORDINARY_BOUNDS[1] for number in numbers)
     turning = tuple(path for path in varying if path in angles)
     return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
 
@@ -150,7 +150,7 @@ class TracedMachine:
 def traced_machine(kind: Specimen, form: Form) -> TracedMachine:
     """Make a machine of this kind with the inputs of a form, in a new graph."""
     graph = Graph()
-    fixed = tuple(graph.input(True, ORDINARY_SIZE if ordinary else None) for ordinary in form.inputs)
+    fixed = tuple(graph.input(True, ORDINARY_BOUNDS if ordinary else None) for ordinary in form.inputs)
     columns = {path: graph.input() for path in form.varying}
     used = {path: -fixed[place] if negative else fixed[place] for path, place, negative in form.uses}
     machine = with_values(kind.machine, {**dict(form.constant), **used, **columns})
