@@ -16,10 +16,10 @@ def roots(values, rows):
 
 
 CRITERIA = {
-    "by the residual": {"closed": 1e-12, "contraction": 1.0},
-    "by the steps": {"settled": 1e-8},
-    "by the step that is foreseen": {"settled": 1e-8, "round_off": 1e-14},
-    "by short steps": {"settled": 1e-8, "longest": 0.5},
+    "by the residual": {"residual_goal": 1e-12, "contraction": 1.0},
+    "by the steps": {"step_goal": 1e-8},
+    "by the step that is foreseen": {"step_goal": 1e-8, "round_off": 1e-14},
+    "by short steps": {"step_goal": 1e-8, "longest_step": 0.5},
 }
 
 
@@ -51,7 +51,7 @@ def test_numbers_that_are_not_finite_diverge():
         np.zeros((2, 1)),
         2,
         most_steps=5,
-        settled=1e-3,
+        step_goal=1e-3,
     )
     assert answer.outcome.tolist() == [Ending.CONVERGED, Ending.DIVERGED]
 
@@ -69,7 +69,9 @@ def valley(values, rows):
 
 
 def test_damped_steps_go_down_a_valley_and_tell_what_has_no_solution():
-    answer = least_squares(valley, np.array([[-1.2, 1.0], [3.0, 0.0]]), most_steps=100, settled=1e-12, closed=1e-9)
+    answer = least_squares(
+        valley, np.array([[-1.2, 1.0], [3.0, 0.0]]), most_steps=100, residual_goal=1e-12, acceptable_residual=1e-9
+    )
     assert answer.value[0] == pytest.approx([1.0, 1.0], abs=1e-9)
     assert answer.outcome.tolist() == [Ending.CONVERGED, Ending.DIVERGED]
     assert answer.residual[1] == pytest.approx(1.0)

@@ -68,7 +68,7 @@ def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapp
             len(whole),
             move=lambda joints, step: joints + step * units,
             most_steps=MOST_CLOSING_STEPS if last else 3,
-            settled=CLOSED_STEP if last else NEARLY_CLOSED_STEP,
+            step_goal=CLOSED_STEP if last else NEARLY_CLOSED_STEP,
         ).value
     return coordinates
 
@@ -152,7 +152,7 @@ def closed_legs(
             values[:, list(row.free_coordinates)] += change * _units(row, length)
         return ClosedLegs(platform, tuple(coordinates), there.settled)
 
-    end = newton(equations, start, count, move=move, most_steps=MOST_CLOSING_STEPS, settled=CLOSED_STEP)
+    end = newton(equations, start, count, move=move, most_steps=MOST_CLOSING_STEPS, step_goal=CLOSED_STEP)
     return replace(end.value, settled=end.converged)
 
 

@@ -353,9 +353,9 @@ def _binary(operation: str, a: Operand, b: Operand) -> Traced:
     return (a if isinstance(a, Node) else b).graph.number(operation, a, b)  # type: ignore[union-attr]
 
 
-# The operands of most operations are two traced numbers without a sign. Each function begins with this case, to which its
-# other tests do not apply: without that, the stiffness of a hexapod takes 1.36 times as long to trace. The condition is
-# written out in each, because a function for it costs 5 %.
+# The operands of most operations are two traced numbers without a sign. Each function begins with this case, to which
+# its other tests do not apply: without that, the stiffness of a hexapod takes 1.36 times as long to trace. A function
+# for the condition would cost 5 %, so that each has it.
 
 
 def _add(a: Any, b: Any) -> Any:

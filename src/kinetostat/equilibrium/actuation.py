@@ -60,7 +60,7 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
         change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), off @ ways)
         return np.where(rest.settled, largest(off), np.nan), lambda going: change[going]
 
-    newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, settled=COMMANDED)
+    newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, step_goal=COMMANDED)
     return CommandedState(
         Equilibria(mechanism, state, settled, settled), logarithm(state.platform), before, ways @ rates
     )

@@ -84,7 +84,9 @@ def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
         there = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
         return gaps_of(there), lambda going: _closing_steps(there)[going]
 
-    end = newton(equations, start, count, move=partial(state_after, mechanism), most_steps=MOST_CLOSINGS, closed=CLOSED)
+    end = newton(
+        equations, start, count, move=partial(state_after, mechanism), most_steps=MOST_CLOSINGS, residual_goal=CLOSED
+    )
     return end.value, end.converged
 
 

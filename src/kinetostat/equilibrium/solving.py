@@ -214,10 +214,10 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
         count,
         move=partial(state_after, mechanism),
         most_steps=most_steps,
-        settled=AT_REST,
+        step_goal=AT_REST,
         round_off=ROUND_OFF_AT_REST,
-        longest=LONGEST_STEP,
+        longest_step=LONGEST_STEP,
         size=partial(motion_of, mechanism),
     )
-    sure = end.converged & (end.steps <= FEW_STEPS) & (end.longest <= LONGEST_STEP)
+    sure = end.converged & (end.steps <= FEW_STEPS) & (end.longest_step <= LONGEST_STEP)
     return Equilibria(mechanism, end.value, end.converged, sure)

@@ -105,7 +105,9 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
         part, target = problems.take(ended), some(goal, ended)
         equations, steps = part.closing_equations(target), MOST_STEPS_AT_GOAL
         # A gap that no longer becomes less has reached round-off, or cannot be closed.
-        end = newton(equations, unknowns[ended], len(ended), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
+        end = newton(
+            equations, unknowns[ended], len(ended), most_steps=steps, residual_goal=NEWTON_SETTLED, contraction=1.0
+        )
         unknowns[ended], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, target)
         solved[ended], crossed[ended] = closed & same, closed & ~same
     return unknowns, solved, crossed

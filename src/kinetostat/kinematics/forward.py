@@ -356,8 +356,10 @@ def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
     return at, sound
 
 
-def _solutions(system: System, starts: Array, goal: Array, settled: float = NEWTON_SETTLED) -> tuple[Array, Array]:
-    """Solve from many starts at once until no more than `settled` is left of any equation.
+def _solutions(
+    system: System, starts: Array, goal: Array, residual_goal: float = NEWTON_SETTLED
+) -> tuple[Array, Array]:
+    """Solve from many starts at once until no more than `residual_goal` is left of any equation.
 
     Returns:
         Unknowns [n x unknowns], and the largest of what is left of the equations [n].
@@ -365,6 +367,6 @@ def _solutions(system: System, starts: Array, goal: Array, settled: float = NEWT
     goals = np.broadcast_to(goal, (len(starts), goal.shape[-1]))
     end = least_squares(
         lambda unknowns, rows: system.residuals(unknowns, goals[rows]), starts, most_steps=MOST_DAMPED_STEPS,
-        settled=settled, closed=CLOSED,
+        residual_goal=residual_goal, acceptable_residual=CLOSED,
     )  # fmt: skip
     return end.value, end.residual

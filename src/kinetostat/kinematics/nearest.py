@@ -161,7 +161,12 @@ class _Search:
             return largest(left[rows]), lambda going: least_norm(rates[rows[going]], left[rows[going]])
 
         end = newton(
-            equations, start + steps, count, most_steps=MOST_CORRECTIONS, closed=enough, contraction=CLOSING_CONTRACTION
+            equations,
+            start + steps,
+            count,
+            most_steps=MOST_CORRECTIONS,
+            residual_goal=enough,
+            contraction=CLOSING_CONTRACTION,
         )
         return _Place(np.where(end.converged[:, None], end.value, np.nan), left, rates)
 

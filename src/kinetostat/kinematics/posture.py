@@ -126,7 +126,7 @@ def _curvature(problems: Problems, unknowns: Array, goal: Coordinates, motions: 
 def _closing_step(problems: Problems, start: Array, goal: Coordinates) -> tuple[Array, Mask]:
     """Close the legs again after a step, by least motions; return unknowns and whether that closes them."""
     equations, steps = problems.closing_equations(goal, _least_motion), MOST_CORRECTIONS
-    end = newton(equations, start, len(start), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
+    end = newton(equations, start, len(start), most_steps=steps, residual_goal=NEWTON_SETTLED, contraction=1.0)
     return end.value, end.residual <= CLOSED
 
 

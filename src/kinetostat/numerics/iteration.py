@@ -21,8 +21,13 @@ from kinetostat.tolerances import LEAST_DIVISOR
 
 SHRINKING = 0.1
 """Ratio of a step to the one before it below which steps shrink fast, as those of Newton's method near a solution."""
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e6
-"""Damping of least squares as shares of the mean square of the rates."""
+FIRST_DAMPING = 1e-3
+"""Damping of the first step of least squares as a share of the mean square of the rates: it is hardly any, so that this
+step is Newton's near a solution."""
+LEAST_DAMPING = 1e-14
+"""Share to which damping may fall: round-off beside the rates, but enough for unknowns that change nothing."""
+MOST_DAMPING = 1e6
+"""Share at which a problem is given up: steps are then a millionth of the gradient, and still lead no nearer."""
 DAMPING_CHANGE = 10.0
 """Factor by which damping becomes less after a step that has led nearer, and more after another one."""
 
@@ -73,14 +78,14 @@ class Solution(Generic[Value]):
         outcome: `Ending` codes [n].
         residual: the largest residual of each problem where it was evaluated last [n].
         steps: number of steps that were taken [n].
-        longest: size of the longest step, before it was shortened [n]; 0 where sizes of steps are not measured.
+        longest_step: size of the longest step, before it was shortened [n]; 0 where sizes of steps are not measured.
     """
 
     value: Value
     outcome: Integers
     residual: Array
     steps: Integers
-    longest: Array
+    longest_step: Array
 
     @property
     def converged(self) -> Mask:
@@ -114,11 +119,11 @@ def newton(
     *,
     most_steps: int,
     move: Callable[[Value, Array], Value] = add,
-    closed: float | Array = 0.0,
+    residual_goal: float | Array = 0.0,
     contraction: float = np.inf,
-    settled: float = 0.0,
+    step_goal: float = 0.0,
     round_off: float | None = None,
-    longest: float = np.inf,
+    longest_step: float = np.inf,
     size: Callable[[Array], Array] = largest,
 ) -> Solution[Value]:
     """Solve n problems by Newton's method.
@@ -133,58 +138,61 @@ def newton(
         count: number of problems, n.
         most_steps: number of steps that are taken at most.
         move: function from unknowns and a step to the unknowns after it.
-        closed: residual at which a problem has converged, one for all or each its own [n].
+        residual_goal: residual at which a problem has converged, one for all or each its own [n].
         contraction: share of the residual before it that a step may leave.
-        settled: size of a step below which a problem has converged.
+        step_goal: size of a step below which a problem has converged.
         round_off: if given, steps that still shrink fast are continued until the next one, which is foreseen from the
             last two as their quadratic convergence has it, would be as small as that.
-        longest: size to which a step is shortened.
+        longest_step: size to which a longer step is shortened.
         size: function that measures steps [n x unknowns]; the largest number if not given.
     """
-    value, trial, rows = start, start, np.arange(count)  # accepted unknowns; those that are tried, of the open problems
-    limits = np.broadcast_to(closed, (count,))
+    # `rows` are the numbers of the problems that are open, and `trial` are their unknowns that are tried next. What
+    # follows from these (`trial_residual`, `step`, `length`) has a row for each open problem, all else for each of n.
+    trial, rows = start, np.arange(count)
+    value, residual, residual_goals = start, np.full(count, np.inf), np.broadcast_to(residual_goal, (count,))
     outcome, steps = np.full(count, int(Ending.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
-    residual, last = np.full((2, count), np.inf)
-    greatest = np.zeros(count)
+    last_length, longest = np.full(count, np.inf), np.zeros(count)
     for number in range(1, most_steps + 1):
-        left, steps_of = equations(trial, rows)
-        solved = left <= limits[rows]
-        nearer = solved | (left < contraction * residual[rows])
+        trial_residual, steps_of = equations(trial, rows)
+        solved = trial_residual <= residual_goals[rows]
+        nearer = solved | (trial_residual < contraction * residual[rows])
         outcome[rows[solved]], outcome[rows[~nearer]] = Ending.CONVERGED, Ending.DIVERGED
-        value, residual[rows[nearer]] = _with_part(value, rows, trial, nearer), left[nearer]
-        going = np.flatnonzero(nearer & ~solved)
-        if not going.size:
-            return Solution(value, outcome, residual, steps, greatest)
-        step, trial, rows = steps_of(going), _at(trial, going, len(rows)), rows[going]
+        value, residual[rows[nearer]] = _with_part(value, rows, trial, nearer), trial_residual[nearer]
+        unsolved = np.flatnonzero(nearer & ~solved)
+        trial, rows = _at(trial, unsolved, len(rows)), rows[unsolved]
+        if not rows.size:
+            break
+        step = steps_of(unsolved)
         length = size(step)
         finite = np.isfinite(length)
-        arrived = length < settled
+        arrived = length < step_goal
         if round_off is not None:
-            arrived = _foreseen_end(length, last[rows], arrived, round_off) & (number > 1)
+            arrived = _foreseen_end(length, last_length[rows], arrived, round_off) & (number > 1)
         outcome[rows[arrived]], outcome[rows[~finite]] = Ending.CONVERGED, Ending.DIVERGED
-        last[rows], steps[rows], greatest[rows] = length, number, np.maximum(greatest[rows], length)
-        if (length > longest).any():
-            step = step * np.minimum(1.0, longest / np.maximum(length, LEAST_DIVISOR))[:, None]
+        last_length[rows], steps[rows], longest[rows] = length, number, np.maximum(longest[rows], length)
+        if (length > longest_step).any():
+            step = step * np.minimum(1.0, longest_step / np.maximum(length, LEAST_DIVISOR))[:, None]
         trial = move(trial, step)
         value = _with_part(value, rows, trial, arrived)
-        going = np.flatnonzero(finite & ~arrived)
-        trial, rows = _at(trial, going, len(rows)), rows[going]
+        still_open = np.flatnonzero(finite & ~arrived)
+        trial, rows = _at(trial, still_open, len(rows)), rows[still_open]
         if not rows.size:
-            return Solution(value, outcome, residual, steps, greatest)
-    return Solution(_with_part(value, rows, trial, rows >= 0), outcome, residual, steps, greatest)
+            break
+    # Problems that are open after the last step keep what it has led to.
+    return Solution(_with_part(value, rows, trial, np.ones(len(rows), dtype=bool)), outcome, residual, steps, longest)
 
 
-def _foreseen_end(length: Array, last: Array, arrived: Mask, round_off: float) -> Mask:
+def _foreseen_end(length: Array, last_length: Array, arrived: Mask, round_off: float) -> Mask:
     """Whether the next step would be round-off, as quadratic convergence foresees it from this one and the last [n].
 
     Where steps do not shrink fast, nothing is foreseen, and `arrived` decides.
     """
-    ratio = length / np.maximum(last, LEAST_DIVISOR)
+    ratio = length / np.maximum(last_length, LEAST_DIVISOR)
     return np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
 
 
 def _at(value: Value, places: Integers, count: int) -> Value:
-    """Some of so many problems, by ascending places; the value itself where that is all of them."""
+    """The values of some of `count` problems, by ascending places; the value itself where that is all of them."""
     if len(places) == count:
         return value
     part: Any = value[places] if isinstance(value, np.ndarray) else value.at(places)
@@ -192,7 +200,7 @@ def _at(value: Value, places: Integers, count: int) -> Value:
 
 
 def _with_part(value: Value, rows: Integers, part: Any, chosen: Mask) -> Value:
-    """Unknowns with those of a part of the problems, by number, where they are chosen in it."""
+    """Put the chosen ones among the unknowns of some problems, whose numbers are `rows`, into their places."""
     places = np.flatnonzero(chosen)
     if not len(places):
         return value
@@ -207,8 +215,8 @@ def least_squares(
     start: Array,
     *,
     most_steps: int,
-    settled: float,
-    closed: float,
+    residual_goal: float,
+    acceptable_residual: float,
 ) -> Solution[Array]:
     """Solve n problems by damped least squares, whose steps are Newton's near a solution and go downhill far from one.
 
@@ -220,40 +228,40 @@ def least_squares(
             equations [k x m] and how the unknowns reduce it [k x m x unknowns].
         start: unknowns to begin with [n x unknowns].
         most_steps: number of steps that are tried at most.
-        settled: residual at which a problem has converged.
-        closed: residual below which it has converged as well if a step leads no nearer: round-off is left.
+        residual_goal: residual at which a problem has converged.
+        acceptable_residual: residual below which it has converged as well if a step leads no nearer: round-off is left.
     """
     value, count = start.copy(), len(start)
-    left, rates = equations(value, np.arange(count))
+    residuals, rates = equations(value, np.arange(count))
     damping, steps = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
-    going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
-    outcome = np.where(going, int(Ending.OUT_OF_STEPS), int(Ending.DIVERGED))
+    is_open = np.asarray(np.isfinite(residuals).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
+    outcome = np.where(is_open, int(Ending.OUT_OF_STEPS), int(Ending.DIVERGED))
     for _ in range(most_steps if value.shape[1] else 0):
-        rows = np.flatnonzero(going)
+        rows = np.flatnonzero(is_open)
         if not rows.size:
             break
-        trial = value[rows] + damped_steps(left[rows], rates[rows], damping[rows])
-        there, rates_there = equations(trial, rows)
-        nearer = (there**2).sum(axis=1) < (left[rows] ** 2).sum(axis=1)
-        nearer &= np.isfinite(rates_there).all(axis=(1, 2))
+        trial = value[rows] + damped_steps(residuals[rows], rates[rows], damping[rows])
+        trial_residuals, trial_rates = equations(trial, rows)
+        nearer = (trial_residuals**2).sum(axis=1) < (residuals[rows] ** 2).sum(axis=1)
+        nearer &= np.isfinite(trial_rates).all(axis=(1, 2))
         taken = rows[nearer]
-        value[taken], left[taken], rates[taken] = trial[nearer], there[nearer], rates_there[nearer]
+        value[taken], residuals[taken], rates[taken] = trial[nearer], trial_residuals[nearer], trial_rates[nearer]
         steps[rows] += 1
         change = np.where(nearer, 1.0 / DAMPING_CHANGE, DAMPING_CHANGE)
         damping[rows] = np.clip(damping[rows] * change, LEAST_DAMPING, MOST_DAMPING)
-        residual = largest(left[rows])
-        solved = (residual <= settled) | (~nearer & (residual < closed))
+        residual = largest(residuals[rows])
+        solved = (residual <= residual_goal) | (~nearer & (residual < acceptable_residual))
         stuck = ~solved & ~(damping[rows] < MOST_DAMPING)
         outcome[rows[solved]], outcome[rows[stuck]] = Ending.CONVERGED, Ending.DIVERGED
-        going[rows] = ~solved & ~stuck
-    return Solution(value, outcome, largest(left), steps, np.zeros(count))
+        is_open[rows] = ~solved & ~stuck
+    return Solution(value, outcome, largest(residuals), steps, np.zeros(count))
 
 
-def damped_steps(left: Array, rates: Array, damping: Array) -> Array:
+def damped_steps(residuals: Array, rates: Array, damping: Array) -> Array:
     """Return steps of damped least squares [n x unknowns].
 
     Args:
-        left: what is left of the equations [n x m].
+        residuals: what is left of the equations [n x m].
         rates: how the unknowns reduce it [n x m x unknowns].
         damping: share of the mean square of the rates that is added to their squares [n].
     """
@@ -261,4 +269,4 @@ def damped_steps(left: Array, rates: Array, damping: Array) -> Array:
     square = back @ rates
     mean = np.trace(square, axis1=1, axis2=2) / square.shape[1] + LEAST_DIVISOR
     square = square + (damping * mean)[:, None, None] * np.eye(square.shape[1])
-    return np.asarray(np.linalg.solve(square, back @ left[:, :, None])[:, :, 0])
+    return np.asarray(np.linalg.solve(square, back @ residuals[:, :, None])[:, :, 0])
