@@ -289,6 +289,10 @@ ROUND_OFF_OF_COMPLIANCE = 1e-20
 which one of them is the square of a rounding error and stands for 0."""
 ROUND_OFF_OF_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue or singular value below which one stands for 0: some dozen units of round-off."""
+ROUND_OFF_OF_BLOCK = 1e-14
+"""Share of the trace of a block of a link's compliance below which a principal compliance is round-off, and rigid."""
+NO_PITCH = 1e-12
+"""Share of what a unit turn moves below which the pitch of its screw is round-off."""
 ROUND_OFF_OF_COMPLEMENT = 1e-12
 """The same share after the subtraction in a Schur complement, which loses two more digits."""
 ROUND_OFF_OF_FREE = 1e-10

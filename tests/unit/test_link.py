@@ -9,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from geometry import displacements, rotations, vectors
+from kinetostat.algebra.scalar import is_infinite
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinetostatics.leg import leg_modes
 from kinetostat.machine.leg import Joint, Leg, Line
@@ -115,6 +116,13 @@ def test_link_axes(start, end, turn):
 
 def test_a_rigid_beam_has_springs_that_do_not_yield():
     assert {spring.stiffness for spring in Beam("beam", ZERO, X_AXIS, Z_AXIS, Rigidity()).springs} == {math.inf}
+
+
+@pytest.mark.parametrize("springs", [lumped_springs, lambda *row: Beam(*row).springs], ids=["lumped", "beam"])
+def test_what_is_rigid_by_form_stays_so_at_lengths_of_many_poses(springs):
+    """An array of infinities would count as a spring that a pose may soften."""
+    along = Vector(np.array([0.5, 0.7]), 0.0, 0.0)
+    assert all(is_infinite(spring.stiffness) for spring in springs("link", ZERO, along, Z_AXIS, Rigidity()))
 
 
 def test_springs_of_a_link_belong_to_it():

@@ -171,7 +171,7 @@ def _leg(leg: Leg, row: LegRow, place: PlacedChain, errors: dict[int, Array]) ->
         moved = element.displaced(motion)
         if isinstance(moved, Parallelogram) and isinstance(element, Parallelogram):
             far = _displacement(_carrying(place, errors, behind + 1)).apply(element.far)
-            moved = replace(moved, far=far, kept=None)
+            moved = replace(moved, far=far, fixed_normal=None)
         if isinstance(moved, Joint) and isinstance(element, Joint) and chain and behind not in errors:
             moved = _same_centre(leg.chain[len(chain) - 1], chain[-1], element, moved)
         chain.append(moved)

@@ -23,6 +23,11 @@ def is_one(a: Scalar) -> bool:
     return type(a) is float and a == 1.0
 
 
+def is_infinite(a: Scalar) -> bool:
+    """Whether `a` is infinite by form, as what is rigid or free may be: the Python float infinity, never an array."""
+    return type(a) is float and a == math.inf
+
+
 def weighted(weight: Scalar, amount: Scalar) -> Scalar:
     """weight * amount, and exactly 0 where the amount is exactly 0, even if the weight is infinite.
 

@@ -8,7 +8,7 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 
 from collections.abc import Sequence
 
-from kinetostat.algebra.scalar import Scalar, larger, reciprocal, total, where
+from kinetostat.algebra.scalar import Scalar, is_infinite, larger, reciprocal, total, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
@@ -179,7 +179,7 @@ def _round_off(
 
 def _in_series(leg: LegScrews) -> bool:
     """Whether the leg has more springs than wrenches, none of them free by form."""
-    free = any(type(s) is float and s == INFINITE for s in leg.compliance)
+    free = any(map(is_infinite, leg.compliance))
     return len(leg.loads) > len(leg.wrenches) and not free
 
 
@@ -193,7 +193,7 @@ def in_modes(modes: Sequence[Modes], rows: Sequence[Sequence[Scalar]]) -> list[t
     amounts: list[tuple[Scalar, ...]] = []
     for leg in modes:
         part = rows[len(amounts) : len(amounts) + len(leg.wrenches)]
-        columns = [leg.amounts(column) if leg.shares else list(column) for column in zip(*part, strict=True)]
+        columns = [leg.mode_amounts(column) if leg.mixing else list(column) for column in zip(*part, strict=True)]
         amounts += zip(*columns, strict=True)
     return amounts + [tuple(row) for row in rows[len(amounts) :]]
 

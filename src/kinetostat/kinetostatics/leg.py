@@ -12,6 +12,7 @@ from kinetostat.algebra.scalar import (
     Scalar,
     finite,
     is_bounded,
+    is_infinite,
     is_one,
     reciprocal,
     smaller,
@@ -29,10 +30,10 @@ from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
 
 AnyScrew = TypeVar("AnyScrew", bound=Screw)
 
-
 INFINITE = float("inf")
-
+"""Compliance of what is free, and stiffness of what is rigid."""
 NOTHING = Wrench(ZERO, ZERO)
+"""The wrench of a spring that never carries a load."""
 
 Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
@@ -43,16 +44,18 @@ def free_springs_as_joints(leg: LegScrews) -> LegScrews:
 
     Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
     """
-    free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if type(s) is float and s == INFINITE]
+    free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if is_infinite(s)]
     if not free:
         return leg
-    felt = _independent_rows(free)
+    independent = _independent_rows(free)
     basis: list[list[Scalar]] = []
     singularity_margin = leg.singularity_margin
-    if len(felt) < len(leg.wrenches):
-        basis, apart = complement([_unit(row) for row in felt]) if felt else ([*_identity(len(leg.wrenches))], 1.0)
-        singularity_margin = smaller(singularity_margin, apart)
-    weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
+    if len(independent) < len(leg.wrenches):
+        basis, margin = _identity(len(leg.wrenches)), 1.0
+        if independent:
+            basis, margin = complement([_unit(row) for row in independent])
+        singularity_margin = smaller(singularity_margin, margin)
+    compliance = [0.0 if is_infinite(s) else s for s in leg.compliance]
     rows = [
         tuple(
             0.0 if _repeats(row, free) else total([c * b for c, b in zip(row, column, strict=True)]) for column in basis
@@ -61,12 +64,12 @@ def free_springs_as_joints(leg: LegScrews) -> LegScrews:
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
     return replace(
-        leg, compliance=tuple(weights), wrenches=wrenches, loads=tuple(rows), singularity_margin=singularity_margin
+        leg, compliance=tuple(compliance), wrenches=wrenches, loads=tuple(rows), singularity_margin=singularity_margin
     )
 
 
 def _independent_rows(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
-    """The rows that do not repeat others, where they are numbers; all others."""
+    """Leave out rows that depend on those before them. Only plain numbers can be judged: traced rows are all kept."""
     kept: list[Sequence[Scalar]] = []
     for row in rows:
         numbers = all(isinstance(c, float) for loads in (row, *kept) for c in loads)
@@ -85,18 +88,21 @@ def _repeats(row: Sequence[Scalar], others: Sequence[Sequence[Scalar]]) -> bool:
 
 
 def _rank(rows: Sequence[Sequence[float]]) -> int:
-    """The number of independent rows of numbers, each scaled to unit size."""
+    """The number of independent rows, each scaled to unit size.
+
+    Gram-Schmidt with the largest row first; what is left of a row is dependent if it is below `DEPENDENT_LOADS`.
+    """
     sizes = [math.hypot(*row) for row in rows]
-    left = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
+    rests = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
     rank = 0
-    while left:
-        axis = max(left, key=lambda row: math.hypot(*row))
+    while rests:
+        axis = max(rests, key=lambda row: math.hypot(*row))
         size = math.hypot(*axis)
         if size <= DEPENDENT_LOADS:
             break
         rank += 1
-        parts = [sum(c * d for c, d in zip(row, axis, strict=True)) / size**2 for row in left]
-        left = [[c - part * d for c, d in zip(row, axis, strict=True)] for row, part in zip(left, parts, strict=True)]
+        parts = [sum(c * d for c, d in zip(row, axis, strict=True)) / size**2 for row in rests]
+        rests = [[c - part * d for c, d in zip(row, axis, strict=True)] for row, part in zip(rests, parts, strict=True)]
     return rank
 
 
@@ -111,13 +117,15 @@ def _identity(size: int) -> list[list[Scalar]]:
 
 @dataclass(frozen=True)
 class Modes:
-    """A leg in wrenches to which it deflects independently: for the platform, springs that feel one wrench each.
+    """The flexibility G of a leg made diagonal: G = L diag(d) L^T.
+
+    Against the wrenches W', with W = W' L^T, the leg is a set of independent springs of compliances d, one for each.
 
     Attributes:
-        wrenches: W' with W = W' L^T.
+        wrenches: W'.
         loads: load in each spring of the leg per unit of each of them.
-        compliance: d with G = L diag(d) L^T.
-        shares: rows of L, unit lower triangular, below the diagonal.
+        compliance: d.
+        mixing: rows of L, unit lower triangular, below the diagonal.
         inverses: 1/d, and 0 where d is 0.
         doubt: 1 where nobody can say whether the leg deflects under one of them at all, else 0.
     """
@@ -125,7 +133,7 @@ class Modes:
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
     compliance: tuple[Scalar, ...]
-    shares: tuple[tuple[Scalar, ...], ...]
+    mixing: tuple[tuple[Scalar, ...], ...]
     inverses: tuple[Scalar, ...] = ()
     doubt: Scalar = 0.0
 
@@ -137,15 +145,15 @@ class Modes:
         ]
         return list(zip(self.wrenches, stiffness, strict=True))
 
-    def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
+    def mode_amounts(self, wrench_amounts: Sequence[Scalar]) -> list[Scalar]:
         """Return the amounts of the modes in a load given by amounts of the leg's wrenches: L^T times these."""
-        size = range(len(amounts))
-        return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
+        size = range(len(wrench_amounts))
+        return [wrench_amounts[k] + total([self.mixing[j][k] * wrench_amounts[j] for j in size if j > k]) for k in size]
 
     def amount_squares(self) -> list[Scalar]:
         """For each mode, the square of its greatest amount in any load that is of unit size in the leg's wrenches."""
         size = range(len(self.wrenches))
-        return [1.0 + total([self.shares[j][k] * self.shares[j][k] for j in size if j > k]) for k in size]
+        return [1.0 + total([self.mixing[j][k] * self.mixing[j][k] for j in size if j > k]) for k in size]
 
 
 def modes_of(leg: LegScrews) -> Modes:
@@ -196,37 +204,47 @@ def leg_resistance(leg: LegScrews) -> Resistance:
 
     Source: theory (10) and (11).
     """
-    if len(leg.loads) != len(leg.wrenches):
+    springwise = len(leg.loads) == len(leg.wrenches)
+    if not springwise:
         leg = free_springs_as_joints(leg)
     if not leg.wrenches:
         return Resistance([(NOTHING, 0.0)] * len(leg.loads), [])
-    stiffness = [reciprocal(s) for s in leg.compliance]
-    if len(leg.loads) == len(leg.wrenches) == 1 and is_one(leg.loads[0][0]):
-        alone = [(leg.wrenches[0], stiffness[0])]
-        return Resistance(alone, alone)
+    if springwise and len(leg.loads) == 1 and is_one(leg.loads[0][0]):
+        action = [(leg.wrenches[0], reciprocal(leg.compliance[0]))]
+        return Resistance(action, action)
     modes = modes_of(leg)
-    in_modes = [
+    return _by_springs(leg, modes) if springwise else Resistance(_shares_by_modes(leg, modes), modes.actions)
+
+
+def _shares_by_modes(leg: LegScrews, modes: Modes) -> list[Action]:
+    """The share s_e c_e c_e^T of each spring of a leg, whatever springs it has."""
+    return [
         (combine(modes.wrenches, [f * k for f, k in zip(row, modes.inverses, strict=True)]), s)
         for row, s in zip(modes.loads, leg.compliance, strict=True)
     ]
-    if len(leg.loads) != len(leg.wrenches):
-        return Resistance(in_modes, modes.actions)
-    pairs = zip(modes.wrenches, modes.compliance, strict=True)
-    rigid = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
-    # As many springs as wrenches: where their loads are independent, b_e is exact even for rigid and free springs. A
-    # dependent set, or one with a load that is round-off, falls back on the modes, pose by pose, by a choice instead
-    # of a branch.
+
+
+def _by_springs(leg: LegScrews, modes: Modes) -> Resistance:
+    """The resistance of a leg with as many springs as wrenches: a share k_e b_e b_e^T for each.
+
+    Where the loads of the springs are independent, b_e is exact even for rigid and free springs. A dependent set, or
+    one with a load that is round-off, falls back on the modes, pose by pose, by a choice instead of a branch.
+    """
     squares = [total([c * c for c in row]) for row in leg.loads]
     sizes = [reciprocal(sqrt(square)) for square in squares]
     unload, sine = dual_basis([_unit(row) for row in leg.loads])
     for square, possible in zip(squares, leg.load_squares, strict=True):
         sine = where(square > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * possible, sine, 0.0)
-    apart = sine > DEPENDENT_LOADS
-    springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
+    independent = sine > DEPENDENT_LOADS
+    alone = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [
-        (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
+        (_either(independent, b, c), where(independent, reciprocal(compliance), s))
+        for b, compliance, (c, s) in zip(alone, leg.compliance, _shares_by_modes(leg, modes), strict=True)
     ]
-    return Resistance(shares, shares + [(_either(apart, NOTHING, w), where(apart, 0.0, k)) for w, k in rigid])
+    rigid = [(w, where(d > 0.0, 0.0, INFINITE)) for w, d in zip(modes.wrenches, modes.compliance, strict=True)]
+    return Resistance(
+        shares, shares + [(_either(independent, NOTHING, w), where(independent, 0.0, k)) for w, k in rigid]
+    )
 
 
 def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:

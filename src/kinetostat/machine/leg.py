@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
+from kinetostat.algebra.scalar import Scalar, cos, is_infinite, is_zero, reciprocal, sin
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
 from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.frozen import dataclass
@@ -410,7 +410,7 @@ def two_force_leg(
     size = span.norm()
     along = span * reciprocal(size)
     springs = [Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True)]
-    if not (type(axial) is float and axial == RIGID):
+    if not is_infinite(axial):
         springs.append(Spring(PartName(name, "rod"), Joint(along), axial * reciprocal(size)))
     chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),

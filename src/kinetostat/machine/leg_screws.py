@@ -3,7 +3,7 @@
 Wrenches are the space reciprocal to the passive twists: of any twists, or in closed form where these turn about two
 points. Which joints and springs a leg has is in `leg`.
 
-Source: theory (1) and (2). Screws are at one reference point in base axes.
+Source: theory (1) and (2); for margins section 2, "Singularities". Screws are at one reference point in base axes.
 """
 
 from collections.abc import Sequence
@@ -30,10 +30,11 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
-        load_squares: square of the size each load has, wrenches' moments over the characteristic length (N², N²m²).
+        load_squares: the largest square that the load of each spring can have under a wrench of 1 N, moments over the
+            characteristic length (N², N²m²): round-off of the load is judged by it.
         singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
-        wrench_squares: squared size of each wrench, moments over the characteristic length, where wrenches are not of
-            unit size: the margin of a platform counts them as if they were. Empty where it counts them as they are.
+        wrench_squares: squared size of each wrench, moments over the characteristic length, by which the margin of a
+            platform scales it to unit size. Empty where the margin counts the wrenches as they are.
     """
 
     passive: tuple[Twist, ...]
@@ -127,33 +128,42 @@ class TwoCentres:
         """The margin 5 / (|V| |V+|) of the five unit twists V at a point (m), lengths divided by `length`.
 
         A row of V+ is the wrench that does work on one twist alone and has no component of the force along the line.
-        For an axis of the pair it is a force through the ball, across the line, without a moment about the other axis.
-        For an axis of the ball it is the moment dual to the three, with forces by which it does no work on the pair.
+        For an axis a_i of the pair it is a force f_i through the ball, across the line, without a moment about the
+        other axis. For an axis b_i of the ball it is the moment m_i dual to the three, with the forces -(a_1 m_i) f_1
+        and -(a_2 m_i) f_2, by which it does no work on the pair.
+
+        Source: theory section 2, "Singularities", on passive axes that turn about two points.
 
         Returns:
             The margin; 0 where the axes of the ball or the pair lock up, or the line is in the plane of the pair.
         """
-        shrink, along = reciprocal(length), self.along
-        arm, line = (reference - self.ball) * shrink, self.wrench(reference).rotational * shrink
-        size = reciprocal(self.square(reference, length))
-        first, second = self.pair_axes
-        weight = reciprocal(self.distance * shrink * second.dot(along.cross(first)))
-        forces = [(along * second.dot(along) - second) * weight, (first - along * first.dot(along)) * weight]
-        moments = [force.cross(arm) for force in forces]
-        across = [moment - line * (moment.dot(line) * size) for moment in moments]
-        dual_axes, square = _dual(self.ball_axes)
-        turns = [[dual.dot(axis) for dual in dual_axes] for axis in self.pair_axes]
-        # V+ is a part of the pair and one of the ball: its square is theirs, and twice their product.
+        shrink = reciprocal(length)
+        arm, line_moment = (reference - self.ball) * shrink, self.wrench(reference).rotational * shrink
+        inverse_line_square = reciprocal(self.square(reference, length))
+        f = self._pair_forces(shrink)
+        moments = [force.cross(arm) for force in f]
+        # The moments less their share in the force along the line.
+        rests = [moment - line_moment * (moment.dot(line_moment) * inverse_line_square) for moment in moments]
+        m, dual_square = _dual(self.ball_axes)
+        along_pair = [[dual.dot(axis) for dual in m] for axis in self.pair_axes]
+        # |V+|^2 is a sum over rows: f_i of the pair, and m_i - (a_1 m_i) f_1 - (a_2 m_i) f_2 of the ball. The products
+        # f_i f_j of all rows together are weighted by 1 (of i = j, the rows of the pair) + (a_i m)(a_j m).
         first_pair, mixed_pair, second_pair = (
-            (moments[i].dot(across[j]) + forces[i].dot(forces[j])) * (float(i == j) + _inner(turns[i], turns[j]))
+            (moments[i].dot(rests[j]) + f[i].dot(f[j])) * (float(i == j) + _inner(along_pair[i], along_pair[j]))
             for i, j in ((0, 0), (0, 1), (1, 1))
         )
-        mixed = [_inner(row, [dual.dot(part) for dual in dual_axes]) for row, part in zip(turns, across, strict=True)]
-        along_line = [dual.dot(line) for dual in dual_axes]
-        of_ball = square - size * _inner(along_line, along_line)
-        inverse = of_ball + first_pair + second_pair + 2.0 * (mixed_pair - total(mixed))
-        margin = float(PAIR + BALL) * reciprocal(sqrt(self._squares(arm, shrink) * inverse))
+        mixed = [_inner(row, [dual.dot(rest) for dual in m]) for row, rest in zip(along_pair, rests, strict=True)]
+        along_line = [dual.dot(line_moment) for dual in m]
+        of_ball = dual_square - inverse_line_square * _inner(along_line, along_line)
+        inverse_square = of_ball + first_pair + second_pair + 2.0 * (mixed_pair - total(mixed))
+        margin = float(PAIR + BALL) * reciprocal(sqrt(self._squares(arm, shrink) * inverse_square))
         return where(margin > 0.0, where(margin < 1.0, margin, 1.0), 0.0)
+
+    def _pair_forces(self, shrink: Scalar) -> list[Vector]:
+        """The forces f_1 and f_2, with distances times `shrink` (1/m)."""
+        e, (first, second) = self.along, self.pair_axes
+        inverse_v = reciprocal(self.distance * shrink * second.dot(e.cross(first)))
+        return [(e * second.dot(e) - second) * inverse_v, (first - e * first.dot(e)) * inverse_v]
 
     def _squares(self, arm: Vector, shrink: Scalar) -> Scalar:
         """The sum of the squares of all components of the five twists; that of a x r is r^2 - (a r)^2."""

@@ -6,13 +6,13 @@ Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Po
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, ordinary, reciprocal, sin, where
+from kinetostat.algebra.scalar import Scalar, cos, is_infinite, is_zero, ordinary, reciprocal, sin, where
 from kinetostat.algebra.vector import (
     AXES,
     IDENTITY,
@@ -28,12 +28,7 @@ from kinetostat.algebra.vector import (
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Joint, Spring
-from kinetostat.tolerances import ROUND_OFF_OF_COMPLEMENT
-
-NEGLIGIBLE = 1e-14
-"""Share of its trace below which a block of a compliance counts as rigid: its entries are round-off."""
-FLAT = 1e-12
-"""Share of its motion below which the pitch of a screw is round-off."""
+from kinetostat.tolerances import NO_PITCH, ROUND_OFF_OF_BLOCK, ROUND_OFF_OF_COMPLEMENT
 
 
 @dataclass(frozen=True)
@@ -102,38 +97,28 @@ class Beam:
     placed: tuple[Rotation, Scalar] | None = None
 
     @property
-    def axes(self) -> tuple[Rotation, Scalar]:
+    def axes_and_length(self) -> tuple[Rotation, Scalar]:
         """The cross-section's axes in the base frame and the length of the link, m."""
         return self.placed or link_axes(self.start, self.end, self.up)
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
-        """None."""
+        """A beam has no freedom."""
         return ()
 
     @property
     def springs(self) -> tuple[Spring, ...]:
         """Six at the middle: torsion GJ/L, bending EI/L, tension EA/L, and shear 1/(L^3/12EI + L/kappa GA)."""
-        axes, length = self.axes
+        axes, length = self.axes_and_length
         middle, shrink, rigidity = (self.start + self.end) * 0.5, reciprocal(length), self.rigidity
-        cubed = length * length * length * (1.0 / 12.0)
-        shear = [
-            0.0
-            if is_zero(bending) or is_zero(sliding)
-            else reciprocal(cubed * reciprocal(bending) + length * reciprocal(sliding))
-            for bending, sliding in ((rigidity.bending_z, rigidity.shear_y), (rigidity.bending_y, rigidity.shear_z))
-        ]
-        turning = zip(("torsion", "bending y", "bending z"), (axes.x, axes.y, axes.z), strict=True)
-        sliding_along = zip(("tension", "shear y", "shear z"), (axes.x, axes.y, axes.z), strict=True)
-        return (
-            *_springs(
-                self.name,
-                [(what, Joint(axis, middle)) for what, axis in turning],
-                [_times(k, shrink) for k in (rigidity.torsion, rigidity.bending_y, rigidity.bending_z)],
-            ),
-            *_springs(
-                self.name, [(what, Joint(a)) for what, a in sliding_along], [_times(rigidity.axial, shrink), *shear]
-            ),
+        return _springs(
+            self.name,
+            ("torsion", Joint(axes.x, middle), _times(rigidity.torsion, shrink)),
+            ("bending y", Joint(axes.y, middle), _times(rigidity.bending_y, shrink)),
+            ("bending z", Joint(axes.z, middle), _times(rigidity.bending_z, shrink)),
+            ("tension", Joint(axes.x), _times(rigidity.axial, shrink)),
+            ("shear y", Joint(axes.y), _shear(rigidity.bending_z, rigidity.shear_y, length)),
+            ("shear z", Joint(axes.z), _shear(rigidity.bending_y, rigidity.shear_z, length)),
         )
 
     @property
@@ -143,7 +128,7 @@ class Beam:
 
     def displaced(self, motion: Displacement) -> "Beam":
         """The link after a rigid displacement of the whole machine."""
-        axes, length = self.axes
+        axes, length = self.axes_and_length
         placed = motion.rotation @ axes, length
         ends = motion.apply(self.start), motion.apply(self.end)
         return Beam(self.name, *ends, motion.rotation.apply(self.up), self.rigidity, placed)
@@ -158,29 +143,33 @@ def lumped_springs(name: str, start: Vector, end: Vector, up: Vector, rigidity: 
     """
     axes, length = link_axes(start, end, up)
     shrink = reciprocal(length)
-    joints = [
-        ("torsion", Joint(axes.x, start)),
-        ("bending y", Joint(axes.y, start)),
-        ("bending z", Joint(axes.z, start)),
-        ("tension", Joint(axes.x)),
-    ]
-    bending = (rigidity.bending_y * (3.0 * shrink), rigidity.bending_z * (3.0 * shrink))
-    return _springs(name, joints, (rigidity.torsion * shrink, *bending, rigidity.axial * shrink))
-
-
-def is_rigid(stiffness: Scalar) -> bool:
-    """Tell whether a stiffness or rigidity is rigid by form: the Python float infinity, not an array."""
-    return type(stiffness) is float and stiffness == RIGID
+    return _springs(
+        name,
+        ("torsion", Joint(axes.x, start), _times(rigidity.torsion, shrink)),
+        ("bending y", Joint(axes.y, start), _times(rigidity.bending_y, 3.0 * shrink)),
+        ("bending z", Joint(axes.z, start), _times(rigidity.bending_z, 3.0 * shrink)),
+        ("tension", Joint(axes.x), _times(rigidity.axial, shrink)),
+    )
 
 
 def _times(stiffness: Scalar, factor: Scalar) -> Scalar:
     """A stiffness times a positive factor; it stays rigid by form if it is."""
-    return stiffness if is_rigid(stiffness) else stiffness * factor
+    return stiffness if is_infinite(stiffness) else stiffness * factor
 
 
-def _springs(name: str, joints: Sequence[tuple[str, Joint]], stiffness: Sequence[Scalar]) -> tuple[Spring, ...]:
-    pairs = zip(joints, stiffness, strict=True)
-    return tuple(Spring(f"{name} {what}", joint, k, part=name) for (what, joint), k in pairs)
+def _shear(bending: Scalar, shear: Scalar, length: Scalar) -> Scalar:
+    """The stiffness of a beam in shear by two of its rigidities; it is free or rigid by form if they make it so."""
+    if is_zero(bending) or is_zero(shear):
+        return 0.0
+    if is_infinite(bending) and is_infinite(shear):
+        return RIGID
+    cubed = length * length * length * (1.0 / 12.0)
+    return reciprocal(cubed * reciprocal(bending) + length * reciprocal(shear))
+
+
+def _springs(name: str, *rows: tuple[str, Joint, Scalar]) -> tuple[Spring, ...]:
+    """The springs of a link: what each resists, its screw and its stiffness."""
+    return tuple(Spring(f"{name} {load}", joint, stiffness, part=name) for load, joint, stiffness in rows)
 
 
 @dataclass(frozen=True)
@@ -193,8 +182,8 @@ class Parallelogram:
         side: unit vector along the short sides.
         width: the width of the short sides, m.
         bar: axial stiffness of each bar, N/m.
-        kept: unit normal of its plane once it has moved. If it were computed from the sides, its sign and the direction
-            of the motion would change where the bars pass the short sides.
+        fixed_normal: unit normal of its plane once it has moved. If it were computed from the sides, its sign and the
+            direction of the motion would change where the bars pass the short sides.
     """
 
     name: str
@@ -203,7 +192,7 @@ class Parallelogram:
     side: Vector
     width: Scalar
     bar: Scalar = RIGID
-    kept: Vector | None = None
+    fixed_normal: Vector | None = None
 
     @property
     def along(self) -> Vector:
@@ -214,8 +203,8 @@ class Parallelogram:
     @property
     def normal(self) -> Vector:
         """Unit normal of its plane."""
-        if self.kept is not None:
-            return self.kept
+        if self.fixed_normal is not None:
+            return self.fixed_normal
         across = self.side.cross(self.along)
         return across * reciprocal(across.norm())
 
@@ -240,8 +229,11 @@ class Parallelogram:
         """Both bars together: along them 2 k, and about the normal k (width sin)^2 / 2."""
         along, normal = self.along, self.normal
         arm = self.width * normal.cross(self.side).dot(along)
-        joints = [("tension", Joint(along)), ("turning", Joint(normal, (self.near + self.far) * 0.5))]
-        return _springs(self.name, joints, (2.0 * self.bar, _times(0.5 * self.bar, arm * arm)))
+        return _springs(
+            self.name,
+            ("tension", Joint(along), _times(self.bar, 2.0)),
+            ("turning", Joint(normal, (self.near + self.far) * 0.5), _times(0.5 * self.bar, arm * arm)),
+        )
 
     @property
     def path(self) -> tuple[Vector, ...]:
@@ -251,9 +243,9 @@ class Parallelogram:
     def displaced(self, motion: Displacement) -> "Parallelogram":
         """The parallelogram after a rigid displacement of the whole machine."""
         turn = motion.rotation.apply
-        kept = None if self.kept is None else turn(self.kept)
+        normal = None if self.fixed_normal is None else turn(self.fixed_normal)
         near, far = motion.apply(self.near), motion.apply(self.far)
-        return replace(self, near=near, far=far, side=turn(self.side), kept=kept)
+        return replace(self, near=near, far=far, side=turn(self.side), fixed_normal=normal)
 
     def moved(self, amount: Scalar) -> tuple["Parallelogram", Displacement]:
         """The parallelogram once its far side has run by `amount` (m of arc), and how that displaces what follows."""
@@ -261,7 +253,7 @@ class Parallelogram:
         normal = self.normal
         turn = rotation_along(normal, cos(angle), sin(angle))
         far = self.near + turn.apply(self.far - self.near)
-        return replace(self, far=far, kept=normal), Displacement(IDENTITY, far - self.far)
+        return replace(self, far=far, fixed_normal=normal), Displacement(IDENTITY, far - self.far)
 
 
 def seat_springs(name: str, axis: Vector, point: Vector, stiffness: Mapping[str, Scalar]) -> tuple[Spring, ...]:
@@ -302,15 +294,15 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     matrix = np.asarray(compliance, dtype=float)
     turning, coupling, moving = matrix[:3, :3], matrix[3:, :3], matrix[3:, 3:]
     springs: list[tuple[Joint, float]] = []
-    turns = _principal(turning, NEGLIGIBLE * float(np.trace(turning)))
+    turns = _principal(turning, ROUND_OFF_OF_BLOCK * float(np.trace(turning)))
     for value, axis in turns:
         moved = coupling @ axis / value
         moving = moving - value * np.outer(moved, moved)
         pitch = float(axis @ moved)
-        pitch = pitch if abs(pitch) > FLAT * np.linalg.norm(moved) else 0.0
+        pitch = pitch if abs(pitch) > NO_PITCH * np.linalg.norm(moved) else 0.0
         foot = point + Vector(*np.cross(axis, moved).tolist())
         springs.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
-    # The root of the contrast of the turns is lost where their share in the motion is subtracted.
+    # Subtracting the turns' share loses as many digits as the root of the ratio of the largest to the smallest turn.
     lost = math.sqrt(turns[0][0] / turns[-1][0]) if turns else 1.0
     for value, axis in _principal(moving, ROUND_OFF_OF_COMPLEMENT * lost * float(np.trace(matrix[3:, 3:]))):
         springs.append((Joint(Vector(*axis.tolist())), 1.0 / value))

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, Line, PartName, Spring, series
-from kinetostat.machine.link import Parallelogram, is_rigid, link_axes
+from kinetostat.machine.link import Parallelogram, link_axes
 from kinetostat.spec.fields import Quantity, table
 
 
@@ -30,17 +30,17 @@ class Translations:
 
 def if_elastic(*springs: Spring) -> tuple[Spring, ...]:
     """Return the springs that are not rigid by form."""
-    return tuple(spring for spring in springs if not is_rigid(spring.stiffness))
+    return tuple(spring for spring in springs if not is_infinite(spring.stiffness))
 
 
 def per_length(rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
     """Return the stiffness of a whole link, factor x rigidity / length (SI); it is rigid by form if the rigidity is."""
-    return rigidity if is_rigid(rigidity) else factor * rigidity * reciprocal(length)
+    return rigidity if is_infinite(rigidity) else factor * rigidity * reciprocal(length)
 
 
 def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
     """Return the stiffness of a joint in series with the link built into it: factor x rigidity / length (SI)."""
-    return stiffness if is_rigid(rigidity) else series(stiffness, per_length(rigidity, length, factor))
+    return stiffness if is_infinite(rigidity) else series(stiffness, per_length(rigidity, length, factor))
 
 
 def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: Sequence[Scalar]) -> list[Scalar]:
@@ -111,7 +111,7 @@ class Arm:
         They are torsion GJ/L, bending EI/L twice and shear 12EI/L^3 twice, and act at the middle of the beam, where
         bending and shear are not coupled.
         """
-        if is_rigid(self.bending) and is_rigid(self.torsion):
+        if is_infinite(self.bending) and is_infinite(self.torsion):
             return ()
         axes, length = link_axes(self.start, self.end, self.up)
         middle = (self.start + self.end) * 0.5

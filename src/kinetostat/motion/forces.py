@@ -7,10 +7,9 @@ Every mass asks for a force, its mass times its acceleration less its weight; vi
 Source: theory (90)-(93). Units are those of `rigid`: forces in N, moments in N times the machine's length.
 """
 
-import math
 from collections.abc import Sequence
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, sqrt, total, where
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.solve import Row, complement, right_inverse
 from kinetostat.algebra.vector import ZERO, Vector
@@ -237,7 +236,7 @@ def _weights(machine: RigidMachine) -> list[Scalar]:
     """Roots of the drives' stiffness, by which more drives than ways share a load; alike where a drive is rigid."""
     springs = [drive.spring for drive in machine.drives]
     stiff = [s.stiffness for s in springs]
-    if not machine.plan.overactuated or any(type(k) is float and math.isinf(k) for k in stiff):
+    if not machine.plan.overactuated or any(map(is_infinite, stiff)):
         return [1.0] * len(springs)
     shrink = 1.0 / machine.length
     return [sqrt(k) if d.slides else sqrt(k) * shrink for k, d in zip(stiff, machine.drives, strict=True)]
