@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.common_tables import STATES, Drives, NamedLoad, ServoGains
 from kinetostat.machine.orientation import ANGLES, orientation_schema
-from kinetostat.machine.written.tables import written_schema
+from kinetostat.machine.written.schema import written_schema
 from kinetostat.spec.errors import PRINTABLE
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.requirements import TABLE, requirements_schema

@@ -1,13 +1,14 @@
-"""Masses that move and loads on the platform: what links, platform and payload weigh, and the wrenches of a file.
+"""Masses and loads of a machine at a pose: what moves, what it weighs, and the wrench on the platform.
 
-Those are the wrench of [load], those of the tables [load.NAME], and the weight of the platform with what it carries. A
-machine whose file has named loads gets a family of its own, whose files have these tables. Weights of links are loads
-on legs and have their place in `equilibrium`.
+Loads on the platform are those of [load], those of each [load.NAME], and the weights of the platform with its tool and
+of the payload. A machine whose file has named loads gets a family of its own, whose files have these tables. Weights of
+links are loads on legs and have their place in `equilibrium`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -106,15 +107,18 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
         given = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
         placed = kind.lengths(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
         for i, (leg, name, length, ends) in enumerate(placed):
-            density, bending, expansion, rise = given if kind.count is None else (entries[i] for entries in given)
-            beside = sum(other == leg for other, *_ in placed) if leg else 1  # pairs of bars lengthen their leg once
-            growth = growth_of(expansion, rise, kind.name) * length * (1.0 / beside)
+            density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in given)
+            # Bars beside each other lengthen their leg as one of them does: each counts as its share of that.
+            parallel = sum(other == leg for other, *_ in placed) if leg else 1
+            growth = growth_of(expansion, rise, kind.name) * length * (1.0 / parallel)
             members.append(Member(leg, name, length, density * length, bending, growth, ends))
     return members
 
 
 MOST_LOADS = 16
-"""Named loads of a machine: more is a mistake."""
+"""Named loads that a machine may have: far more than anybody writes by hand, so that more of them are a mistake."""
+LONGEST_LOAD_NAME = 40
+"""Characters that the name of a load may have: it stands in rows and paths of tables."""
 
 
 def family_with_loads(family: Family, document: Document, origin: str) -> Family:
@@ -126,16 +130,21 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     load = document.get("load")
     entries = load.items() if isinstance(load, dict) else ()
     tables = {key: value for key, value in entries if isinstance(value, dict) and key not in quantities(Load)}
-    names = tuple(key for key, value in tables.items() if not all(entry.isdecimal() for entry in value))
+    names = tuple(key for key, value in tables.items() if not _has_numbers_as_keys(value))
     if len(names) > MOST_LOADS:
         raise InputError(f'"{origin}": [load] has {len(names)} named loads; at most {MOST_LOADS} are allowed.')
     for name in names:
-        if not name.isidentifier() or len(name) > 40:
+        if not name.isidentifier() or len(name) > LONGEST_LOAD_NAME:
             raise InputError(
                 f'"{origin}": [load.{shorten(name)}] cannot be the name of a load; take letters, digits and _, at most '
-                "40 of them, e.g. [load.counterweight]."
+                f"{LONGEST_LOAD_NAME} of them, e.g. [load.counterweight]."
             )
     return _with_loads(family, names) if names else family
+
+
+def _has_numbers_as_keys(table: Mapping[str, Any]) -> bool:
+    """Whether a table replaces entries of a vector, as `--set load.forse.0=1` makes one of a misspelt [load] field."""
+    return all(key.isdecimal() for key in table)
 
 
 @lru_cache(KEPT_FAMILIES)
@@ -228,7 +237,7 @@ def loads_left_out(machine: Machine, configuration: Configuration) -> str:
     return f"Not counted here, but by analyze --loaded: {', '.join(parts)}." if parts else ""
 
 
-def loads_platform(machine: Machine) -> bool:
+def platform_is_loaded(machine: Machine) -> bool:
     """Whether the file of a machine loads its platform: by a wrench that is not zero, or by its weight."""
     tool = machine.tables["tool"]
     wrenches = [machine.load, *(wrench for _, wrench in machine.named_loads)]

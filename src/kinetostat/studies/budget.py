@@ -32,7 +32,7 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -313,7 +313,7 @@ class _Sums:
         length = float(self.state.configuration.length)
         rates = _clean(model.rates(), length)
         inputs = random_inputs(
-            self.parts, rates, model.drawn.load, length, others=self.many and loads_platform(self.machine)
+            self.parts, rates, model.drawn.load, length, others=self.many and platform_is_loaded(self.machine)
         )
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
         names = self.machine.family.component_names

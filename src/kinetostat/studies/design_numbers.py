@@ -19,7 +19,7 @@ from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
-from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, parameters, values
 from kinetostat.spec.errors import InputError
@@ -179,7 +179,7 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
     point = _one_point(machine)
     frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
     wanted = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
-    if loads_platform(machine):
+    if platform_is_loaded(machine):
         wanted["displacement under load"] = DISPLACEMENT
     if machine.tolerances:
         wanted["error as built, 95 %"] = BUILT_ERROR

@@ -19,7 +19,7 @@ from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, Q
 from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
 from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.limits import LIMITS, About, Parts
-from kinetostat.machine.loads import loads_platform, moving_masses
+from kinetostat.machine.loads import moving_masses, platform_is_loaded
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import Parameter, values, with_values
 from kinetostat.spec.errors import InputError, several
@@ -187,7 +187,7 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
             raise InputError(
                 f'"{name}" has no meaning here: {machine.name} lacks {QUANTITIES[name].needs}; leave it out.'
             )
-    loaded = loads_platform(machine) or any(parameter.path.startswith("load.") for parameter in varied)
+    loaded = platform_is_loaded(machine) or any(parameter.path.startswith("load.") for parameter in varied)
     for name in ACTUATOR_LOADS:
         if name in names and not loaded:
             raise InputError(

@@ -6,7 +6,7 @@ from typing import Any
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import Display, number
-from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
@@ -35,7 +35,7 @@ def masses_of(answer: Vibration) -> str:
 
 def loads_of(answer: Vibration) -> str:
     """Say that the loads of the file do not count where the machine vibrates about its free state; empty if they do."""
-    loaded = loads_platform(answer.machine) or answer.state.left_out
+    loaded = platform_is_loaded(answer.machine) or answer.state.left_out
     if answer.loaded or not loaded:
         return ""
     return "These are vibrations about the free state: loads of the file do not count, but in modes --loaded."

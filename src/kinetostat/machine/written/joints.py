@@ -243,6 +243,10 @@ MOTORS = tuple(dict.fromkeys(name for kind in JOINT_TYPES.values() for name in k
 """Words of `actuated` for joints with several freedoms."""
 
 
+LOAD_OF_STIFFNESS = {"linear stiffness": "force", "torsional stiffness": "moment"}
+"""Kind of quantity of the load of a spring, by that of its stiffness."""
+
+
 def stiffness_kind(kind: str, motor: str) -> str:
     """Kind of quantity of the stiffness of a joint's actuator or hinge; `motor` says which freedom it is on, if any."""
     row = JOINT_TYPES[kind]

@@ -25,7 +25,7 @@ LINK_MODELS = {
 """Models of a link, by which it deflects."""
 
 CABLE = "cable"
-"""The only `type` of a leg."""
+"""The only word that `type` of a leg may have; a leg without it is a chain of joints and links."""
 ONE_SIDED = ("pulls", "pushes")
 """Words of `acts`: a cable pulls its ends together, a prop pushes them apart; neither does the other."""
 
@@ -46,13 +46,13 @@ class JointPlan:
         joins: names of the bodies on its base side and on its platform side.
         actuated: whether a servo holds it.
         sprung: whether it has a stiffness, as an actuator or a flexure hinge.
+        compliance: its own compliance, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty
+            if it is stiff.
         series: keys of the parts that this stiffness is made of, in a row; empty if it is one number.
         seat: directions in which its bearings have a stiffness: some of `joints.SEAT`.
         motor: the freedom that is actuated, of a joint with several: a key of its type's `motors`; empty otherwise.
         preloaded: whether the file gives a preload of its spring.
         acts: "pulls" or "pushes" if its spring carries loads of one sign only; empty otherwise.
-        compliance: its own compliance, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty
-            if it is stiff.
         rod: whether it is a strut whose rod stretches (`struts`).
         cross_section: name of the rod's cross-section; empty if its axial rigidity is given, or if there is no rod.
     """
@@ -119,7 +119,7 @@ class LegPlan(Immutable):
         inverse: closed form of its joint coordinates, if it has one.
         copy_of: name of the leg of the file that it is a copy of; empty if it is not a copy.
         copies: what the file says about that leg's copies.
-        placement: the way the copy lies: a `copies.CopyPlacement`, which builds on this file; None if not a copy.
+        placement: the way the copy lies: a `copies.CopyPlacement`, whose file imports this one; None if not a copy.
     """
 
     name: str
@@ -159,7 +159,10 @@ class Plan(Immutable):
     @property
     def legs_of_file(self) -> tuple[LegPlan, ...]:
         """The legs of the file, each once; its first copy stands for a leg that is copied."""
-        return tuple({leg.copy_of or leg.name: leg for leg in reversed(self.legs)}.values())[::-1]
+        first: dict[str, LegPlan] = {}
+        for leg in self.legs:
+            first.setdefault(leg.copy_of or leg.name, leg)
+        return tuple(first.values())
 
     def __hash__(self) -> int:
         # A dictionary of machines asks often, and names tell most plans apart; equality compares all of them.
