@@ -1,6 +1,7 @@
 """Study files: what they may hold, and one sentence for every mistake that names the field and the remedy."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import pytest
@@ -8,8 +9,10 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT
 from kinetostat.spec import document as documents
+from kinetostat.spec.validation import LONGEST_MACHINE_NAME
 from kinetostat.studies.bundled import bundled_studies, study_template
 from kinetostat.studies.optimisation.problem import load_problem
+from kinetostat.studies.optimisation.result import machine_of_design
 from refusals import refused
 from studies import PAPER, SMALL, written
 
@@ -30,6 +33,15 @@ def test_the_schema_refuses_what_is_not_known(capsys):
     document["optimiser"] = {}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(document, schema)
+
+
+@pytest.mark.parametrize("length", [5, 70, LONGEST_MACHINE_NAME])
+def test_the_best_design_of_a_machine_with_a_long_name_is_told_from_the_machine(length):
+    drawn = load_problem(PAPER)
+    drawn = replace(drawn, machine=replace(drawn.machine, name="m" * length))
+    name = machine_of_design(drawn, drawn.space.initial).name
+    assert name.endswith(", optimised")
+    assert len(name) <= LONGEST_MACHINE_NAME
 
 
 def test_new_prints_a_study_to_start_from(capsys, tmp_path):

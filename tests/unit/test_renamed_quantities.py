@@ -2,10 +2,12 @@
 
 import warnings
 
+import numpy as np
 import pytest
 
 from kinetostat import load
 from kinetostat.kinetostatics.response import respond
+from kinetostat.studies.optimisation.result import ComplianceChange, Result
 from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.workspace_verdicts import parse_condition
 
@@ -24,6 +26,13 @@ def test_the_former_attribute_of_a_response_still_works_and_warns():
     response = respond(load("hexapod"))
     with pytest.warns(DeprecationWarning, match="singularity_margin"):
         assert response.regularity == response.singularity_margin
+
+
+def test_the_former_attribute_of_a_search_s_result_still_works_and_warns():
+    change = ComplianceChange("compliance_x", "m/N", 2.0, 1.0)
+    result = Result(None, None, None, np.array([0]), 0, compliance_changes=(change,))
+    with pytest.warns(DeprecationWarning, match="compliance_changes"):
+        assert result.directions == (change,)
 
 
 def test_todays_names_do_not_warn():

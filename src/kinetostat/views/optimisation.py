@@ -134,7 +134,7 @@ def direction_table(result: Result) -> Table:
     display = result.problem.machine.display
     worst = "" if result.problem.poses.count == 1 else ", the worst of all poses"
     table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "change", "unit"])
-    for direction in result.directions:
+    for direction in result.compliance_changes:
         name = direction.name.removeprefix("compliance_")
         cells = (display.number(value, direction.unit) for value in (direction.before, direction.after))
         table.add_row(name, *cells, times_stiffer(direction.gain), display.scale(direction.unit).unit)
@@ -191,7 +191,7 @@ def remarks(result: Result) -> Iterator[str]:
     if bounded and len(result.problem.objectives) == 1:
         names = ", ".join(f"{term.name} ({term.bound})" for term in bounded)
         yield f"At a bound: {names}. Wider bounds would improve the objective, by the percentages above."
-    lost = [term for term in result.directions if term.gain < LEAST_STIFFNESS_LEFT]
+    lost = [term for term in result.compliance_changes if term.gain < LEAST_STIFFNESS_LEFT]
     for term in lost:
         name = term.name.removeprefix("compliance_")
         yield f"The best design gives up {name}: {term.gain:.2g} of its stiffness is left; add a constraint to keep it."
@@ -285,7 +285,7 @@ def _initial(result: Result) -> dict[str, Any]:
 def _directions(result: Result) -> list[dict[str, Any]]:
     return [
         {"name": item.name, "units": item.unit, "initial": item.before, "best": item.after, "gain": item.gain}
-        for item in result.directions
+        for item in result.compliance_changes
     ]
 
 

@@ -76,7 +76,9 @@ def comparison(result: Result, title: str) -> Figure:
 
 
 def _gains(panel: Axes, result: Result) -> None:
-    compared = [direction for direction in result.directions if np.isfinite(direction.gain) and direction.gain > 0.0]
+    compared = [
+        direction for direction in result.compliance_changes if np.isfinite(direction.gain) and direction.gain > 0.0
+    ]
     places, gains = np.arange(len(compared)), np.array([direction.gain for direction in compared])
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
     panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)

@@ -19,6 +19,8 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.validation import LONGEST_MACHINE_NAME
 from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict, Outcome, Robustness, robustness_of
 from kinetostat.studies.optimisation.log import Log, best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
@@ -26,13 +28,14 @@ from kinetostat.studies.optimisation.slopes import Ridge, Surveyor, at_bounds, f
 from kinetostat.studies.quantities import uncounted_loads
 from kinetostat.studies.sensitivity import relative_sensitivity
 
-LONGEST_MACHINE_NAME = 80
+DESIGN_SUFFIX = ", optimised"
+"""End of the name of a machine that is a design of a study."""
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
 
 
 @dataclass(frozen=True)
-class Direction:
-    """The compliance of one direction before and after, the worst over the poses, SI."""
+class ComplianceChange:
+    """The compliance of one component before and after, the worst over the poses, SI."""
 
     name: str
     unit: str
@@ -52,7 +55,7 @@ class VariableInfluence:
     """The effect of one variable on the objectives at the best design.
 
     Attributes:
-        name: of the variable.
+        name: the name of the variable.
         slopes: derivatives of each objective by it, SI; where an objective has a kink, of the part that decides.
         percents: percent by which each objective changes per percent of the variable, of an angle per 0.01 rad; NaN
             where one of them is 0.
@@ -70,16 +73,16 @@ class Result(Immutable):
     """The result of a study.
 
     Attributes:
-        problem: that was solved.
-        log: of all designs.
+        problem: the problem that was solved.
+        log: the log of all designs.
         initial: what the machine is worth as its file says, by the same measure.
         front: numbers of the Pareto-optimal designs, by the first objective; of one objective the best design alone.
         knee: place in `front` of the design that is called the best.
-        directions: before and after.
-        influences: of the continuous variables; empty where there are no derivatives.
+        compliance_changes: the compliances before and after.
+        influences: the effects of the continuous variables; empty where there are no derivatives.
         ridges: ways that leave the objective as it is.
-        no_ridges: why none were looked for.
-        robustness: of the best design; None without tolerances.
+        no_ridges: the reason why none were sought; empty if they were, and where there are several objectives.
+        robustness: the robustness of the best design; None without tolerances.
     """
 
     problem: Problem
@@ -87,11 +90,12 @@ class Result(Immutable):
     initial: Outcome
     front: Integers
     knee: int
-    directions: tuple[Direction, ...] = ()
+    compliance_changes: tuple[ComplianceChange, ...] = ()
     influences: tuple[VariableInfluence, ...] = ()
     ridges: tuple[Ridge, ...] = ()
     no_ridges: str = ""
     robustness: Robustness | None = None
+    directions = renamed_property("compliance_changes")
 
     def __repr__(self) -> str:
         return f"<Result of {self.problem.study.name!r}: {self.log.count:,} designs judged, {len(self.front)} best>"
@@ -108,7 +112,7 @@ class Result(Immutable):
 
     @cached_property
     def genes(self) -> Array:
-        """Of the best design [variables]."""
+        """Genes of the best design [variables]."""
         return np.asarray(self.log.genes([self.best])[0])
 
     @property
@@ -152,7 +156,7 @@ def machine_of_design(problem: Problem, genes: Array) -> Machine:
     """A design [variables] as a machine."""
     columns = problem.space.columns(genes[None])
     machine = with_values(problem.machine, {path: float(value[0]) for path, value in columns.items()})
-    return replace(machine, name=f"{problem.machine.name}, optimised"[:LONGEST_MACHINE_NAME])
+    return replace(machine, name=problem.machine.name[: LONGEST_MACHINE_NAME - len(DESIGN_SUFFIX)] + DESIGN_SUFFIX)
 
 
 def result_of(assess: Assessor, log: Log) -> Result:
@@ -173,48 +177,55 @@ def _as_it_is(problem: Problem) -> Array:
 def _explain(assess: Assessor, result: Result) -> Result:
     """The result with everything that is asked of its best design."""
     problem = assess.problem
-    searched = problem.method in ("gradient", "hybrid")  # then the program is there
-    survey = Surveyor(problem, searched) if problem.differentiable else None
-    ridges: list[Ridge] = []
-    reason = "No ridges are sought, because the objective has no derivatives, or too many poses for them."
-    if survey is not None and len(problem.objectives) == 1:
-        ridges, reason = find_ridges(problem, survey, result.genes)
+    compiled = problem.method in ("gradient", "hybrid")  # these searches have compiled the derivatives already
+    survey = Surveyor(problem, compiled) if problem.differentiable else None
+    ridges, reason = _ridges(problem, survey, result.genes)
     return replace(
         result,
-        directions=tuple(_directions(problem, result.machine)),
+        compliance_changes=tuple(_compliance_changes(problem, result.machine)),
         influences=tuple(_influences(problem, survey, result.genes)) if survey else (),
         ridges=tuple(ridges),
-        no_ridges=reason if len(problem.objectives) == 1 else "",
+        no_ridges=reason,
         robustness=robustness_of(assess, result.genes),
     )
 
 
-def _directions(problem: Problem, machine: Machine) -> list[Direction]:
+def _ridges(problem: Problem, survey: Surveyor | None, genes: Array) -> tuple[list[Ridge], str]:
+    """The ridges through a design, or the reason why none were sought; neither of several objectives."""
+    if len(problem.objectives) > 1:
+        return [], ""
+    if survey is None:
+        return [], "No ridges are sought, because the objective has no derivatives, or too many poses for them."
+    return find_ridges(problem, survey, genes)
+
+
+def _compliance_changes(problem: Problem, machine: Machine) -> list[ComplianceChange]:
     """The greatest compliances over the poses that are reached, of the machine as it was and of another design."""
-    there = problem.machine.family.component_names
-    names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in there]
+    components = problem.machine.family.component_names
+    names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in components]
     numbers = [values(design) for design in (problem.machine, machine)]
     columns = {path: np.array([design[path] for design in numbers], dtype=float) for path in problem.space.paths}
     answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), names)
     reached = answers.status == Status.OK
     worst = {name: answers.values[name].max(axis=1, where=reached, initial=-np.inf) for name in names}
     return [
-        Direction(name, QUANTITIES[name].unit, *np.where(reached.any(axis=1), worst[name], np.nan).tolist())
+        ComplianceChange(name, QUANTITIES[name].unit, *np.where(reached.any(axis=1), worst[name], np.nan).tolist())
         for name in names
     ]
 
 
 def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[VariableInfluence]:
-    here, bounds, design = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
-    if not here.sound:
+    """The effects of the continuous variables at a design; none where its derivatives are not sound."""
+    surveyed, bounds, design = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
+    if not surveyed.sound:
         return []
-    terms = [here.term(objective.term, objective.sign > 0) for objective in problem.objectives]
+    terms = [surveyed.term(objective.term, objective.sign > 0) for objective in problem.objectives]
+    levels = np.array([level for level, _ in terms])
     influences = []
-    for place, k in enumerate(survey.free):
-        variable = problem.space.searched_variables[k]
+    for place, number in enumerate(survey.free):
+        variable = problem.space.searched_variables[number]
         slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in terms)
-        size = 1.0 if variable.quantity.kind == "angle" else float(design[k])
-        levels = [value for value, _ in terms]
-        percents = tuple(relative_sensitivity(np.array(slopes), size, np.array(levels)).tolist())
-        influences.append(VariableInfluence(variable.name, slopes, percents, bounds[k]))
+        scale = 1.0 if variable.quantity.kind == "angle" else float(design[number])
+        percents = tuple(relative_sensitivity(np.array(slopes), scale, levels).tolist())
+        influences.append(VariableInfluence(variable.name, slopes, percents, bounds[number]))
     return influences
