@@ -111,8 +111,8 @@ def free_stiffnesses(
 ) -> dict[str, PrincipalStiffness] | None:
     """Principal stiffnesses against a pure force (moment) while the rotations (translations) follow: 1 / eig(C_bb).
 
-    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob). Where there
-    is no finite C a direction is free: of two stiffnesses ten decades apart, the lesser then counts as none.
+    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob). Where C is
+    not finite, a direction is free: of two stiffnesses ten decades apart, the lesser then counts as none.
 
     Args:
         stiffness, compliance: K and C at P, base axes [n x n]; C is used where it is finite.
