@@ -145,6 +145,8 @@ DEGENERATE_FACE = 1e-10
 SURELY_REGULAR = 1e-6
 """Share of the largest pivot of conditions above which all of them are surely independent, and reflections without
 exchanges keep ten digits; singular values decide below it."""
+ACCURACY_OF_SHARE = 1e-3
+"""Relative accuracy of the share of the loads under which a machine gives way: people are shown three digits."""
 STIFFEST_LEG = 1e6
 """Stiffness of a leg, in units of the typical one of the machine's springs, and beside the softest direction of all
 legs together, beyond which it counts as rigid where legs are eliminated: the sum of all legs keeps ten digits."""

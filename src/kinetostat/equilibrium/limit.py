@@ -15,15 +15,17 @@ from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import FEW_STEPS, are_near, at_rest, states_near, with_share
 from kinetostat.equilibrium.tangent import Stability, stabilities, stability
 from kinetostat.frozen import dataclass
+from kinetostat.tolerances import ACCURACY_OF_SHARE
 
-STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
-"""Steps that are tried together: the rest of the loads, and steps each smaller by this ratio than the one before; few
-steps where the machine may stand under all of its loads."""
+STEP_RATIO = 2.0
+"""Ratio of two steps that are tried together, one after the other in size: the largest leads to all of the loads."""
+CANDIDATES = 14
+"""Number of steps that are tried together: the smallest is 2^-13 of the largest, below `ACCURACY_OF_SHARE`."""
+FEW_CANDIDATES = 4
+"""The same at first, because nearly every machine stands under all of its loads, which a few steps show."""
 MOST_LOAD_STEPS = 14
 """Greatest number of steps: a machine that moves very far before it gives way is not followed to its end, which would
 take seconds."""
-ACCURACY_OF_SHARE = 1e-3
-"""Relative accuracy of the load factor."""
 
 
 @dataclass(frozen=True)
@@ -34,33 +36,36 @@ class LoadLimit:
         share: share of the loads under which it is at rest.
         balance: the equations of that state.
         stability: its stability, with the motion by which it gives way.
-        least: whether the machine was not followed to its end, so that it stands under this share or a greater one.
+        is_lower_bound: whether the search has ended early, so that the machine may stand under a greater share.
     """
 
     share: float
     balance: Balance
     stability: Stability
-    least: bool = False
+    is_lower_bound: bool = False
 
     @property
     def is_passed(self) -> bool:
         """Whether a machine that is stable under all of its loads has snapped over on the way to them."""
-        return self.share < 1.0 and not self.least
+        return self.share < 1.0 and not self.is_lower_bound
 
 
 def snap_flags(balance: Balance) -> Array:
-    """Tell which states of rest are reached only by snapping over while the loads grow: 1, or 0 [n].
+    """Return 1 for each state of rest that is reached only by snapping over while the loads grow, else 0.
 
     Each mechanism is followed by itself, which takes some hundredths of a second where it snaps over.
 
     Args:
-        balance: the equations of states of rest under all loads.
+        balance: the equations of states of rest under all loads, at n poses.
+
+    Returns:
+        Floats, as quantities are [n].
     """
-    limits = (limit_of(balance.mechanism.at(np.array([row]))) for row in range(len(balance.left)))
+    limits = (load_limit(balance.mechanism.at(np.array([row]))) for row in range(len(balance.left)))
     return np.array([float(limit is not None and limit.is_passed) for limit in limits])
 
 
-def limit_of(mechanism: Mechanism) -> LoadLimit | None:
+def load_limit(mechanism: Mechanism) -> LoadLimit | None:
     """Follow a mechanism at one pose under growing loads.
 
     Args:
@@ -88,9 +93,7 @@ def limit_of(mechanism: Mechanism) -> LoadLimit | None:
 
 def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
     """The last stable state while the loads grow from one under which the mechanism stands."""
-    whole = _last_stable(mechanism, _shares(last.share, FEW_CANDIDATES), last)  # as nearly every machine stands
-    if whole is not None and whole.share == 1.0:
-        return whole
+    last = _last_stable(mechanism, _shares(last.share, FEW_CANDIDATES), last) or last
     for _ in range(MOST_LOAD_STEPS):
         if last.share == 1.0:
             return last
@@ -101,13 +104,13 @@ def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
         last = next_state
         if accurate:
             return last
-    return replace(last, least=True)
+    return replace(last, is_lower_bound=True)
 
 
 def _shares(last: float, count: int) -> Array:
     """Return `count` shares of the loads beyond the last one, closer together near it; the greatest of them is 1."""
-    left = STEP_RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
-    return np.append(last + (1.0 - last) * left, 1.0)
+    steps = STEP_RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
+    return np.append(last + (1.0 - last) * steps, 1.0)
 
 
 def _last_stable(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> LoadLimit | None:

@@ -36,7 +36,7 @@ from kinetostat.spec.immutable import Immutable, ImmutableAnswer
 
 if TYPE_CHECKING:
     from kinetostat.equilibrium import actuation, balance, links, solving, tangent
-    from kinetostat.equilibrium import limit as load_limit
+    from kinetostat.equilibrium import limit as load_limits
     from kinetostat.equilibrium import mechanism as mechanisms
     from kinetostat.equilibrium.balance import Balance
     from kinetostat.equilibrium.limit import LoadLimit
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 else:
     actuation = LateModule("kinetostat.equilibrium.actuation")
     balance = LateModule("kinetostat.equilibrium.balance")
-    load_limit = LateModule("kinetostat.equilibrium.limit")
+    load_limits = LateModule("kinetostat.equilibrium.limit")
     links = LateModule("kinetostat.equilibrium.links")
     mechanisms = LateModule("kinetostat.equilibrium.mechanism")
     solving = LateModule("kinetostat.equilibrium.solving")
@@ -214,7 +214,7 @@ class MachineState(Immutable):
     @cached_property
     def limit(self) -> "LoadLimit | None":
         """The last stable state of rest while the loads grow, up to all of them; None if there is none."""
-        return load_limit.limit_of(self.mechanism)
+        return load_limits.load_limit(self.mechanism)
 
     @cached_property
     def struts(self) -> "tuple[Strut, ...]":

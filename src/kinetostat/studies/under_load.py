@@ -424,7 +424,7 @@ def how_it_gives_way(limit: LoadLimit | None) -> str:
     known = stability.mode.any()
     by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
     what = f" Slack there: {', '.join(slack)}." if slack else ""
-    least = "at least " if limit.least else ""
+    least = "at least " if limit.is_lower_bound else ""
     return f"It stands up to {least}{limit.share:.3g} times this load{by}.{what}"
 
 
