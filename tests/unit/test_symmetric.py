@@ -36,6 +36,6 @@ def test_a_dyad_is_the_symmetric_outer_product(a, b):
 @given(twists, twists, st.floats(-10, 10))
 def test_sums_and_multiples_go_entry_by_entry(a, b, factor):
     p, q = Symmetric6.dyad(a, a), Symmetric6.dyad(b, b)
-    assert np.array_equal(array(Symmetric6.total([p, q])), array(p) + array(q))
+    assert np.array_equal(array(Symmetric6.sum_of([p, q])), array(p) + array(q))
     assert np.array_equal(array(p * factor), array(p) * factor)
-    assert np.array_equal(array(Symmetric6.total([])), np.zeros((6, 6)))
+    assert np.array_equal(array(Symmetric6.sum_of([])), np.zeros((6, 6)))

@@ -243,7 +243,7 @@ def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
     Source: theory (5), eq. 32. A second route, by which `stiffness_matrix` is checked.
     """
     shares = [Symmetric6.dyad(b, b) * k for leg in legs for b, k in leg_modes(leg)]
-    return Symmetric6.total(shares)
+    return Symmetric6.sum_of(shares)
 
 
 def dual_twists(
@@ -307,7 +307,7 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
         length: what to multiply translational components by, to compare them with rotational ones, m or 1/m.
     """
     limited = [where(w < INFINITE, w, 0.0) for _, w in shares]
-    finite = Symmetric6.total([Symmetric6.dyad(a, a) * w for (a, _), w in zip(shares, limited, strict=True)])
+    finite = Symmetric6.sum_of([Symmetric6.dyad(a, a) * w for (a, _), w in zip(shares, limited, strict=True)])
     reached = [_beyond_round_off(screw, length) for screw, _ in shares]
     endless = [
         [where(w < INFINITE, 0.0, where(flag, 1.0, 0.0)) for flag in flags]

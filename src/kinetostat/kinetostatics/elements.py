@@ -176,7 +176,7 @@ def stiffness_equations(response: Response, parts: Sequence[Element]) -> dict[st
     if not square or any(element.stiffness is None for element in parts):
         return None
     dyads = stiffness_coefficients(response.statics)
-    return {element.name: Symmetric6.total([dyads[i] for i in element.springs]) for element in parts}
+    return {element.name: Symmetric6.sum_of([dyads[i] for i in element.springs]) for element in parts}
 
 
 def _weights(response: Response, element: Element) -> dict[int, Scalar]:
