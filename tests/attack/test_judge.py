@@ -46,7 +46,7 @@ def links_begin_at_points(patch):
 
 def builds_are_merged(patch):
     """Legs with and without a carriage are placed as one build."""
-    patch.setattr(leg_gaps, "_sort", lambda element: (type(element), element.mover.point is None))
+    patch.setattr(leg_gaps, "_build_key", lambda element: (type(element), element.mover.point is None))
 
 
 def zeros_are_counted(patch):

@@ -5,8 +5,9 @@ import pytest
 
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics import closure
+from kinetostat.kinematics.closing import free_coordinates
 from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, goal_of, problems_of
+from kinetostat.kinematics.leg_gaps import Problems, goal_of, problems_of
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near

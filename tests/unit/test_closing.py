@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
-from kinetostat.kinematics.closing import closing_equations, leg_end
+from kinetostat.kinematics.closing import closing_equations, free_coordinates, leg_end
 from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.leg_gaps import free_coordinates, problems_of
+from kinetostat.kinematics.leg_gaps import problems_of
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Chains, Step

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
-from kinetostat.machine.column import column, stacked_columns
+from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
+from kinetostat.tolerances import PARALLEL_AXES
 
 if TYPE_CHECKING:
     from kinetostat.machine.written import family
@@ -91,6 +92,23 @@ def placement_of(pose: Mapping[str, Scalar]) -> Displacement:
     roll, pitch, yaw = (pose[name] for name in ANGLES)
     turn = rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
     return Displacement(turn, Vector(pose["x"], pose["y"], pose["z"]))
+
+
+def free_coordinates(chains: Chains) -> tuple[str, ...]:
+    """Coordinates that the pose does not give, without those out of the plane of a machine that only moves in one."""
+    staying = ("z", "roll", "pitch") if stays_in_plane(chains) else ()
+    return tuple(name for name in (*POINT, *ANGLES) if name not in chains.pose and name not in staying)
+
+
+def stays_in_plane(chains: Chains) -> bool:
+    """Tell whether no joint moves anything out of the x-y plane."""
+    return all(_in_plane(step.element.mover) for steps in chains.legs for step in steps if step.moves)
+
+
+def _in_plane(mover: Joint) -> bool:
+    along = np.max(np.abs(np.asarray(plain(mover.axis.z), dtype=float)))
+    across = max(np.max(np.abs(np.asarray(plain(c), dtype=float))) for c in (mover.axis.x, mover.axis.y))
+    return bool(is_zero(mover.pitch) and (along if mover.point is None else across) <= PARALLEL_AXES)
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,24 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints, clearance, leg_end, platform_placement, squared_distance
+from kinetostat.kinematics.closing import (
+    Joints,
+    clearance,
+    free_coordinates,
+    leg_end,
+    platform_placement,
+    squared_distance,
+)
 from kinetostat.kinematics.following import follow
-from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, with_undetermined
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at, goal_of, problems_of
 from kinetostat.kinematics.posture import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
-from kinetostat.tolerances import CLOSED
+from kinetostat.numerics.least_norm import with_damping
+from kinetostat.tolerances import CLOSED, LEAST_NORM_DAMPING, UNDETERMINED
 
 
 @dataclass(frozen=True)
@@ -134,7 +142,7 @@ class ClosedForms:
         if not free:
             return status
         (problems,) = problems_of(task.chains, len(status), free)
-        return with_undetermined(problems, problems.unknowns_of(coordinates), goal_of(problems, task.goal), status)
+        return _with_undetermined(problems, problems.unknowns_of(coordinates), goal_of(problems, task.goal), status)
 
     @staticmethod
     def over_scalars(chains: Chains) -> Joints:
@@ -185,19 +193,46 @@ def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> 
     coordinates, status = np.zeros((count, chains.size)), np.full(count, int(Status.OK))
     groups = problems_of(chains, count, free)
     if chosen is not None:
-        groups = [group.take(np.flatnonzero(chosen[group.poses])) for group in groups]
+        groups = [group.subset(np.flatnonzero(chosen[group.poses])) for group in groups]
     stated = [(group, goal_of(group, goal)) for group in groups]
     for group, group_goal in stated:
         status[group.poses[too_far_or_near(group, group_goal)]] = int(Status.OUT_OF_REACH)
     for group, group_goal in stated:
         tried = np.flatnonzero(status[group.poses] == Status.OK)
-        problems, tried_goal = group.take(tried), some(group_goal, tried)
+        problems, tried_goal = group.subset(tried), coordinates_at(group_goal, tried)
         unknowns, codes = follow(problems, tried_goal)
         reached = np.flatnonzero(codes == Status.OK)
-        unknowns[reached] = nearest_home(problems.take(reached), unknowns[reached], some(tried_goal, reached))
-        verdicts = with_undetermined(problems, unknowns, tried_goal, codes) if free else codes
-        problems.fill(coordinates, unknowns)
+        unknowns[reached] = nearest_home(
+            problems.subset(reached), unknowns[reached], coordinates_at(tried_goal, reached)
+        )
+        verdicts = _with_undetermined(problems, unknowns, tried_goal, codes) if free else codes
+        problems.write_joints(coordinates, unknowns)
         # The worst status of a pose's legs wins, so the worst is written last.
         for code in (Status.SINGULAR, Status.NOT_CONVERGED, Status.OUT_OF_REACH):
             status[problems.poses[verdicts == code]] = int(code)
     return coordinates, status
+
+
+def _with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, codes: Codes) -> Codes:
+    """The codes, SINGULAR instead of OK where the platform can move without opening a leg or changing the pose given.
+
+    The damped inverse of what determines the platform is then as large as the damping is small.
+
+    Args:
+        problems, codes: the problems, and the `Status` code of each.
+        unknowns: their solutions [problems x unknowns].
+        goal: coordinates of the platform in each of them.
+    """
+    solved = np.flatnonzero(codes == Status.OK)
+    if not solved.size:
+        return codes
+    problems = problems.subset(solved)
+    rates = problems.gaps(unknowns[solved], coordinates_at(goal, solved))[1]
+    square = np.swapaxes(rates, 1, 2) @ rates
+    damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
+    moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
+    freedom = np.linalg.solve(with_damping(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
+    loose = (freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED
+    codes = codes.copy()
+    codes[solved[loose]] = int(Status.SINGULAR)
+    return codes

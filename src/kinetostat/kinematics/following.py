@@ -12,11 +12,13 @@ that are accepted by the contraction of Newton's method.
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.kinematics.leg_gaps import Coordinates, Problems, least_norm, some, stays_in_plane
+from kinetostat.kinematics.closing import stays_in_plane
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
 from kinetostat.numerics.iteration import largest, newton
+from kinetostat.numerics.least_norm import least_norm
 from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_DIVISOR, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
@@ -74,11 +76,11 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
         tried = left[differs[left]]
         if not tried.size:
             continue
-        reached, solved = _by_way(problems.take(tried), plan, some(goal, tried))
+        reached, solved = _by_way(problems.subset(tried), plan, coordinates_at(goal, tried))
         taken = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
         unknowns[tried[taken]], status[tried[solved]] = reached[taken], int(Status.OK)
         left = left[status[left] != Status.OK]
-    unknowns[left], shown = _least_gap(problems.take(left), unknowns[left], some(goal, left))
+    unknowns[left], shown = _least_gap(problems.subset(left), unknowns[left], coordinates_at(goal, left))
     status[left[shown]] = int(Status.OUT_OF_REACH)
     return unknowns, status
 
@@ -91,7 +93,7 @@ def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, M
     unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, LONGEST_STRIDE)
     again = np.flatnonzero(crossed)
     if again.size:
-        part, target = problems.take(again), some(goal, again)
+        part, target = problems.subset(again), coordinates_at(goal, again)
         unknowns[again], solved[again], _ = _strides(part, plan(part, target), target, CAREFUL_STRIDE)
     return unknowns, solved
 
@@ -102,7 +104,7 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
     solved, crossed = np.zeros((2, len(unknowns)), dtype=bool)
     ended = np.flatnonzero(arrived)
     if ended.size:
-        part, target = problems.take(ended), some(goal, ended)
+        part, target = problems.subset(ended), coordinates_at(goal, ended)
         equations, steps = part.closing_equations(target), MOST_STEPS_AT_GOAL
         # A gap that no longer becomes less has reached round-off, or cannot be closed.
         end = newton(
@@ -125,7 +127,7 @@ def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
         next_share = np.where(next_share > 1.0 - SHORTEST_STRIDE, 1.0, next_share)
         shares = np.ones(count)
         shares[items] = next_share
-        part, target = problems.take(items), some(way(shares), items)
+        part, target = problems.subset(items), coordinates_at(way(shares), items)
         moved, could_grow, accepted = _step(part, unknowns[items], target, furthest)
         unknowns[items[accepted]], done[items[accepted]] = moved[accepted], next_share[accepted]
         stride[items] *= np.where(accepted, np.clip(0.9 * could_grow, *GROWTH), np.clip(0.7 * could_grow, *SHRINKAGE))
@@ -145,8 +147,8 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
     accepted = longer >= 1.0
     tried = np.flatnonzero(accepted)
     if tried.size:
-        part, start = problems.take(tried), unknowns[tried] + tangent[tried]
-        correction = least_norm(*part.gaps(start, some(target, tried))[::-1])
+        part, start = problems.subset(tried), unknowns[tried] + tangent[tried]
+        correction = least_norm(*part.gaps(start, coordinates_at(target, tried))[::-1])
         size = largest(correction)
         close = (size <= STEP_CONTRACTION * first[tried]) | (size <= ROUND_OFF_OF_STEP)
         accepted[tried] = close & (size <= MOST_TANGENT_ERROR)
@@ -183,7 +185,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         step = np.einsum("ncd,nd->nc", inverse, slope)
         step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), LEAST_DIVISOR)))[:, None]
         moved = best[items] + step
-        left, rates, distance_there = problems.take(items).gaps_and_distance(moved, some(goal, items))
+        left, rates, distance_there = problems.subset(items).gaps_and_distance(moved, coordinates_at(goal, items))
         slope_there = np.einsum("nrc,nr->nc", rates, left)
         better = distance_there < distance
         inverse[better] = _updated_inverse(inverse[better], step[better], slope[better] - slope_there[better])

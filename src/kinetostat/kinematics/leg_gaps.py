@@ -6,36 +6,35 @@ the gaps is elsewhere (`following`, `closure`).
 Source: theory (19)-(21); placements are in the base frame.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
-from kinetostat.arrays import Array, Codes, Integers, Mask
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
-from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, plain, stacked_columns
-from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
 from kinetostat.numerics.iteration import Steps, largest
-from kinetostat.tolerances import LEAST_DIVISOR, LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
+from kinetostat.numerics.least_norm import least_norm
 
 Coordinates = dict[str, Scalar]
 """Coordinates of the platform: x, y, z (m) and roll, pitch, yaw (rad), one for each problem, or a float for all."""
 
 
-def some(coordinates: Coordinates, chosen: Integers) -> Coordinates:
+def coordinates_at(coordinates: Coordinates, problems: Integers) -> Coordinates:
     """The coordinates of some problems, by number."""
-    return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
+    return {name: value if isinstance(value, float) else value[problems] for name, value in coordinates.items()}
 
 
 @dataclass(frozen=True)
 class Build:
-    """Legs with the same sorts of joints in a row.
+    """Legs with the same kinds of joints in a row.
 
     Attributes:
         elements: moving elements of the legs, at the home pose; scalars are floats, or arrays [poses or 1 x legs].
@@ -58,7 +57,7 @@ class Build:
             return scalar if isinstance(scalar, float) else column(scalar[poses if len(scalar) > 1 else 0, legs])
 
         return tuple(
-            Step(_element_of([element], lambda scalars: entry_of(scalars[0])), True) for element in self.elements
+            Step(_with_scalars(element, map(entry_of, _scalars_of(element))), True) for element in self.elements
         )
 
 
@@ -68,18 +67,18 @@ def builds_of(chains: Chains) -> list[Build]:
     first = 0
     for steps in chains.legs:
         elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
-        sorts = tuple(_sort(element) for element in elements)
-        alike.setdefault(sorts, []).append((elements, np.arange(first, first + len(elements))))
+        keys = tuple(_build_key(element) for element in elements)
+        alike.setdefault(keys, []).append((elements, np.arange(first, first + len(elements))))
         first += len(elements)
     builds = []
     for legs in alike.values():
-        elements = [_element_of(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
+        elements = [_merged_element(same_place) for same_place in zip(*(elements for elements, _ in legs), strict=True)]
         slides = np.array([element.mover.point is None for element in legs[0][0]], dtype=bool)
         builds.append(Build(tuple(elements), slides, np.stack([places for _, places in legs])))
     return builds
 
 
-def _sort(element: Any) -> tuple[Any, ...]:
+def _build_key(element: Any) -> tuple[Any, ...]:
     """The class of an element, and which of its fields are points, names or None: alike in elements of one build.
 
     Only then can one evaluation place them all. A joint with a carriage and one without it differ.
@@ -89,19 +88,33 @@ def _sort(element: Any) -> tuple[Any, ...]:
     return type(element), element.mover.point is None, is_zero(element.mover.pitch), kinds
 
 
-def _element_of(elements: Sequence[Any], merge: Callable[[Sequence[Scalar]], Scalar]) -> Any:
-    """An element whose scalars are made of those of several."""
-    changes: dict[str, Any] = {}
-    for name in (field.name for field in fields(elements[0])):
-        values = [getattr(element, name) for element in elements]
-        if isinstance(values[0], Vector):
-            changes[name] = Vector(*map(merge, zip(*(value.components() for value in values), strict=True)))
-        elif not isinstance(values[0], str | None):
-            changes[name] = merge(values)
-    return replace(elements[0], **changes)
+def _merged_element(elements: Sequence[Any]) -> Any:
+    """One element for those of several legs of a build: its scalars have a column for each leg."""
+    return _with_scalars(elements[0], map(_stacked_scalar, zip(*map(_scalars_of, elements), strict=True)))
 
 
-def _row(scalars: Sequence[Scalar]) -> Scalar:
+def _scalars_of(element: Any) -> list[Scalar]:
+    """The numbers of an element in the order of its fields, those of a vector one by one; names are left out."""
+    values = [getattr(element, field.name) for field in fields(element)]
+    parts = (value.components() if isinstance(value, Vector) else (value,) for value in values if _has_numbers(value))
+    return [scalar for part in parts for scalar in part]
+
+
+def _with_scalars(element: Any, scalars: Iterable[Scalar]) -> Any:
+    """The element with other numbers, in the order of `_scalars_of`."""
+    remaining, changes = iter(scalars), {}
+    for name in (field.name for field in fields(element)):
+        value = getattr(element, name)
+        if _has_numbers(value):
+            changes[name] = Vector(*islice(remaining, 3)) if isinstance(value, Vector) else next(remaining)
+    return replace(element, **changes)
+
+
+def _has_numbers(value: Any) -> bool:
+    return not isinstance(value, str | None)
+
+
+def _stacked_scalar(scalars: Sequence[Scalar]) -> Scalar:
     """A float where all legs have it; else an array [poses or 1 x legs]."""
     first = scalars[0]
     if all(isinstance(scalar, int | float) and scalar == first for scalar in scalars):
@@ -123,31 +136,6 @@ class AlikeLegs:
     build: Build
     legs: Integers
     columns: Integers
-
-
-def least_norm(rates: Array, left: Array) -> Array:
-    """Least-squares solutions of rates x = left, all but least in norm, problem by problem; NaN where not finite.
-
-    Args:
-        rates: [problems x rows x unknowns].
-        left: [problems x rows].
-    """
-    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
-    if not sound.all():
-        steps = np.full((len(rates), rates.shape[2]), np.nan)
-        if sound.any():
-            steps[sound] = least_norm(rates[sound], left[sound])
-        return steps
-    across = np.swapaxes(rates, 1, 2)
-    if rates.shape[2] >= rates.shape[1]:
-        return np.asarray((across @ np.linalg.solve(with_damping(rates @ across), left[:, :, None]))[:, :, 0])
-    return np.asarray(np.linalg.solve(with_damping(across @ rates), across @ left[:, :, None])[:, :, 0])
-
-
-def with_damping(square: Array) -> Array:
-    """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
-    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
-    return np.asarray(square + LEAST_NORM_DAMPING * (trace + LEAST_DIVISOR) * np.eye(square.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -187,7 +175,7 @@ class Problems:
 
     def at_home(self) -> Coordinates:
         """Coordinates of the platform at the home pose."""
-        point = {name: _at(getattr(self.chains.home.translation, name), self.poses) for name in POINT}
+        point = {name: _scalar_at(getattr(self.chains.home.translation, name), self.poses) for name in POINT}
         return point | dict.fromkeys(ANGLES, 0.0)
 
     def unknowns_of(self, coordinates: Array) -> Array:
@@ -197,7 +185,7 @@ class Problems:
             unknowns[:, part.columns] = coordinates[self._entries(part)] / self._units(part)
         return unknowns
 
-    def fill(self, coordinates: Array, unknowns: Array) -> None:
+    def write_joints(self, coordinates: Array, unknowns: Array) -> None:
         """Write the joint coordinates of solved problems into those of all poses [poses x coordinates], rad or m."""
         for part in self.parts:
             coordinates[self._entries(part)] = unknowns[:, part.columns] * self._units(part)
@@ -208,10 +196,10 @@ class Problems:
     def _units(self, part: AlikeLegs) -> Array:
         return np.where(part.build.slides, self.lengths[:, None, None], 1.0)
 
-    def take(self, chosen: Integers) -> "Problems":
+    def subset(self, problems: Integers) -> "Problems":
         """Return some of the problems, by number."""
-        parts = tuple(replace(part, legs=part.legs[chosen]) for part in self.parts)
-        return replace(self, poses=self.poses[chosen], parts=parts)
+        parts = tuple(replace(part, legs=part.legs[problems]) for part in self.parts)
+        return replace(self, poses=self.poses[problems], parts=parts)
 
     def gaps(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
         """Return what is left from the legs' ends to the goal, and how the unknowns reduce it.
@@ -239,19 +227,19 @@ class Problems:
         lengths, first = self.lengths, self.size - len(self.free)
         for k, name in enumerate(self.free, first):
             goal = goal | {name: goal[name] + unknowns[:, k] * (1.0 if name in ANGLES else lengths)}
-        left, rates, distance = [], [], np.zeros(len(unknowns))
+        gaps, rates, distance = [], [], np.zeros(len(unknowns))
         for part in self.parts:
             legs = part.legs.shape[1]
             ends, twists = self._ends(part, unknowns, lengths)
             wanted = placement_of({name: column(_for_each_leg(value, legs)) for name, value in goal.items()})
-            each = 1.0 / np.repeat(lengths, legs)
-            turned = rotation_between(ends.rotation, wanted.rotation).components()
-            apart = [plain(c) * each for c in (wanted.translation - ends.translation).components()]
-            left.append(stacked_columns([*turned, *apart], len(each)).reshape(len(lengths), 6 * legs))
-            rates.append(self._spread(part, twists, wanted, len(lengths)))
-            apart = plain(squared_distance(ends, wanted, column(np.repeat(lengths, legs))))
-            distance = distance + np.asarray(apart).reshape(-1, legs).sum(axis=1)
-        return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
+            leg_lengths = np.repeat(lengths, legs)
+            turn = rotation_between(ends.rotation, wanted.rotation).components()
+            shift = [plain(c) * (1.0 / leg_lengths) for c in (wanted.translation - ends.translation).components()]
+            gaps.append(stacked_columns([*turn, *shift], len(leg_lengths)).reshape(len(lengths), 6 * legs))
+            rates.append(self._rates_by_all_unknowns(part, twists, wanted, len(lengths)))
+            squares = plain(squared_distance(ends, wanted, column(leg_lengths)))
+            distance = distance + np.asarray(squares).reshape(-1, legs).sum(axis=1)
+        return np.hstack(gaps), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
 
     def closing_equations(
         self, goal: Coordinates, solve: Callable[[Array, Array], Array] = least_norm
@@ -265,8 +253,8 @@ class Problems:
         """
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
-            left, rates = self.take(rows).gaps(unknowns, some(goal, rows))
-            return largest(left), lambda going: solve(rates[going], left[going])
+            gaps, rates = self.subset(rows).gaps(unknowns, coordinates_at(goal, rows))
+            return largest(gaps), lambda unsolved: solve(rates[unsolved], gaps[unsolved])
 
         return equations
 
@@ -274,23 +262,22 @@ class Problems:
         """Places to which legs take the platform, and its twist per unit of their coordinates [legs x 6 x joints]."""
         count = part.legs.shape[1]
         coordinates = unknowns[:, part.columns].reshape(-1, part.columns.shape[1])
-        each = np.repeat(lengths, count)
-        poses = np.repeat(self.poses, count)
+        leg_lengths, poses = np.repeat(lengths, count), np.repeat(self.poses, count)
         home = self.chains.home.translation.components()
-        start = Displacement(self.chains.home.rotation, Vector(*(column(_at(c, poses)) for c in home)))
-        slides = part.build.slides
-        amounts = [column(q * each if slide else q) for q, slide in zip(coordinates.T.copy(), slides, strict=True)]
+        start = Displacement(self.chains.home.rotation, Vector(*(column(_scalar_at(c, poses)) for c in home)))
+        # A coordinate of a slide is counted in lengths of the machine, one of a turn in rad.
+        units = [leg_lengths if slide else 1.0 for slide in part.build.slides]
+        amounts = [column(q * unit) for q, unit in zip(coordinates.T, units, strict=True)]
         end = leg_end(part.build.steps(poses, part.legs.ravel()), start, iter(amounts))
-        twists = np.empty((len(each), 6, len(slides)))
-        for k, (mover, slide) in enumerate(zip(end.movers, slides, strict=True)):
-            turning = mover.twist(end.platform.translation).components()
-            for row, scalar in enumerate(turning):
-                scale = (each if slide else 1.0) * (1.0 if row < 3 else 1.0 / each)
-                twists[:, row, k] = plain(scalar) * scale
+        twists = np.empty((len(leg_lengths), 6, len(units)))
+        for k, (mover, unit) in enumerate(zip(end.movers, units, strict=True)):
+            for row, scalar in enumerate(mover.twist(end.platform.translation).components()):
+                # The platform turns in rad and moves in lengths of the machine, as gaps do.
+                twists[:, row, k] = plain(scalar) * (unit * (1.0 if row < 3 else 1.0 / leg_lengths))
         return end.platform, twists
 
-    def _spread(self, part: AlikeLegs, twists: Array, wanted: Displacement, count: int) -> Array:
-        """The rates of some legs' gaps by all unknowns."""
+    def _rates_by_all_unknowns(self, part: AlikeLegs, twists: Array, wanted: Displacement, count: int) -> Array:
+        """The rates of some legs' gaps by all unknowns [problems x rows x unknowns]; joints of other legs have none."""
         if not self.free and part.columns.shape[0] == 1 and len(self.parts) == 1:
             return twists
         legs = len(part.columns)
@@ -303,7 +290,7 @@ class Problems:
         return rates
 
 
-def _at(scalar: Scalar, poses: Integers) -> Scalar:
+def _scalar_at(scalar: Scalar, poses: Integers) -> Scalar:
     values = plain(scalar)
     return values[poses] if np.size(values) > 1 else float(np.ravel(values)[0])
 
@@ -350,23 +337,6 @@ def problems_of(chains: Chains, count: int, free: Sequence[str]) -> list[Problem
     return problems
 
 
-def free_coordinates(chains: Chains) -> tuple[str, ...]:
-    """Coordinates that the pose does not give, without those out of the plane of a machine that only moves in one."""
-    staying = ("z", "roll", "pitch") if stays_in_plane(chains) else ()
-    return tuple(name for name in (*POINT, *ANGLES) if name not in chains.pose and name not in staying)
-
-
-def stays_in_plane(chains: Chains) -> bool:
-    """Tell whether no joint moves anything out of the x-y plane."""
-    return all(_in_plane(step.element.mover) for steps in chains.legs for step in steps if step.moves)
-
-
-def _in_plane(mover: Joint) -> bool:
-    along = np.max(np.abs(np.asarray(plain(mover.axis.z), dtype=float)))
-    across = max(np.max(np.abs(np.asarray(plain(c), dtype=float))) for c in (mover.axis.x, mover.axis.y))
-    return bool(is_zero(mover.pitch) and (along if mover.point is None else across) <= PARALLEL_AXES)
-
-
 def goal_of(problems: Problems, goal: Array) -> Coordinates:
     """Coordinates of the platform in each problem; those not given are those of the home pose.
 
@@ -375,28 +345,3 @@ def goal_of(problems: Problems, goal: Array) -> Coordinates:
         goal: coordinates of the poses, in the order of the chains' pose [poses x given], rad or m.
     """
     return problems.at_home() | {name: goal[problems.poses, i] for i, name in enumerate(problems.chains.pose)}
-
-
-def with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, codes: Codes) -> Codes:
-    """The codes, SINGULAR instead of OK where the platform can move without opening a leg or changing the pose given.
-
-    The damped inverse of what determines the platform is then as large as the damping is small.
-
-    Args:
-        problems, codes: the problems, and the `Status` code of each.
-        unknowns: their solutions [problems x unknowns].
-        goal: coordinates of the platform in each of them.
-    """
-    solved = np.flatnonzero(codes == Status.OK)
-    if not solved.size:
-        return codes
-    problems = problems.take(solved)
-    rates = problems.gaps(unknowns[solved], some(goal, solved))[1]
-    square = np.swapaxes(rates, 1, 2) @ rates
-    damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
-    moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
-    freedom = np.linalg.solve(with_damping(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
-    loose = (freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED
-    codes = codes.copy()
-    codes[solved[loose]] = int(Status.SINGULAR)
-    return codes

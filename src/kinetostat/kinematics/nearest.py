@@ -7,10 +7,11 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import ANGLES, POINT
-from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, least_norm, problems_of
+from kinetostat.kinematics.closing import ANGLES, POINT, free_coordinates
+from kinetostat.kinematics.leg_gaps import Problems, problems_of
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.iteration import Steps, largest, newton
+from kinetostat.numerics.least_norm import least_norm
 from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8
@@ -131,7 +132,7 @@ class _Search:
             allowed: motions by which the legs stay closed to first order [unknowns x motions].
             loads: Lagrange's multipliers, see `_steps` [rows].
         """
-        problems = self.problems.take(np.zeros(allowed.shape[1], dtype=int))
+        problems = self.problems.subset(np.zeros(allowed.shape[1], dtype=int))
         rates_beside = problems.gaps(here.unknowns + CURVATURE_STEP * allowed.T, self.home)[1]
         of_legs = np.einsum("r,nrc->nc", loads, rates_beside - here.rates) @ allowed / CURVATURE_STEP
         return np.asarray(allowed[self.rows].T @ allowed[self.rows] + 0.5 * (of_legs + of_legs.T))
@@ -152,12 +153,12 @@ class _Search:
             Where the legs nearly close [n x ...]; unknowns are NaN where that fails.
         """
         count = len(steps)
-        problems = self.problems.take(np.zeros(count, dtype=int))
+        problems = self.problems.subset(np.zeros(count, dtype=int))
         enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG_STEP) ** 2)
         left, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
-            left[rows], rates[rows] = problems.take(rows).gaps(unknowns, self.home)
+            left[rows], rates[rows] = problems.subset(rows).gaps(unknowns, self.home)
             return largest(left[rows]), lambda going: least_norm(rates[rows[going]], left[rows[going]])
 
         end = newton(

@@ -9,8 +9,9 @@ Source: theory section 6.
 import numpy as np
 
 from kinetostat.arrays import Array, Mask
-from kinetostat.kinematics.leg_gaps import Coordinates, Problems, some, with_damping
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at
 from kinetostat.numerics.iteration import largest, newton
+from kinetostat.numerics.least_norm import with_damping
 from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, LEAST_DIVISOR, NEAREST_POSTURE, NEWTON_SETTLED
 
 MOST_STEPS, MOST_CORRECTIONS = 40, 8
@@ -51,7 +52,7 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
     for _ in range(MOST_STEPS):
         if not rows.size:
             break
-        moving, their_goal = problems.take(rows), some(goal, rows)
+        moving, their_goal = problems.subset(rows), coordinates_at(goal, rows)
         step, slope = _steps(moving, best[rows], their_goal)
         end, closed = _closing_step(moving, best[rows] + share[:, None] * step, their_goal)
         # Sums of squares tell steps apart down to half of the digits; shorter ones are Newton's last and taken whole.
@@ -96,7 +97,7 @@ def _steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Arra
         # Lagrange's multipliers: how strongly each gap keeps the joints from their home positions.
         pulls = np.einsum("nkc,nc->nk", right[rows, :kept], unknowns[rows]) / sizes[rows, :kept]
         loads = np.einsum("nrk,nk->nr", left[rows, :, :kept], pulls)
-        curvature = _curvature(problems.take(rows), unknowns[rows], some(goal, rows), motions, loads)
+        curvature = _curvature(problems.subset(rows), unknowns[rows], coordinates_at(goal, rows), motions, loads)
         bends, axes = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
         amounts = np.einsum("nij,ni->nj", axes, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
         step = -np.einsum("nij,nj,nic->nc", axes, amounts, motions)
