@@ -297,9 +297,9 @@ NO_PITCH = 1e-12
 """Share of what a unit turn moves below which the pitch of its screw is round-off."""
 ROUND_OFF_OF_COMPLEMENT = 1e-12
 """The same share after the subtraction in a Schur complement, which loses two more digits."""
-ROUND_OFF_OF_FREE = 1e-10
-"""The same share where an infinite C says that some direction is free: what round-off leaves of it is then not taken
-for a stiffness, also where springs of one machine are seven decades apart."""
+LARGEST_FREE = 1e-7
+"""Share of the largest stiffness that round-off may leave of a direction known to be free; springs of one machine that
+are farther apart are told from none."""
 EQUAL_STIFFNESSES = 1e-9
 """Relative difference of principal stiffnesses below which they are equal, and their directions are arbitrary."""
 EQUAL_FREQUENCIES = 1e-6

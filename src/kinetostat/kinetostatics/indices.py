@@ -26,9 +26,10 @@ from kinetostat.frozen import dataclass
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.tolerances import (
     AT_RIGHT_ANGLES,
+    LARGEST_FREE,
+    LEAST_DIVISOR,
     ROUND_OFF_OF_COMPLEMENT,
     ROUND_OFF_OF_EIGENVALUE,
-    ROUND_OFF_OF_FREE,
 )
 
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
@@ -112,7 +113,7 @@ def free_stiffnesses(
     """Principal stiffnesses against a pure force (moment) while the rotations (translations) follow: 1 / eig(C_bb).
 
     What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob). Where C is
-    not finite, a direction is free: of two stiffnesses ten decades apart, the lesser then counts as none.
+    not finite, a direction is free, and what can be round-off of a stiffness counts as none.
 
     Args:
         stiffness, compliance: K and C at P, base axes [n x n]; C is used where it is finite.
@@ -199,7 +200,8 @@ def _ellipsoids(
 ) -> dict[str, PrincipalStiffness] | None:
     """From the blocks of `direct`, or else Schur complements of `dual`; `inverse` says that C is what is used.
 
-    Where it is `known_free` that some direction has no stiffness, more round-off is taken for that.
+    Where it is `known_free` that some direction has no stiffness, all is taken for that which round-off can have left
+    of it: the complement loses as many digits as the condition of the other block has.
     """
     matrix = dual if direct is None else direct
     if matrix is None:
@@ -209,14 +211,13 @@ def _ellipsoids(
         block = matrix[np.ix_(inside, inside)]
         size, share = float(np.linalg.norm(block, 2)), ROUND_OFF_OF_EIGENVALUE
         if direct is None and other:
-            coupling = matrix[np.ix_(inside, other)]
-            share = ROUND_OFF_OF_FREE if known_free else ROUND_OFF_OF_COMPLEMENT
-            block = (
-                block
-                - coupling
-                @ np.linalg.pinv(matrix[np.ix_(other, other)], ROUND_OFF_OF_COMPLEMENT, hermitian=True)
-                @ coupling.T
-            )
+            coupling, held = matrix[np.ix_(inside, other)], matrix[np.ix_(other, other)]
+            share = ROUND_OFF_OF_COMPLEMENT
+            if known_free:
+                sizes = np.linalg.svd(held, compute_uv=False)
+                least = sizes[sizes > ROUND_OFF_OF_COMPLEMENT * sizes[0]].min(initial=sizes[0])
+                share = min(max(share, ROUND_OFF_OF_EIGENVALUE * sizes[0] / max(least, LEAST_DIVISOR)), LARGEST_FREE)
+            block = block - coupling @ np.linalg.pinv(held, ROUND_OFF_OF_COMPLEMENT, hermitian=True) @ coupling.T
         values, vectors = np.linalg.eigh(block)
         stiffnesses = [0.0 if value <= share * size else float(value) for value in values]
         order = range(len(inside))

@@ -144,7 +144,10 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     rows = ROTATIONS if name == "rotation" else TRANSLATIONS
     amounts: dict[str, float] = {}
     for spring, share in zip(springs, compliance_shares(statics), strict=True):
-        amount = sum(float(share.entry(i, j)) * way[i % 3] * way[j % 3] for way in alike for i in rows for j in rows)
+        entries = [(float(share.entry(i, j)), i % 3, j % 3) for i in rows for j in rows]
+        if not all(math.isfinite(entry) for entry, _, _ in entries):
+            return Softest(0.0, alike, ())  # a free spring lets it go: what round-off has left is no stiffness
+        amount = sum(entry * way[i] * way[j] for way in alike for entry, i, j in entries)
         # The compliance in each of these directions is 1 / least, so this is the spring's share of their sum.
         amounts[spring.name] = amount * least / len(alike)
     return Softest(least, alike, *parts_and_kinds(springs, amounts))
