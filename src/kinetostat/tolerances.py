@@ -46,6 +46,11 @@ NEWTON_SETTLED = 1e-14
 LEAST_GAP_SETTLED = 1e-6
 """Slope of the squared gap, as a share of the gap, at which it has its least value: half of the digits
 are lost there."""
+NO_CONTRACTION = 1e-7
+"""Size of a correction, rad or in units of the machine's length, below which the next one shows no contraction: it is
+the square of this, which is round-off."""
+NO_CURVATURE = 1e-12
+"""Cosine between a step and the change of slope along it below which that change is round-off and says nothing."""
 NEAREST_GAIN = 1e-10
 """Share of its square by which a squared distance could still become less where the nearest pose is reached: it
 is written in five digits, and the step that would do so is still taken."""
@@ -134,6 +139,10 @@ UNMOVED_TOOL = 1e-13
 tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
+SAME_FORCE = 1e-13
+"""Share of the largest of the forces that are distributed below which a step of them is round-off."""
+INDEPENDENT_CONDITION = 1e-20
+"""Square of the share of a condition's normal below which other conditions leave nothing of it."""
 HANGING = 1e-13
 """Share of a cable's length below which a step towards its shape is round-off; as level a cable hangs straight down."""
 SURELY_HANGING = 1e-10

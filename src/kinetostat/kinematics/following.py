@@ -19,7 +19,15 @@ from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
 from kinetostat.numerics.iteration import largest, newton
 from kinetostat.numerics.least_norm import least_norm
-from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_DIVISOR, LEAST_GAP_SETTLED, NEWTON_SETTLED
+from kinetostat.tolerances import (
+    CLOSED,
+    DEPENDENT,
+    LEAST_DIVISOR,
+    LEAST_GAP_SETTLED,
+    NEWTON_SETTLED,
+    NO_CONTRACTION,
+    NO_CURVATURE,
+)
 
 MOST_TRIALS = 80
 """Number of steps that are tried on one way, accepted or not."""
@@ -37,16 +45,12 @@ MOST_TANGENT_ERROR = 0.1
 STEP_CONTRACTION = 0.55
 """Share of a correction that the next one may have. Newton's method has a half at the point where two branches meet,
 so that no step beyond it is accepted."""
-ROUND_OFF_OF_STEP = 1e-7
-"""Size of a correction below which its contraction says nothing."""
 MOST_STEPS_AT_GOAL = 60
 """Number of Newton's steps at the goal, where each halves the gap at worst."""
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
 STIFFENING = 1e-2
 """Added to the curvature at first, for unknowns that change nothing there."""
-LEAST_CURVATURE_COSINE = 1e-12
-"""Cosine between a step and the change of slope along it, below which that change is round-off and says nothing."""
 LONGEST_DESCENT = 0.3
 """Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
 ASIDE = 1e-2
@@ -150,12 +154,12 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
         part, start = problems.subset(tried), unknowns[tried] + tangent[tried]
         correction = least_norm(*part.gaps(start, coordinates_at(target, tried))[::-1])
         size = largest(correction)
-        close = (size <= STEP_CONTRACTION * first[tried]) | (size <= ROUND_OFF_OF_STEP)
+        close = (size <= STEP_CONTRACTION * first[tried]) | (size <= NO_CONTRACTION)
         accepted[tried] = close & (size <= MOST_TANGENT_ERROR)
         moved[tried] = start + correction
         # The error of the tangent grows as the square of the step, the contraction as the step itself.
         allowed = np.sqrt(MOST_TANGENT_ERROR / np.maximum(size, LEAST_DIVISOR))
-        steady = np.maximum(STEP_CONTRACTION * first[tried] / np.maximum(size, ROUND_OFF_OF_STEP), 0.25)
+        steady = np.maximum(STEP_CONTRACTION * first[tried] / np.maximum(size, NO_CONTRACTION), 0.25)
         longer[tried] = np.minimum(np.minimum(allowed, longer[tried]), steady)
     return moved, np.where(np.isfinite(longer), longer, 0.0), accepted
 
@@ -207,7 +211,7 @@ def _updated_inverse(inverse: Array, step: Array, change: Array) -> Array:
         change: how much less steep it is at the end of the step [n x unknowns].
     """
     work = np.einsum("nc,nc->n", step, change)
-    sound = work > LEAST_CURVATURE_COSINE * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
+    sound = work > NO_CURVATURE * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
     weight = np.where(sound, 1.0 / np.where(sound, work, 1.0), 0.0)[:, None, None]
     across = np.eye(step.shape[1]) - weight * step[:, :, None] * change[:, None, :]
     return np.asarray(across @ inverse @ np.swapaxes(across, 1, 2) + weight * step[:, :, None] * step[:, None, :])

@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import BALANCED, SURELY_REGULAR, UNRESISTED
+from kinetostat.tolerances import BALANCED, INDEPENDENT_CONDITION, SAME_FORCE, SURELY_REGULAR, UNRESISTED
 
 MOST_CHANGES = 200
 """Greatest number of changes of the set of forces at their bounds: many times the number of cables of a machine."""
@@ -24,12 +24,8 @@ MOST_POWER_STEPS, MOST_HALVINGS = 100, 30
 LEAST_CURVATURE = 1e-12
 """Least curvature of the cost by a force, beside 1 for the force that is farthest from the wanted level: a higher power
 is flat at the level itself."""
-SAME_FORCE = 1e-13
-"""Share of the largest force below which a step is round-off."""
 NO_CONDITION = -1
 """Number that stands for none among those of conditions."""
-INDEPENDENT = 1e-20
-"""Square of the share of a condition's normal below which other conditions leave nothing of it."""
 
 
 @dataclass(frozen=True)
@@ -277,7 +273,7 @@ class _DualSearch:
         share = np.linalg.solve(square, np.einsum("nar,nr->na", others, normal)[:, :, None])[:, :, 0]
         step = normal - np.einsum("nar,na->nr", others, share)
         gain = (step * step).sum(axis=1)
-        moves = gain > INDEPENDENT * self._lengths[rows, entering] ** 2
+        moves = gain > INDEPENDENT_CONDITION * self._lengths[rows, entering] ** 2
         with np.errstate(all="ignore"):
             until_free = np.where(at_bound & (share > UNRESISTED), self._pull[rows] / share, np.inf)
             until_met = np.where(moves, lacking / gain, np.inf)
