@@ -211,13 +211,13 @@ def _ellipsoids(
         block = matrix[np.ix_(inside, inside)]
         size, share = float(np.linalg.norm(block, 2)), ROUND_OFF_OF_EIGENVALUE
         if direct is None and other:
-            coupling, held = matrix[np.ix_(inside, other)], matrix[np.ix_(other, other)]
+            coupling, opposite = matrix[np.ix_(inside, other)], matrix[np.ix_(other, other)]
             share = ROUND_OFF_OF_COMPLEMENT
             if known_free:
-                sizes = np.linalg.svd(held, compute_uv=False)
+                sizes = np.linalg.svd(opposite, compute_uv=False)
                 least = sizes[sizes > ROUND_OFF_OF_COMPLEMENT * sizes[0]].min(initial=sizes[0])
                 share = min(max(share, ROUND_OFF_OF_EIGENVALUE * sizes[0] / max(least, LEAST_DIVISOR)), LARGEST_FREE)
-            block = block - coupling @ np.linalg.pinv(held, ROUND_OFF_OF_COMPLEMENT, hermitian=True) @ coupling.T
+            block = block - coupling @ np.linalg.pinv(opposite, ROUND_OFF_OF_COMPLEMENT, hermitian=True) @ coupling.T
         values, vectors = np.linalg.eigh(block)
         stiffnesses = [0.0 if value <= share * size else float(value) for value in values]
         order = range(len(inside))
