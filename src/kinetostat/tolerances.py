@@ -223,6 +223,8 @@ FIT_SETTLED = 1e-10
 two fits apart, also where steps along a curved valley are many."""
 FIT_BEGUN = 1e-3
 """The same of fits that only say how far the residuals spread, because the next one starts from there."""
+FITTED_COMPLIANCE = 1e-12
+"""Relative difference of a compliance by fitted values of the file from the one that was found that is round-off."""
 ROUND_OFF_OF_MEASUREMENT = 1e-9
 """Residual, rad or as a share of the machine's length, up to which it may be round-off of the file or of the model: no
 value is an outlier by it, and no interval is shorter."""

@@ -12,9 +12,9 @@ from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import fitted_text
 from kinetostat.machine.loading import bundled
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.identification.fitted_values import fitted_file_values
 from kinetostat.studies.identification.identification import identification_of
 from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements
-from kinetostat.studies.identification.own_numbers import own_numbers
 from synthetic_measurements import measured, posed
 from synthetic_printer import Truth, probed_heights, write_probes
 
@@ -73,7 +73,7 @@ def test_stiffnesses_are_identified_in_their_own_units(tmp_path):
     read = dict(zip(names, moved.T, strict=True)), dict.fromkeys(names, np.full(20, 1e-12))
     data = Measurements("m.csv", tuple(range(2, 22)), poses, *read, wrenches, np.zeros((20, 3)))
     answer = identification_of(error_model(machine, poses, 20, wrenches), data, ["legs.leg [145].*.compliance"])
-    assert own_numbers(answer) == pytest.approx(truth, rel=1e-6)
+    assert fitted_file_values(answer) == pytest.approx(truth, rel=1e-6)
     ((before, after),) = changed_lines(drawn, fitted_text(answer))
     found = re.findall(r'"(\S+) ([^"]*)"', after)
     assert [unit for _, unit in found] == ["N/um"] * 4 + ["N/m"]
@@ -84,5 +84,5 @@ def test_stiffnesses_are_identified_in_their_own_units(tmp_path):
 def test_errors_of_single_joints_are_no_numbers_of_a_family_s_file():
     model, poses = posed(load("planar-3rpr"), 25, 0.4, 0.3)
     answer = identification_of(model, measured(model, poses, 1e-4 * np.ones(len(model.errors)), ("x", "y", "rz")))
-    assert own_numbers(answer) is None
-    assert own_numbers(identification_of(model, answer.observed.data, ["zeros"])) == {}
+    assert fitted_file_values(answer) is None
+    assert fitted_file_values(identification_of(model, answer.observed.data, ["zeros"])) == {}

@@ -21,9 +21,9 @@ from kinetostat.studies.identification.firmware import (
     reprap_text,
 )
 from kinetostat.studies.identification.fit import Tell
+from kinetostat.studies.identification.fitted_values import with_home
 from kinetostat.studies.identification.identification import USUALLY_FITTED, Identification, identify
 from kinetostat.studies.identification.next_poses import NextPoses, as_csv, unit_of
-from kinetostat.studies.identification.own_numbers import with_home
 from kinetostat.studies.identification.record import FitRecord, record_of
 from kinetostat.units import KINDS
 from kinetostat.views.data_forms import json_of
