@@ -42,8 +42,8 @@ def truth_of(model, groups=("geometry", "zeros"), size=2e-4, seed=9):
 def found(answer, truth):
     """How far identified values lie from the truth, in halves of their 95 % intervals, of those that are seen."""
     halves = answer.fit.half_intervals
-    numbers = [n for n, place in enumerate(answer.observed.chosen) if place >= 0 and np.isfinite(halves[n])]
-    true = truth[answer.observed.chosen[numbers]]
+    numbers = [n for n, place in enumerate(answer.observed.error_numbers) if place >= 0 and np.isfinite(halves[n])]
+    true = truth[answer.observed.error_numbers[numbers]]
     return (answer.fit.values[numbers] - true) / halves[numbers]
 
 

@@ -223,6 +223,9 @@ FIT_SETTLED = 1e-10
 two fits apart, also where steps along a curved valley are many."""
 FIT_BEGUN = 1e-3
 """The same of fits that only say how far the residuals spread, because the next one starts from there."""
+ON_A_LINE = 1e-10
+"""Share of the largest singular value of the products of two sets of positions below which these lie on a line: each
+then lies beside it by less than 1e-5 of its length, and how one is turned about it against the other is noise."""
 FITTED_COMPLIANCE = 1e-12
 """Relative difference of a compliance by fitted values of the file from the one that was found that is round-off."""
 ROUND_OFF_OF_MEASUREMENT = 1e-9

@@ -130,7 +130,7 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
     for _ in range(200):
         true = true_values(base, somewhere(draw, what == "wide"))
         noise = draw.normal(0.0, NOISE / sigma, len(PROBED))
-        fit = best_fit(Linear(rates, true, noise), base.observed.pose, wishes)
+        fit = best_fit(Linear(rates, true, noise), base.observed.row_poses, wishes)
         answer = replace(base, fit=fit)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
         inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.half_intervals, strict=True)]
@@ -156,7 +156,7 @@ def test_fourteen_numbers_of_exact_printers_leave_residuals_of_the_noise(machine
         places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
         heights = [reached(commanded(place), truth, place)[2] for place in places]
         observed = replace(base.observed, value=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
-        fit = best_fit(observed, observed.pose, wishes)
+        fit = best_fit(observed, observed.row_poses, wishes)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
         inside += (np.abs(fit.values - true_values(base, truth)) <= fit.half_intervals).tolist()
     assert np.mean(inside) == pytest.approx(0.95, abs=0.025)

@@ -1,6 +1,7 @@
 """Identification from synthetic measurements whose truth is known, and what it says about bad data."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.model import error_model
 from kinetostat.kinematics.forward import system_of
 from kinetostat.machine.machine import springs
-from kinetostat.machine.parameters import with_values
-from kinetostat.numerics.motions import Motions
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.numerics.motions import Motions, exponential
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.identification.fit import Wishes, best_fit
 from kinetostat.studies.identification.identification import identification_of, identify
@@ -42,7 +43,7 @@ def test_rates_of_every_sort_of_measurement_are_exact():
     _, rates = seen.linearisation(at)
     difference = 0.5 * (seen.residuals(at - way) - seen.residuals(at + way))
     for name in names:
-        rows = np.array(seen.names) == name
+        rows = np.array(seen.row_names) == name
         assert difference[rows] == pytest.approx(
             (rates @ way)[rows], rel=1e-3, abs=5e-3 * np.abs(difference[rows]).max()
         )
@@ -212,6 +213,40 @@ def test_positions_in_another_unit_are_noticed(tmp_path):
     )
     with pytest.raises(InputError, match="check the unit"):
         identify(load_without_limits("hexapod"), path)
+
+
+def on_a_line(count=7):
+    """The hexapod at poses along x, its frame unknown, measured without an error from the base frame."""
+    machine = load_without_limits("hexapod")
+    poses = {path: np.full(count, float(value)) for path, value in values(machine).items() if path.startswith("pose.")}
+    poses["pose.x"] = np.linspace(-0.01, 0.012, count)
+    model, nothing = error_model(machine, poses, count, np.zeros(6)), np.full((count, 3), np.nan)
+    measured = {name: model.drawn.tool[:, i] for i, name in enumerate(("x", "y", "z"))}
+    sigma = {name: np.full(count, 1e-5) for name in measured}
+    return model, Measurements("data.csv", tuple(range(count)), poses, measured, sigma, np.zeros((count, 6)), nothing)
+
+
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.0, 0.3, 0.2], [0.0, 0.0, math.pi]])
+def test_positions_on_a_line_turn_the_frame_no_more_than_they_say(turn):
+    """The line does not say how the frame is turned about it; what round-off says of that must not count."""
+    model, data = on_a_line()
+    rotation = exponential(np.array([[*turn, 0.0, 0.0, 0.0]])).rotation[0]
+    seen = model.drawn.tool @ rotation  # R^T p
+    data = replace(data, values={name: seen[:, i] for i, name in enumerate(("x", "y", "z"))})
+    frame = observation(model, data, [place_unknown("frame.rx")]).frame
+    assert frame.point(seen) == pytest.approx(model.drawn.tool, abs=1e-12)
+    assert np.linalg.norm(frame.amounts()[0, :3]) == pytest.approx(np.linalg.norm(turn), abs=1e-6)
+
+
+def test_rates_of_the_target_leave_the_twists_of_the_tool_as_they_are():
+    model, data = on_a_line()
+    unknowns = [place_unknown(path) for path in (*FRAME_UNKNOWNS, *TARGET_UNKNOWNS)]
+    observed = observation(model, data, unknowns)
+    target = observed._target_of(np.zeros((len(data), 6)), np.zeros(len(unknowns)))
+    twists = np.zeros((len(data), 6, len(unknowns)))
+    rates = target.rates(twists, [unknown.path for unknown in unknowns])
+    assert rates.any(axis=(0, 1)).all()
+    assert not twists.any()
 
 
 def test_poses_chosen_beat_poses_at_random_by_the_factor_that_is_foretold():

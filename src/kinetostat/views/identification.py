@@ -225,7 +225,7 @@ IDENTIFICATION = Description(
         Field("family", "machine.family.name"),
         Field("data", "observed.data.path"),
         Field("poses", lambda answer: len(answer.observed.data)),
-        Field("values", lambda answer: len(answer.observed.value)),
+        Field("values", lambda answer: len(answer.observed.measured)),
         Field("unknowns", _unknowns),
         Field("covariance", "fit.covariance"),
         Field("rank", "fit.rank"),

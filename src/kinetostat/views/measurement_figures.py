@@ -73,13 +73,13 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
 
 def _component_names(answer: Identification) -> AnyArray:
     """Return for each measured value the component that it is of."""
-    return np.array([name.removeprefix("deflection.") for name in answer.observed.names])
+    return np.array([name.removeprefix("deflection.") for name in answer.observed.row_names])
 
 
 def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: Array) -> None:
     """Draw the residuals of some rows over their lines, a colour for each component; outliers are black crosses."""
     names, kept = _component_names(answer), answer.fit.kept
-    lines = np.array(answer.observed.data.lines)[answer.observed.pose]
+    lines = np.array(answer.observed.data.lines)[answer.observed.row_poses]
     for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
         of_name = rows & kept & (names == name)
         panel.plot(lines[of_name], residuals[of_name], ".", color=colour, ms=3, label=name)

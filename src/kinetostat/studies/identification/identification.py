@@ -68,8 +68,8 @@ class Identification:
 
     def __repr__(self) -> str:
         return (
-            f"<Identification of {self.machine.name!r}: {len(self.unknowns)} unknowns from {len(self.observed.value)} "
-            f"values, {self.fit.rank} combinations seen, {len(self.outliers)} outliers>"
+            f"<Identification of {self.machine.name!r}: {len(self.unknowns)} unknowns from "
+            f"{len(self.observed.measured)} values, {self.fit.rank} combinations seen, {len(self.outliers)} outliers>"
         )
 
     @property
@@ -87,7 +87,7 @@ class Identification:
         """Values that were set aside: line of the file, name, and residual in standard deviations."""
         data, fit = self.observed.data, self.fit
         return [
-            (data.lines[self.observed.pose[row]], self.observed.names[row], float(fit.after[row]))
+            (data.lines[self.observed.row_poses[row]], self.observed.row_names[row], float(fit.after[row]))
             for row in np.flatnonzero(~fit.kept)
         ]
 
@@ -98,7 +98,7 @@ class Identification:
             residuals: in standard deviations [rows].
         """
         fit, off = self.fit, residuals * self.observed.sigma
-        turns = np.array([name.removeprefix("deflection.") in (*ROTATION, *EULER) for name in self.observed.names])
+        turns = np.array([name.removeprefix("deflection.") in (*ROTATION, *EULER) for name in self.observed.row_names])
         kinds = {"length": fit.kept & ~turns, "angle": fit.kept & turns}
         return {kind: float(np.sqrt((off[rows] ** 2).mean())) for kind, rows in kinds.items() if rows.any()}
 
@@ -202,7 +202,7 @@ def identification_of(
         data.known,
         float((ROUND_OFF_OF_MEASUREMENT * np.where(seen.turns, 1.0, model.length) / seen.sigma).min(initial=np.inf)),
     )
-    answer = best_fit(seen, seen.pose, wishes, tell)
+    answer = best_fit(seen, seen.row_poses, wishes, tell)
     hidden = tuple(unseen_of(seen, answer, sizes))
     proposed = next_poses(model.machine, seen, answer, sizes, more) if more else None
     return Identification(model.machine, seen, answer, sizes, hidden, proposed)

@@ -155,7 +155,7 @@ def _candidates(
     rows = np.flatnonzero(np.isin(whole.drawn.status, REGULAR if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
     there = observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
-    return replace(there, members=seen.members), within
+    return replace(there, error_mix=seen.error_mix), within
 
 
 def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:

@@ -1,4 +1,4 @@
-"""Measured values that a machine with errors would give, and their rates by every unknown: theory (64).
+"""Measured values that a machine with errors would give, and their rates by every unknown.
 
 Unknowns are errors of the machine, and where wanted the place of the measuring frame in the base frame and that of the
 target on the platform. Residuals are in standard deviations.
@@ -17,9 +17,10 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
 from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, ROTATION, Measurements
+from kinetostat.tolerances import ON_A_LINE
 
 ANGLE_STEP = 1e-5
-"""Of central differences of angles by small rotations, rad: what they leave out is its square."""
+"""Step of central differences of angles by small rotations, rad: what they leave out is its square."""
 FRAME_UNKNOWNS = tuple(f"frame.{name}" for name in (*ROTATION, *POSITION))
 TARGET_UNKNOWNS = tuple(f"target.{name}" for name in (*ROTATION, *POSITION))
 """Unknown places of the measuring frame in the base frame, and of the target from the tool point in platform axes."""
@@ -42,30 +43,32 @@ class Observation:
         model: the machine at the commanded poses.
         data: what was measured there.
         unknowns: what is to be found, in order.
-        chosen: the place of each in the errors of the model; -1 of tied errors, the frame's and the target's.
-        members: how far each error of the model goes with each unknown [errors x unknowns].
+        error_numbers: number of each unknown among the errors of the model; -1 of tied errors, and of unknowns of the
+            frame and the target.
+        error_mix: how far each error of the model goes with each unknown, errors = error_mix @ unknowns [errors x
+            unknowns].
         frame: where the measuring frame is taken to be at first.
-        names: of the measured value in each row of the residuals [rows].
-        pose: to which pose each row belongs [rows].
+        row_names: name of the measured value in each row of the residuals [rows].
+        row_poses: number of the pose to which each row belongs [rows].
         sigma: standard deviation of each row [rows].
-        value: that was measured [rows].
+        measured: the value that was measured in each row [rows].
     """
 
     model: ErrorModel
     data: Measurements
     unknowns: tuple[MachineError, ...]
-    chosen: Integers
-    members: Array
+    error_numbers: Integers
+    error_mix: Array
     frame: Motions
-    names: tuple[str, ...]
-    pose: Integers
+    row_names: tuple[str, ...]
+    row_poses: Integers
     sigma: Array
-    value: Array
+    measured: Array
 
     @property
     def turns(self) -> Mask:
         """Flags of the rows that are angles [rows]."""
-        return np.isin([name.removeprefix("deflection.") for name in self.names], (*ROTATION, *EULER))
+        return np.isin([name.removeprefix("deflection.") for name in self.row_names], (*ROTATION, *EULER))
 
     def residuals(self, values: Array) -> Array:
         """Measured values less those that the unknowns predict, over the standard deviations [rows].
@@ -81,17 +84,18 @@ class Observation:
         return self._over_sigma(predicted), rates / self.sigma[:, None]
 
     def _over_sigma(self, predicted: Array) -> Array:
-        off = self.value - predicted
+        off = self.measured - predicted
         off = np.where(self.turns, np.arctan2(np.sin(off), np.cos(off)), off)
         return np.asarray(off / self.sigma)
 
-    def _of(self, values: Array, paths: Sequence[str]) -> Array:
+    def _unknowns_at(self, paths: Sequence[str], values: Array) -> Array:
+        """The values of unknowns by path, of all that have values [unknowns]; 0 where a path is not sought."""
         known = {unknown.path: value for unknown, value in zip(self.unknowns, values, strict=True)}
         return np.array([known.get(path, 0.0) for path in paths])
 
     def errors(self, values: Array) -> Array:
         """The errors of the whole model [errors] that unknowns [unknowns] stand for."""
-        return np.asarray(self.members @ values)
+        return np.asarray(self.error_mix @ values)
 
     def twists(self, whole: Array) -> Array:
         """Twists of the tool per unit of each unknown, base axes, from the rates of all errors; 0 by frame and target.
@@ -99,8 +103,8 @@ class Observation:
         Args:
             whole: rates of all errors of the model [n x 6 x errors].
         """
-        used = self.members.any(axis=1)
-        return np.asarray(whole[:, :, used] @ self.members[used])
+        used = self.error_mix.any(axis=1)
+        return np.asarray(whole[:, :, used] @ self.error_mix[used])
 
     def _predict(self, values: Array, with_rates: bool) -> tuple[Array, Array]:
         """Predicted values [rows], and their rates by the unknowns [rows x unknowns], empty where these are not wanted.
@@ -115,7 +119,7 @@ class Observation:
         if not with_rates:
             target = self._target_of(model.displacement(errors)[0] + deflection, values)
             return self._values(target.in_frame, deflection), np.zeros((0, 0))
-        wanted = set(np.flatnonzero(self.members.any(axis=1)).tolist())
+        wanted = set(np.flatnonzero(self.error_mix.any(axis=1)).tolist())
         displacement, error_rates = model.linearisation(errors, wanted)
         target = self._target_of(displacement + deflection, values)
         twists = self.twists(np.concatenate([error_rates[:, :, :first_spring], per_spring], axis=2))
@@ -124,8 +128,9 @@ class Observation:
 
     def _target_of(self, displacement: Array, values: Array) -> "_Target":
         """The target where the tool is displaced [n x 6], with the unknown places of frame and target at values."""
-        drawn, frame, target = self.model.drawn, self._of(values, FRAME_UNKNOWNS), self._of(values, TARGET_UNKNOWNS)
-        turns = np.concatenate([displacement[:, :3], 0.0 * displacement[:, :3]], axis=1)
+        drawn = self.model.drawn
+        frame, target = self._unknowns_at(FRAME_UNKNOWNS, values), self._unknowns_at(TARGET_UNKNOWNS, values)
+        turns = np.concatenate([displacement[:, :3], np.zeros_like(displacement[:, :3])], axis=1)
         platform_axes = exponential(turns).rotation @ drawn.axes
         frame_turn, target_turn = (
             exponential(place[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])).rotation for place in (frame, target)
@@ -148,24 +153,24 @@ class Observation:
         columns = {name: seen.translation[:, i] for i, name in enumerate(POSITION)}
         columns |= {name: angles[:, i] for i, name in enumerate((*ROTATION, *EULER))} | {"distance": away}
         columns |= {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
-        return np.array([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
+        return np.array([columns[name][row] for name, row in zip(self.row_names, self.row_poses, strict=True)])
 
-    def _rates(self, seen: Motions, rates: Array, soft: Array) -> Array:
+    def _rates(self, seen: Motions, rates: Array, per_spring: Array) -> Array:
         """Rates of every measured value [rows x unknowns]."""
-        wanted = {*self.names}
+        wanted = {*self.row_names}
         columns: dict[str, Array] = {name: rates[:, 3 + i] for i, name in enumerate(POSITION)}
         if wanted & {*ROTATION, *EULER}:
             by_turn = _angle_rates(seen.rotation) @ rates[:, :3]
             columns |= {name: by_turn[:, i] for i, name in enumerate((*ROTATION, *EULER))}
         if "distance" in wanted:
-            way = seen.translation - self.data.origins
-            way = way / np.linalg.norm(way, axis=1)[:, None]
-            columns["distance"] = np.einsum("ni,niu->nu", way, rates[:, 3:])
+            sight = seen.translation - self.data.origins
+            sight = sight / np.linalg.norm(sight, axis=1)[:, None]
+            columns["distance"] = np.einsum("ni,niu->nu", sight, rates[:, 3:])
         if any(name.startswith("deflection") for name in wanted):
-            first = len(self.model.errors) - soft.shape[2]
-            by_spring = soft @ self.members[first:]
+            first_spring = len(self.model.errors) - per_spring.shape[2]
+            by_spring = per_spring @ self.error_mix[first_spring:]
             columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
-        return np.stack([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
+        return np.stack([columns[name][row] for name, row in zip(self.row_names, self.row_poses, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -204,7 +209,7 @@ class _Target:
             twists: of the tool per unit of each unknown, base axes, 0 by frame and target [n x 6 x unknowns].
             paths: of the unknowns.
         """
-        turning, moving = twists[:, :3], twists[:, 3:]
+        turning, moving = twists[:, :3].copy(), twists[:, 3:]
         moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), self.arm[:, None]), 1, 2)
         from_frame = self.tool + self.arm - self.origin
         for place in (number for number, path in enumerate(paths) if path in FRAME_UNKNOWNS):
@@ -225,7 +230,11 @@ class _Target:
 
 
 def _turn_axis(turn: Array, component: int) -> Array:
-    """Angular velocity per unit rate of a component of a rotation vector, which need not be small [3]."""
+    """Angular velocity per unit rate of a component of a rotation vector, which need not be small [3].
+
+    The translation of the exponential of a screw (w, u) is J(w) u, with the left Jacobian J of rotations: of a unit
+    vector u it is the column of J that is wanted.
+    """
     return np.asarray(exponential(np.array([[*turn[:3], *np.eye(3)[component]]])).translation[0])
 
 
@@ -273,13 +282,12 @@ def observation(
             the measuring frame is the base frame.
     """
     _check_placed(model, data)
-    paths = [error.path for error in model.errors]
-    chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
-    members = np.zeros((len(paths), len(unknowns)))
-    for number, unknown in enumerate(unknowns):
+    numbers = {error.path: number for number, error in enumerate(model.errors)}
+    error_mix = np.zeros((len(numbers), len(unknowns)))
+    for column, unknown in enumerate(unknowns):
         for path, share in (ties or {}).get(unknown.path, {unknown.path: 1.0}).items():
-            if path in paths:
-                members[paths.index(path), number] = share
+            if path in numbers:
+                error_mix[numbers[path], column] = share
     # The rows of the residuals: pose by pose, so that the values of one pose stand together.
     pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
     pairs.sort(key=lambda pair: pair[1])
@@ -292,13 +300,13 @@ def observation(
         model=model,
         data=data,
         unknowns=tuple(unknowns),
-        chosen=chosen,
-        members=members,
+        error_numbers=np.array([numbers.get(unknown.path, -1) for unknown in unknowns], dtype=np.int64),
+        error_mix=error_mix,
         frame=frame,
-        names=tuple(name for name, _ in pairs),
-        pose=np.array([row for _, row in pairs], dtype=np.int64),
+        row_names=tuple(name for name, _ in pairs),
+        row_poses=np.array([row for _, row in pairs], dtype=np.int64),
         sigma=np.array([data.sigma[name][row] for name, row in pairs]),
-        value=np.array([data.values[name][row] for name, row in pairs]),
+        measured=np.array([data.values[name][row] for name, row in pairs]),
     )
 
 
@@ -319,7 +327,8 @@ def still_frame() -> Motions:
 def _frame(model: ErrorModel, data: Measurements) -> Motions:
     """The place of the measuring frame with which the drawn machine comes nearest to positions (W. Kabsch, 1976).
 
-    Without three measured positions, which fix a frame, it is the base frame.
+    Without three measured positions it is the base frame. Where all lie on a line, they do not say how the frame is
+    turned about it: of all frames that come as near it is the one that is turned least.
     """
     if not all(name in data.values for name in POSITION):
         return still_frame()
@@ -329,10 +338,23 @@ def _frame(model: ErrorModel, data: Measurements) -> Motions:
         return still_frame()
     start, end = measured[rows], model.drawn.tool[rows]
     spread = (start - start.mean(axis=0)).T @ (end - end.mean(axis=0))
-    left, _, right = np.linalg.svd(spread)
-    hand = np.diag([1.0, 1.0, np.sign(np.linalg.det(right.T @ left.T))])
-    turn = right.T @ hand @ left.T
+    left, sizes, right = np.linalg.svd(spread)
+    if sizes[1] > ON_A_LINE * sizes[0]:
+        hand = np.diag([1.0, 1.0, np.sign(np.linalg.det(right.T @ left.T))])
+        turn = right.T @ hand @ left.T
+    else:
+        turn = _least_turn(left[:, 0], right[0])
     return Motions(turn[None], (end.mean(axis=0) - turn @ start.mean(axis=0))[None])
+
+
+def _least_turn(start: Array, end: Array) -> Array:
+    """The rotation by the least angle that turns one unit vector into another [3 x 3]."""
+    axis, cosine = np.cross(start, end), float(start @ end)
+    sine = float(np.linalg.norm(axis))
+    if sine == 0.0:  # a turn by nothing, or half a turn about any axis across
+        axis = np.cross(start, np.eye(3)[np.abs(start).argmin()])
+    axis = axis / np.linalg.norm(axis)
+    return np.asarray(exponential(np.array([[*(np.arctan2(sine, cosine) * axis), 0.0, 0.0, 0.0]])).rotation[0])
 
 
 def _check_far(model: ErrorModel, data: Measurements) -> None:

@@ -172,13 +172,13 @@ def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[i
 def _unknowns_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
     """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
     rows, sources = observed.model.rows, observed.model.sources
-    row, result = rows.legs[leg], np.zeros(len(observed.chosen))
+    row, result = rows.legs[leg], np.zeros(len(observed.error_numbers))
     places = random_coordinates(row, rows.length)
     motion = (NO_ERROR, (Insertion(leg, len(row.twists) if at_end else 0, twist),))
     goal = effects(row, rows, [motion], places)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
         return result
-    machine = [(n, place) for n, place in enumerate(observed.chosen) if 0 <= place < len(sources)]
+    machine = [(n, place) for n, place in enumerate(observed.error_numbers) if 0 <= place < len(sources)]
     mine = [(n, sources[place]) for n, place in machine if {i.leg for i in sources[place][1]} == {leg}]
     if not mine:
         return None
