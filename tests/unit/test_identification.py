@@ -215,27 +215,33 @@ def test_positions_in_another_unit_are_noticed(tmp_path):
         identify(load_without_limits("hexapod"), path)
 
 
+LINE = np.array([6.0, 3.0, 2.0]) / 7.0
+
+
 def on_a_line(count=7):
-    """The hexapod at poses along x, its frame unknown, measured without an error from the base frame."""
+    """The hexapod at poses along `LINE`, measured from the base frame."""
     machine = load_without_limits("hexapod")
     poses = {path: np.full(count, float(value)) for path, value in values(machine).items() if path.startswith("pose.")}
-    poses["pose.x"] = np.linspace(-0.01, 0.012, count)
+    for path, part in zip(("pose.x", "pose.y", "pose.z"), LINE, strict=True):
+        poses[path] += part * np.linspace(-0.01, 0.012, count)
     model, nothing = error_model(machine, poses, count, np.zeros(6)), np.full((count, 3), np.nan)
-    measured = {name: model.drawn.tool[:, i] for i, name in enumerate(("x", "y", "z"))}
+    measured = {name: model.drawn.tool[:, i] for i, name in enumerate(POSITION)}
     sigma = {name: np.full(count, 1e-5) for name in measured}
     return model, Measurements("data.csv", tuple(range(count)), poses, measured, sigma, np.zeros((count, 6)), nothing)
 
 
-@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.0, 0.3, 0.2], [0.0, 0.0, math.pi]])
-def test_positions_on_a_line_turn_the_frame_no_more_than_they_say(turn):
-    """The line does not say how the frame is turned about it; what round-off says of that must not count."""
+@pytest.mark.parametrize("angle", [0.0, 0.4, 3.1])
+def test_positions_on_a_line_turn_the_frame_no_more_than_they_say(angle):
+    """The line does not say how the frame is turned about it; what noise says of that must not count."""
     model, data = on_a_line()
+    turn = angle * np.array([1.0, -2.0, 0.0]) / math.sqrt(5.0)
     rotation = exponential(np.array([[*turn, 0.0, 0.0, 0.0]])).rotation[0]
-    seen = model.drawn.tool @ rotation  # R^T p
-    data = replace(data, values={name: seen[:, i] for i, name in enumerate(("x", "y", "z"))})
+    noise = np.random.default_rng(0).normal(0.0, 1e-9, model.drawn.tool.shape)
+    seen = model.drawn.tool @ rotation + noise  # R^T p
+    data = replace(data, values={name: seen[:, i] for i, name in enumerate(POSITION)})
     frame = observation(model, data, [place_unknown("frame.rx")]).frame
-    assert frame.point(seen) == pytest.approx(model.drawn.tool, abs=1e-12)
-    assert np.linalg.norm(frame.amounts()[0, :3]) == pytest.approx(np.linalg.norm(turn), abs=1e-6)
+    assert frame.point(seen) == pytest.approx(model.drawn.tool, abs=1e-7)
+    assert np.linalg.norm(frame.amounts()[0, :3]) == pytest.approx(angle, abs=1e-5)
 
 
 def test_rates_of_the_target_leave_the_twists_of_the_tool_as_they_are():
