@@ -244,6 +244,13 @@ def test_positions_on_a_line_turn_the_frame_no_more_than_they_say(angle):
     assert np.linalg.norm(frame.amounts()[0, :3]) == pytest.approx(angle, abs=1e-5)
 
 
+def test_former_names_of_an_observation_still_work_and_warn():
+    observed = observation(*on_a_line(), [place_unknown("frame.rx")])
+    for former, name in (("chosen", "error_numbers"), ("names", "row_names"), ("value", "measured")):
+        with pytest.warns(DeprecationWarning, match=name):
+            assert getattr(observed, former) is getattr(observed, name)
+
+
 def test_rates_of_the_target_leave_the_twists_of_the_tool_as_they_are():
     model, data = on_a_line()
     unknowns = [place_unknown(path) for path in (*FRAME_UNKNOWNS, *TARGET_UNKNOWNS)]

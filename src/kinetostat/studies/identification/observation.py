@@ -16,6 +16,7 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, ROTATION, Measurements
 from kinetostat.tolerances import ON_A_LINE
 
@@ -35,6 +36,7 @@ def place_unknown(path: str) -> MachineError:
     return MachineError(path, "angle" if turns else "length", what, words, "")
 
 
+@former_names(chosen="error_numbers", members="error_mix", names="row_names", pose="row_poses", value="measured")
 @dataclass(frozen=True, eq=False)
 class Observation:
     """Measurements beside the model that is to explain them.
