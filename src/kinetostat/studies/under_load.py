@@ -136,6 +136,21 @@ class LoadedState(AnswerInState):
         return len(self.displacement) > 0
 
     @property
+    def tool_displacement(self) -> float:
+        """How far the loads move the tool point, m."""
+        return math.hypot(*self.displacement[self._rotations :])
+
+    @property
+    def tool_rotation(self) -> float:
+        """How far the loads turn the platform, rad."""
+        return math.hypot(*self.displacement[: self._rotations])
+
+    @property
+    def _rotations(self) -> int:
+        """Number of the components that are rotations, which come first."""
+        return sum(name.startswith("r") for name in self.components)
+
+    @property
     def limit_use(self) -> float | None:
         """Greatest share that any actuator uses of the limit of its load; None where the file limits none."""
         state = self.state

@@ -218,6 +218,12 @@ class Validation(ImmutableAnswer):
         return max(*self.differences.values(), self.frequency_difference)
 
     @property
+    def diagonal_differences(self) -> Array:
+        """The relative difference of each entry of the diagonal of C [6]; NaN where the machine is rigid."""
+        ours, theirs = np.diag(self.ours), np.diag(self.theirs)
+        return np.abs(np.divide(theirs, ours, out=np.full(len(ours), np.nan), where=ours != 0.0) - 1.0)
+
+    @property
     def frequency_difference(self) -> float:
         """The largest relative difference of the natural frequencies; infinite where only one of the two has a mode."""
         return max((frequency_difference(*pair) for pair in self.frequencies), default=0.0)

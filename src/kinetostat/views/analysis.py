@@ -106,7 +106,7 @@ def _loaded_parts(state: "LoadedState", full: bool) -> Iterator[Table | str]:
         return
     display = state.machine.display
     yield loaded.displacement_table(state, display)
-    yield loaded.springs_of(state, display, full)
+    yield loaded.springs_or_kinds_table(state, display, full)
     yield loaded.SIGNS if state.loaded else ""
     yield loaded.strut_table(state, display)
     yield f"Components {' '.join(state.components)} at the loaded {state.machine.reference}, base axes."

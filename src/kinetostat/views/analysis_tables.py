@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.display import ENGINEERING, Display, number
+from kinetostat.display import DASH, ENGINEERING, Display, number
 from kinetostat.kinematics.mobility import SortOfPose
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
@@ -181,7 +181,7 @@ def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
     springs = {share.spring: [share] for share in analysis.attribution}
     for name, contributions in (springs if full else by_part(analysis.attribution)).items():
         parts = np.sum([contribution.compliance_share for contribution in contributions], axis=0)
-        table.add_row(name, *("–" if math.isnan(part) else f"{100 * part:.1f} %" for part in parts))
+        table.add_row(name, *(DASH if math.isnan(part) else f"{100 * part:.1f} %" for part in parts))
     return table
 
 
@@ -250,7 +250,7 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Disp
     ]
     table = numeric_table("Eigenscrews", "", heads)
     for i, screw in enumerate(screws, 1):
-        point = "–" if screw.point is None else _point_text(screw.point, display)
+        point = DASH if screw.point is None else _point_text(screw.point, display)
         cells = (display.number(screw.eigenvalue, "N/rad", "infinite"), display.number(screw.pitch, "m", "infinite"))
         table.add_row(str(i), *cells, direction_words(screw.direction), point)
     return table

@@ -8,7 +8,7 @@ from typing import Any
 from rich.text import Text
 
 from kinetostat.arrays import Array
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.machine.parameters import with_leg
@@ -43,8 +43,8 @@ MOST_PARAMETERS = 16
 """Parameters that have a line unless all are wanted: the strongest, which fill half of a screen."""
 MOST_NAMED_PATHS = 8
 """Paths of parameters that a sentence names, on two lines; it counts the others."""
-NO_NUMBER, NO_EFFECT = "–", "·"
-"""Signs in tables: for a rigid or free direction, and for an effect too small to count."""
+NO_EFFECT = "·"
+"""Sign in tables for an effect that is too small to count; a direction that is rigid or free has a dash."""
 
 
 def _lines(answer: Guidelines) -> Lines:
@@ -113,7 +113,7 @@ def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
 
 def _share(part: float) -> Text:
     if math.isnan(part) or part == 0.0:
-        return Text(NO_EFFECT if part == 0.0 else NO_NUMBER)
+        return Text(NO_EFFECT if part == 0.0 else DASH)
     return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= DECIDING_SHARE else "dim")
 
 
@@ -143,7 +143,7 @@ def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
 def _limit(value: float) -> str:
     """Return a limit in at most five characters."""
     if math.isnan(value):
-        return NO_NUMBER
+        return DASH
     if value == 0.0 or math.isinf(value):
         return NO_EFFECT if value == 0.0 else "never"
     text = f"{value:.2g}" if value >= 1000.0 else f"{value:.3g}"
@@ -167,7 +167,7 @@ def _effect_table(answer: Guidelines, count: int) -> FittedTable:
 
 def _arrow(percent: float) -> Text:
     if not abs(percent) >= LEAST_EFFECT:
-        return Text(NO_NUMBER if math.isnan(percent) else NO_EFFECT)
+        return Text(DASH if math.isnan(percent) else NO_EFFECT)
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
     return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
 
@@ -289,7 +289,7 @@ GUIDELINES = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.influence_figures.guideline_figures",
+    figures="views.guideline_figures.guideline_figures",
     state=lambda answer: "design guidelines" if answer.status is Status.OK else answer.status.word,
     answered=lambda answer: answer.status is Status.OK,
     files={"guidelines.json": "json"},

@@ -19,7 +19,7 @@ from kinetostat.views.drawing import Points, flat, ring_of, views_of
 from kinetostat.views.figures import COLOURS, STYLE, look_of, new_figure, set_title
 from kinetostat.views.layout import fix_layout
 from kinetostat.views.lettering import width_of
-from kinetostat.views.loaded_tables import leg_loads
+from kinetostat.views.loaded_tables import named_leg_springs
 from kinetostat.views.question import Drawing
 from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.scene.overlays import exaggerated_displacement, exaggeration_of, motions_of
@@ -141,7 +141,7 @@ def moved_legend(figure: Figure, named: tuple[str, str], setting: str, slack: bo
 
 def bars_figure(state: LoadedState) -> Figure:
     """Draw a bar for the load of each leg: to the right where it pulls, to the left where it pushes, none if slack."""
-    shown, display = leg_loads(state), state.machine.display
+    shown, display = named_leg_springs(state), state.machine.display
     kinds = [
         (unit, turns) for unit, turns in (("N", False), ("N·m", True)) if any(s.turning is turns for _, s in shown)
     ]

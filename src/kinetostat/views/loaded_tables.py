@@ -65,46 +65,40 @@ def loaded_lines(state: LoadedState) -> Lines:
         yield "Stability", stability_of(state)
 
 
-def tool_motion(state: LoadedState) -> tuple[float, float]:
-    """Return how far the loads move the tool point, m, and turn the platform, rad."""
-    pairs = [*zip(state.components, state.displacement, strict=True)]
-    moved, turned = (math.hypot(*(v for name, v in pairs if name.startswith("r") is turns)) for turns in (False, True))
-    return moved, turned
-
-
 def sag_sentence(state: LoadedState) -> str:
     """Say how far the loads move and turn the tool."""
     show = state.machine.display.show_deflection
-    moved, turned = tool_motion(state)
-    return f"The loads move the {state.machine.reference} by {show(moved, 'm')} and turn it by {show(turned, 'rad')}."
+    moved, turned = show(state.tool_displacement, "m"), show(state.tool_rotation, "rad")
+    return f"The loads move the {state.machine.reference} by {moved} and turn it by {turned}."
 
 
 def actuator_sentence(state: LoadedState) -> str:
     """Say which actuators carry most, and how much of their limits they use."""
     show, parts = state.machine.display.show, []
     for turns, kind in KINDS_OF_LOADS:
-        driven = [(name, load) for name, turning, load in actuator_loads(state) if turning is turns]
+        driven = [spring for spring in actuator_springs(state) if spring.turning is turns]
         if driven:
-            name, load = max(driven, key=lambda pair: abs(pair[1]))
-            direction = "" if turns or not load else ", which pulls" if load > 0.0 else ", which pushes"
-            size = show(abs(load), load_unit(turns))
-            parts.append(f"the greatest {kind} of an actuator is {size} ({name}{direction})")
+            most = max(driven, key=lambda spring: abs(spring.load))
+            direction = "" if turns or not most.load else ", which pulls" if most.load > 0.0 else ", which pushes"
+            size = show(abs(most.load), load_unit(turns))
+            parts.append(f"the greatest {kind} of an actuator is {size} ({most.name}{direction})")
     if not parts:
         return ""
     text, use = "; ".join(parts), state.limit_use
-    reserve = "the file limits no load of actuators" if use is None else (
-        f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
-    )  # fmt: skip
-    return f"{text[0].upper()}{text[1:]}; {reserve}."
+    if use is None:
+        use_text = "the file limits no load of actuators"
+    else:
+        use_text = f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
+    return f"{text[0].upper()}{text[1:]}; {use_text}."
 
 
-def actuator_loads(state: LoadedState) -> list[tuple[str, bool, float]]:
-    """Name, whether it is rotary, and load of each actuator, N or N·m; of several springs in series one counts."""
-    loads: dict[tuple[str, bool], SpringState] = {}
+def actuator_springs(state: LoadedState) -> list[SpringState]:
+    """Return the spring of each actuator: the first of those in series, because all of these carry the same load."""
+    first: dict[tuple[str, bool], SpringState] = {}
     for spring in state.springs:
         if spring.actuated:
-            loads[spring.leg, spring.turning] = loads.get((spring.leg, spring.turning), spring)
-    return [(spring.name, spring.turning, spring.load) for spring in loads.values()]
+            first.setdefault((spring.leg, spring.turning), spring)
+    return list(first.values())
 
 
 def displacement_table(state: LoadedState, display: Display) -> FittedTable:
@@ -119,7 +113,7 @@ def displacement_table(state: LoadedState, display: Display) -> FittedTable:
     return table
 
 
-def leg_loads(state: LoadedState) -> list[tuple[str, SpringState]]:
+def named_leg_springs(state: LoadedState) -> list[tuple[str, SpringState]]:
     """Name what carries each leg: its actuator by the name of the leg, or by its own where a leg has several."""
     shown = [spring for spring in state.springs if spring.actuated] or list(state.springs)
     count = Counter(spring.leg for spring in shown)
@@ -153,7 +147,7 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
     return table
 
 
-def springs_of(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
+def springs_or_kinds_table(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
     """Return the table of the springs: each by itself where they are few or `full`, else by kind."""
     few = len(state.springs) <= MOST_LISTED_SPRINGS
     return spring_table(state, display) if few or full else _kinds_table(state, display)

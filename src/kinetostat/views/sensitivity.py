@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from kinetostat.display import DASH
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.parameters import with_leg
@@ -46,7 +47,7 @@ def influence_table(answer: Sensitivity, count: int) -> FittedTable:
 def _percent_text(value: float) -> str:
     """Return a number with three decimals, or a dash where there is none."""
     if math.isnan(value):
-        return "–"
+        return DASH
     return "0" if abs(value) < NEGLIGIBLE else f"{value:.3f}"
 
 
@@ -109,7 +110,7 @@ SENSITIVITY = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.influence_figures.sensitivity_figures",
+    figures="views.sensitivity_figures.sensitivity_figures",
     answered=lambda answer: answer.status is Status.OK,
     files={"sensitivity.json": "json"},
 )

@@ -1,11 +1,13 @@
 """A machine beside an independent engine: the description of the answer of `validate`. Nothing is computed here."""
 
+import math
 from collections.abc import Iterator
 
+import numpy as np
 from rich.table import Table
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import values
 from kinetostat.tolerances import AGREED
@@ -15,7 +17,10 @@ from kinetostat.views.question import NAME, Axis, Description, Field, Lines, Rec
 from kinetostat.views.tables import numeric_table
 
 COMPARED_DIGITS = 9
-"""Digits in which a machine is compared with an independent engine: differences of 1e-9 are to be seen."""
+"""Digits in which a machine is compared with an independent engine: differences of 1e-9 show."""
+COMPLIANCE_UNITS = "compliance, rad/(N·m), rad/N and m/N"
+ROW_AND_COLUMN = ("moved", "loaded")
+"""Axes of C: the component that moves and the one that is loaded."""
 REBUILT = (
     "The machine was rebuilt in the engine from its geometry, cross-sections and springs alone; no Jacobian of "
     "kinetostat is used there."
@@ -62,12 +67,12 @@ def _diagonal_table(validation: Validation) -> Table:
     columns = ["kinetostat", validation.engine, "difference", "unit"]
     table = numeric_table("Diagonal of the compliance, side by side", "direction", columns)
     family = validation.machine.family
+    diagonals = np.diag(validation.ours), np.diag(validation.theirs), validation.diagonal_differences
     for i, name in zip(family.components, family.component_names, strict=True):
-        ours, theirs = float(validation.ours[i, i]), float(validation.theirs[i, i])
-        difference = f"{abs(theirs / ours - 1.0):.1e}" if ours else "–"
+        ours, theirs, difference = (float(values[i]) for values in diagonals)
         scale = validation.machine.display.scale(QUANTITIES[f"compliance_{name}"].unit)
         cells = (number(value * scale.factor, digits=COMPARED_DIGITS) for value in (ours, theirs))
-        table.add_row(name, *cells, difference, scale.unit)
+        table.add_row(name, *cells, DASH if math.isnan(difference) else f"{difference:.1e}", scale.unit)
     return table
 
 
@@ -85,19 +90,20 @@ def _pose(validation: Validation) -> dict[str, float]:
     return {path.removeprefix("pose."): value for path, value in numbers.items() if path.startswith("pose.")}
 
 
-C_ABOUT = "compliance, rad/(N·m), rad/N and m/N"
-MATRIX = ("moved", "loaded")
+def _components(_validation: Validation) -> list[str]:
+    return list(COMPONENTS)
+
 
 VALIDATION = Description(
     title="Validation",
     fields=(
         NAME,
         Field("pose", _pose),
-        Field("components", lambda _: list(COMPONENTS)),
+        Field("components", _components),
         Field("engine"),
         Field("version"),
-        Field("ours", long_name=f"{C_ABOUT}, by kinetostat", axes=MATRIX),
-        Field("theirs", long_name=f"{C_ABOUT}, by the engine", axes=MATRIX),
+        Field("ours", long_name=f"{COMPLIANCE_UNITS}, by kinetostat", axes=ROW_AND_COLUMN),
+        Field("theirs", long_name=f"{COMPLIANCE_UNITS}, by the engine", axes=ROW_AND_COLUMN),
         Field("differences"),
         Field("difference"),
         Field("allowed", lambda _: AGREED),
@@ -122,6 +128,6 @@ VALIDATION = Description(
     ),
     lines=_lines,
     tables=_tables,
-    axes=(Axis("moved", lambda _: list(COMPONENTS)), Axis("loaded", lambda _: list(COMPONENTS))),
+    axes=tuple(Axis(name, _components) for name in ROW_AND_COLUMN),
     state=lambda validation: f"compared with an independent engine, {validation.engine} {validation.version}",
 )

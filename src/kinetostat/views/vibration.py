@@ -5,7 +5,7 @@ from typing import Any
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
-from kinetostat.display import Display, number
+from kinetostat.display import DASH, Display, number
 from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.attribution import ranking_of
@@ -152,7 +152,7 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTabl
 
 def percent(share: float) -> str:
     """Return a share as a number of percent, a dash where it is nothing."""
-    return f"{100.0 * share:.1f}" if abs(share) >= LEAST_PERCENT else "–"
+    return f"{100.0 * share:.1f}" if abs(share) >= LEAST_PERCENT else DASH
 
 
 def _lines(answer: Vibration) -> Lines:

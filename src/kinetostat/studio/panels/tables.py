@@ -26,9 +26,9 @@ from kinetostat.units import component_units, load_unit, motion_unit
 from kinetostat.views.analysis_tables import actuator_table, entry_unit, matrix_units
 from kinetostat.views.loaded_tables import (
     actuator_sentence,
-    leg_loads,
+    named_leg_springs,
     sag_sentence,
-    springs_of,
+    springs_or_kinds_table,
     stability_of,
     tangent_table,
 )
@@ -219,7 +219,7 @@ def loaded_text(state: LoadedState) -> str:
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
     ]
-    springs = as_table(springs_of(state, display), "")
+    springs = as_table(springs_or_kinds_table(state, display), "")
     return (
         paragraph(" ".join([state.message, sag_sentence(state), actuator_sentence(state)]).rstrip(), "lead")
         + heading("Which legs carry")
@@ -235,7 +235,7 @@ def loaded_text(state: LoadedState) -> str:
 
 def tension_bars(state: LoadedState) -> str:
     """Return a bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
-    shown = leg_loads(state)
+    shown = named_leg_springs(state)
     largest = {
         turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (False, True)
     }

@@ -25,7 +25,7 @@ from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figu
 from kinetostat.views.loaded_tables import (
     SIGNS,
     displacement_table,
-    springs_of,
+    springs_or_kinds_table,
     stability_of,
     strut_table,
     tangent_table,
@@ -141,7 +141,7 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
     yield as_table(displacements, f"{displacements.title}, with exact geometry and by linear equations; base axes.")
     yield figure_of(bars_figure(state), "What each leg carries.")
-    yield as_table(springs_of(state, display), f"Loads and deformations of the springs. {SIGNS}")
+    yield as_table(springs_or_kinds_table(state, display), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
         yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
     free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal.tolist()]

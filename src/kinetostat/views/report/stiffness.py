@@ -5,7 +5,7 @@ Nothing is computed here.
 
 import xarray as xr
 
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid import failures
@@ -156,7 +156,7 @@ def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
         values = maps[name].where(maps["status"] == int(Status.OK)).values
         if (values == values).any():
             least, most = float(maps[name].min()), float(maps[name].max())
-            ratio = number(most / least) if least > 0.0 else "–"
+            ratio = number(most / least) if least > 0.0 else DASH
             unit = maps[name].attrs["units"]
             texts = [typeset(display.number(value, unit, "free")) for value in (least, most)]
             rows.append((name.replace("_", " "), *texts, typeset(ratio), display.scale(unit).unit))

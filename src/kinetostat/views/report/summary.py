@@ -27,7 +27,7 @@ from kinetostat.units import load_unit
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.analysis_tables import first_lines, margin_sentence
 from kinetostat.views.drawing import three_views
-from kinetostat.views.loaded_tables import KINDS_OF_LOADS, actuator_loads, loaded_lines, tool_motion
+from kinetostat.views.loaded_tables import KINDS_OF_LOADS, actuator_springs, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
@@ -58,11 +58,10 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
 def _demands(answers: Answers, state: LoadedState) -> Table:
     """Return a table of the displacements and errors of a loaded machine beside the requirements of its file."""
     display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
-    moved, turned = tool_motion(state)
     across, about = (_verdicts(answers, prefix, "xyz") for prefix in ("displacement_", "displacement_r"))
     rows = [
-        ("displacement of the tool", display.show_deflection(moved, "m"), across),
-        ("rotation of the platform", display.show_deflection(turned, "rad"), about),
+        ("displacement of the tool", display.show_deflection(state.tool_displacement, "m"), across),
+        ("rotation of the platform", display.show_deflection(state.tool_rotation, "rad"), about),
         *_actuator_demands(answers, state),
     ]
     if vibration and vibration.modes:
@@ -79,7 +78,7 @@ def _demands(answers: Answers, state: LoadedState) -> Table:
 def _actuator_demands(answers: Answers, state: LoadedState) -> Iterator[tuple[str, str, str]]:
     """Give the greatest load of the actuators of each kind, beside the limit and the requirements on it."""
     for turns, kind in KINDS_OF_LOADS:
-        loads = [abs(load) for _, turning, load in actuator_loads(state) if turning is turns]
+        loads = [abs(spring.load) for spring in actuator_springs(state) if spring.turning is turns]
         if loads:
             shown = partial(answers.machine.display.show, unit=load_unit(turns))
             bound = getattr(answers.machine.tables["limits"], f"actuator_{kind}")
