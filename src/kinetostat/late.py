@@ -1,4 +1,4 @@
-"""Modules that are imported only when something in them is used, and slow habits that libraries are kept from.
+"""Modules that are imported at their first use, and slow parts of other people's libraries that are switched off.
 
 A module that most of its importers never use is named twice: to the type checker, and here.
 
@@ -43,7 +43,7 @@ def hide_array_libraries() -> None:
 def show_array_libraries(*names: str) -> None:
     """Let array libraries be imported again, where they had been hidden."""
     for name in names:
-        if sys.modules.get(name, sys) is None:
+        if name in sys.modules and sys.modules[name] is None:
             del sys.modules[name]
 
 
@@ -66,8 +66,9 @@ def postpone_glyph_names() -> None:
 def leave_out_property_lists() -> None:
     """Import Matplotlib without the lists of properties that it writes into its own documentation.
 
-    A command shows them to nobody, and to make them takes as long as to import NumPy. Where Matplotlib has been
-    imported before, or has changed, nothing happens.
+    A command shows them to nobody, and to make them takes as long as to import NumPy. Classes that Matplotlib defines
+    after this call have no list in the docstring of their `set`; those that it defined before keep theirs. It cannot be
+    undone: only a process that writes figures and ends calls it.
     """
     artist: Any = import_module("matplotlib.artist")
     artist.kwdoc = lambda _artist: ""

@@ -1,6 +1,7 @@
 """`doctor`: whether this installation is sound, and what to do where it is not. No formula lives here.
 
-Checks are printed as they are made, by Rich alone: the tables of `views` need libraries that may be broken here.
+Checks are printed as they are made, by Rich alone: the tables of `views` need libraries that may be broken here. Imports
+are inside of the functions, so that a broken library fails its own check and not the command.
 """
 
 import argparse
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 SOUNDNESS_MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
 NAME_WIDTH = 14
-"""Characters for the name of what is checked: those of the longest name, and a gap."""
+"""Characters for the name of what is checked: most have fewer, and a longer one ends in an ellipsis."""
 
 
 def add_doctor_command(commands: "Commands") -> None:
@@ -118,11 +119,11 @@ def print_checks(console: "Console", checks: "Iterable[InstallationCheck]") -> "
         line = Table.grid(padding=(0, 2, 0, 0))
         for width in (1, NAME_WIDTH, None):
             line.add_column(width=width, overflow="fold" if width is None else "ellipsis")
-        line.add_row(Text(mark, style), check.name, Text(check.detail, "" if check.state == "sound" else style))
+        line.add_row(Text(mark, style), check.name, Text(check.detail, "" if check.is_sound else style))
         if check.fix:
             line.add_row("", "", Text(f"→ {check.fix}", "cyan"))
         console.print(line)
-    failed = [check.name for check in shown if check.state == "failed"]
+    failed = [check.name for check in shown if check.is_failed]
     if failed:
         console.print(Text.assemble(("\nTo repair:", "bold red"), f" {', '.join(failed)}."))
     else:

@@ -68,6 +68,14 @@ class InstallationCheck:
     detail: str
     fix: str = ""
 
+    @property
+    def is_sound(self) -> bool:
+        return self.state is Soundness.SOUND
+
+    @property
+    def is_failed(self) -> bool:
+        return self.state is Soundness.FAILED
+
 
 Checks: TypeAlias = Callable[[], Iterator[InstallationCheck]]
 """A function that makes checks one by one."""
@@ -115,7 +123,7 @@ def diagnose(parts: Mapping[str, Checks]) -> Iterator[InstallationCheck]:
 
 def healthy(checks: Sequence[InstallationCheck]) -> bool:
     """Whether none of the checks has failed."""
-    return all(check.state is not Soundness.FAILED for check in checks)
+    return not any(check.is_failed for check in checks)
 
 
 def as_json(checks: Sequence[InstallationCheck]) -> dict[str, Any]:

@@ -136,19 +136,10 @@ class LoadedState(AnswerInState):
         return len(self.displacement) > 0
 
     @property
-    def tool_displacement(self) -> float:
-        """How far the loads move the tool point, m."""
-        return math.hypot(*self.displacement[self._rotations :])
-
-    @property
-    def tool_rotation(self) -> float:
-        """How far the loads turn the platform, rad."""
-        return math.hypot(*self.displacement[: self._rotations])
-
-    @property
-    def _rotations(self) -> int:
-        """Number of the components that are rotations, which come first."""
-        return sum(name.startswith("r") for name in self.components)
+    def tool_motion(self) -> tuple[float, float]:
+        """The displacement of the tool point, m, and the rotation of the platform, rad, that the loads cause."""
+        rotations = sum(name.startswith("r") for name in self.components)
+        return math.hypot(*self.displacement[rotations:]), math.hypot(*self.displacement[:rotations])
 
     @property
     def limit_use(self) -> float | None:

@@ -18,10 +18,10 @@ Result = TypeVar("Result")
 
 WORKERS = 4
 """Threads for all pages: Python computes one thing at a time, so more of them would only delay the event loop."""
-SHARE = 2
+THREADS_PER_PAGE = 2
 """Threads that one page may use at a time, so that a page with a slow machine leaves some to the others."""
 PATIENCE = 0.3
-"""Seconds for which a computation may take without a word: below it a word would only flicker."""
+"""Seconds that a computation may take before the page says that it is busy: a message for less would only flicker."""
 
 log = logging.getLogger("kinetostat")
 
@@ -39,7 +39,8 @@ class Lane(Generic[Request, Result]):
         """Create an idle lane of the page that is being built.
 
         Args:
-            work: computes the result of a request, in a thread; it must not touch the page.
+            work: computes the result of a request, in a thread, or None if there is nothing to show; it must not touch
+                the page.
             deliver: shows the result, on the event loop.
             failed: says on the page that `work` has raised an exception; by default the page's exception handler.
             slow: says on the page that `work` takes longer than people wait without a word.
@@ -53,9 +54,11 @@ class Lane(Generic[Request, Result]):
         self._open = True
 
     def ask(self, request: Request) -> None:
-        """Compute this request next, in the place of the one that is waiting."""
+        """Compute this request next, in the place of the one that is waiting; a page that is gone asks in vain."""
+        if not self._open:
+            return
         self._waiting = [request]
-        if not self.busy and self._open:
+        if not self.busy:
             self.busy = True
             background_tasks.create(self._run(), name="studio lane")
 
@@ -105,7 +108,7 @@ def _shares() -> "WeakKeyDictionary[Client, asyncio.Semaphore]":
 
 def _share(page: Client) -> asyncio.Semaphore:
     """Return the semaphore that limits the threads of a page."""
-    return _shares().setdefault(page, asyncio.Semaphore(SHARE))
+    return _shares().setdefault(page, asyncio.Semaphore(THREADS_PER_PAGE))
 
 
 @cache

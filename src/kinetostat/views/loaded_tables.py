@@ -68,7 +68,7 @@ def loaded_lines(state: LoadedState) -> Lines:
 def sag_sentence(state: LoadedState) -> str:
     """Say how far the loads move and turn the tool."""
     show = state.machine.display.show_deflection
-    moved, turned = show(state.tool_displacement, "m"), show(state.tool_rotation, "rad")
+    moved, turned = map(show, state.tool_motion, ("m", "rad"))
     return f"The loads move the {state.machine.reference} by {moved} and turn it by {turned}."
 
 

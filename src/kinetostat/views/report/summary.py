@@ -58,10 +58,11 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
 def _demands(answers: Answers, state: LoadedState) -> Table:
     """Return a table of the displacements and errors of a loaded machine beside the requirements of its file."""
     display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
+    moved, turned = state.tool_motion
     across, about = (_verdicts(answers, prefix, "xyz") for prefix in ("displacement_", "displacement_r"))
     rows = [
-        ("displacement of the tool", display.show_deflection(state.tool_displacement, "m"), across),
-        ("rotation of the platform", display.show_deflection(state.tool_rotation, "rad"), about),
+        ("displacement of the tool", display.show_deflection(moved, "m"), across),
+        ("rotation of the platform", display.show_deflection(turned, "rad"), about),
         *_actuator_demands(answers, state),
     ]
     if vibration and vibration.modes:
