@@ -37,7 +37,7 @@ LONGEST_STAGE = 0.2
 NEARLY_CLOSED_STEP = 1e-2
 """The same on the way there, where the next stage starts from."""
 MOST_CLOSING_STEPS = 40
-"""Of Newton's method: errors are small, so that a few steps suffice where there is a solution."""
+"""Most steps of Newton's method: errors are small, so that a few suffice where there is a solution."""
 MOST_STAGES = 8
 """Steps on the way from the home place to a pose."""
 

@@ -52,7 +52,7 @@ class Measures:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all, rows first."""
+        """Names of all components, those of the rows first."""
         return (*self.rows, *self.lengths)
 
     def linear(self, twists: Array) -> Array:

@@ -1,7 +1,7 @@
 """`doctor`: whether this installation is sound, and what to do where it is not. No formula lives here.
 
-Checks are printed as they are made, by Rich alone: the tables of `views` need libraries that may be broken here. Imports
-are inside of the functions, so that a broken library fails its own check and not the command.
+Checks are printed as they are made, by Rich alone: the tables of `views` need libraries that may be broken here.
+Imports are inside of the functions, so that a broken library fails its own check and not the command.
 """
 
 import argparse

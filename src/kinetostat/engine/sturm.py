@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from kinetostat.engine.loops import LoopCode, Value
 
 HALVINGS = 50
-"""Of the interval from zero to a bound of the largest eigenvalue, after which it is as long as round-off."""
+"""Halvings of the interval from zero to a bound of the largest eigenvalue: it is then as long as round-off."""
 TOGETHER = 6
 """Sturm sequences that are computed together, because each of their sums waits for the one before."""
 APART = 1.0 + math.sqrt(2.0) / 100.0

@@ -315,7 +315,7 @@ def _same_freedom(first: Joint, second: Joint) -> bool:
 
 
 def _with_universal(joints: list[dict[str, Any]]) -> None:
-    """Of two ball joints with a strut between them the first becomes universal, so that the strut cannot spin."""
+    """Make the first of two ball joints with a strut between them universal, so that the strut cannot spin."""
     balls = [i for i, joint in enumerate(joints) if joint["type"] == "spherical"]
     for first, second in pairwise(balls):
         if all(joint["type"] == "prismatic" for joint in joints[first + 1 : second]):

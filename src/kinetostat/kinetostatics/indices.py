@@ -187,7 +187,7 @@ def guided_stiffness_along(
 
 
 def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int], Array]]:
-    """Of each block that exists: name, its rows, the other block's rows, and base axes of its rows [n x 3]."""
+    """Return of each block that exists name, rows, the other block's rows, and base axes of its rows [n x 3]."""
     turns = [i for i, c in enumerate(components) if c < 3]
     moves = [i for i, c in enumerate(components) if c >= 3]
     axes = np.eye(3)[[c % 3 for c in components]]

@@ -367,7 +367,7 @@ class Machine(Immutable):
 
     @property
     def named_loads(self) -> list[tuple[Vector, Wrench]]:
-        """Of each table [load.NAME], its point from P in platform axes (m), and its wrench there, base axes."""
+        """Point of each table [load.NAME], from P in platform axes (m), and its wrench there, base axes."""
         tables = [self.tables[f"load.{name}"] for name in self.family.loads]
         return [(Vector(*table.point), _wrench(table)) for table in tables]
 

@@ -70,7 +70,7 @@ LEAST_NAMED_SHARE = 0.005
 ROUND_OFF_SHARE = 1e-9
 """Share of an error below which a part of it is round-off."""
 DRAWN_DIGITS = 3
-"""Of errors of the tool: percentiles of drawn machines have no more."""
+"""Digits of errors of the tool: percentiles of drawn machines have no more."""
 
 
 @dataclass(frozen=True, eq=False)

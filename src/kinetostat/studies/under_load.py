@@ -149,7 +149,7 @@ class LoadedState(AnswerInState):
 
     @property
     def softest(self) -> dict[str, Softest]:
-        """Of "translation" and "rotation", the direction in which further loads meet the least stiffness.
+        """Direction in which further loads meet the least stiffness, of "translation" and of "rotation".
 
         What makes it soft are the shares of the parts in the compliance that springs alone have along this direction
         at the unloaded pose; none where they do not hold the machine.

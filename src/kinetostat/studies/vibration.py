@@ -66,7 +66,7 @@ WIDE = 6.0
 LEAST_DRAWN_RATIO = 1e-4
 """Damping ratio below which frequencies about a mode lie as those of this one: no picture shows a sharper peak."""
 HIGHEST = 1e20
-"""Of frequencies, Hz: its square is still a number."""
+"""Highest frequency, Hz: its square is still a number."""
 BELOW, ABOVE = 0.2, 1.6
 """Range of the curves as multiples of the lowest and of the highest frequency that is drawn."""
 

@@ -21,7 +21,7 @@ from kinetostat.views.scene.anatomy import anatomy
 
 MOVES, TURNS = ("x", "y", "z"), ("rx", "ry", "rz")
 PLATFORM, BASE, HEAD = "platform", "base", "head"
-"""Of what a handle is: the whole platform, a joint on the base, or a joint on the platform."""
+"""Kinds of handles: of the whole platform, of a joint on the base, or of a joint on the platform."""
 HOLD = 0.03
 """Weight of what should stay (the orientation under a push, the place under a turn) against what is pulled."""
 LEAST_FOLLOWED, MOST_ASIDE = 0.5, 5.0

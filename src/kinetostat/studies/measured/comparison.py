@@ -34,7 +34,7 @@ from kinetostat.tolerances import LEAST_DIVISOR
 GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
 """Groups of errors that leave the compliance of a machine at its pose as it is: they only move it."""
 GEOMETRY_STEP = 1e-5
-"""Of differences by errors of geometry, rad or in units of the machine's length: what they leave out is its square."""
+"""Step of differences by errors of geometry, rad or in units of the machine's length; its square is their error."""
 SAME_COMPLIANCE = 1e-9
 """Share by which a machine that is placed as built may differ from the drawn one, without any error."""
 COVERAGE_FACTOR = 2.0
@@ -352,7 +352,7 @@ class _Entry:
         return entry if self.matrix == "compliance" else 1.0 / entry
 
     def changes(self, changes: Array) -> Array:
-        """Of the number by changes of the compliance [6 x 6 x p], to first order [p], theory (71)."""
+        """Changes of the number by those of the compliance [6 x 6 x p], to first order [p], theory (71)."""
         if self.matrix == "deflection":
             return np.asarray(self.load @ changes[self.i])
         if self.matrix == "stiffness":

@@ -114,7 +114,7 @@ class Problem(Immutable):
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Of all objectives, then of all constraints."""
+        """Terms of all objectives, then those of all constraints."""
         return *(item.term for item in self.objectives), *(item.term for item in self.constraints)
 
     @property

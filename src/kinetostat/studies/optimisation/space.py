@@ -67,7 +67,7 @@ class Variable:
 
     @property
     def quantity(self) -> Quantity:
-        """Of its first field."""
+        """Quantity of its first field."""
         return self.fields[0].quantity
 
     @property

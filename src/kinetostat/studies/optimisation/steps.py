@@ -48,9 +48,9 @@ CROSSED = 0.9
 GENE_CROSSED = 0.5
 """Share of the genes of a couple that are crossed."""
 CROSSOVER_INDEX = 15.0
-"""Of simulated binary crossover: the larger, the nearer children are to their parents."""
+"""Index of simulated binary crossover: the larger, the nearer children are to their parents."""
 MUTATION_INDEX = 20.0
-"""Of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
+"""Index of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
 ATTEMPTS = 20
 """Times that couples are mated to replace children that exist already."""
 
@@ -180,7 +180,7 @@ def _new(fresh: Array, known: Array) -> Integers:
 
 
 ITERATIONS = 100
-"""Of one descent."""
+"""Most iterations of one descent."""
 PRECISION, PRECISION_WITH_KINKS = 1e-13, 1e-9
 """Relative change of the objective at which a descent ends, without and with kinks: along the bottom of a curved one
 it would creep for thousands of steps."""

@@ -63,7 +63,7 @@ FREE_AXES = (0, 1, 3, 5)
 HELD_AXES = (2, 4)
 """Components that it holds: rz, y."""
 LINK_LENGTHS = (0.64, 0.68, 0.72)
-"""Of the passive links, m: the reference design and 4 cm to either side."""
+"""Lengths of the passive links, m: the reference design and 4 cm to either side."""
 NEARLY_ALL = 0.99
 """Share of a stiffness that counts as nearly all of it; ours, the paper gives none."""
 NEGLIGIBLE_COEFFICIENT = 1e-12
