@@ -155,7 +155,7 @@ def test_fourteen_numbers_of_exact_printers_leave_residuals_of_the_noise(machine
         truth = somewhere(draw, wide=True)
         places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
         heights = [reached(commanded(place), truth, place)[2] for place in places]
-        observed = replace(base.observed, value=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
+        observed = replace(base.observed, measured=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
         fit = best_fit(observed, observed.row_poses, wishes)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
         inside += (np.abs(fit.values - true_values(base, truth)) <= fit.half_intervals).tolist()
@@ -208,7 +208,7 @@ def test_each_error_moves_the_nozzle_as_the_kinematics_of_the_tests_say(machine,
     truth = replace(Truth(), **{named: sizes.get(named, np.array([2e-5, -1e-5, 0.0]))})
     places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
     heights = np.array([reached(commanded(place), truth, place)[2] for place in places])
-    left = replace(base.observed, value=heights).residuals(true_values(base, truth))
+    left = replace(base.observed, measured=heights).residuals(true_values(base, truth))
     assert np.abs(heights).max() > 1e-7
     assert left == pytest.approx(np.zeros(10), abs=1e-9 / NOISE)  # a nanometre, of the second order
 
