@@ -1,6 +1,7 @@
 """Machines and answers in a notebook: the terminal's tables as HTML, with a picture. Nothing is computed here.
 
-Colours are the page's own, so that light and dark pages read alike; nothing is fetched from elsewhere.
+Texts have the page's own colour; those of verdicts are readable on light and dark ground, and figures keep a white one.
+Nothing is fetched from elsewhere.
 """
 
 import base64
@@ -47,8 +48,11 @@ CSS = """
 .kinetostat img.figure{background:#fff;border-radius:6px;padding:4px}
 .kinetostat summary{cursor:pointer;opacity:.75;margin:.4em 0}
 """.strip()
+"""Style of the pieces. Notebooks give stripes to tables, and a ground to the row under the pointer: the rule on `tr`
+takes both away."""
 CLASSES = {"green": "good", "red": "bad", "yellow": "warn"}
 """Classes of the style sheet by the terminal's colours."""
+_PLAIN = Console(file=io.StringIO(), width=LINE_LENGTH)
 
 
 def html_of(answer: object) -> str:
@@ -102,14 +106,17 @@ class _HtmlConsole(Console):
         self._line = ""
 
     def print(self, *objects: Any, end: str = "\n", style: str | Style | None = None, **_: Any) -> None:
-        """Keep what `Console` would print; texts without `end` are parts of the line that follows."""
+        """Keep what `Console` would print; texts without `end` are parts of the line that follows.
+
+        A page has its own layout: other arguments (`justify`, `overflow`, ...) are ignored, and blank lines left out.
+        """
         for printed in objects:
             content = printed.renderable if isinstance(printed, Padding) else printed
             if isinstance(content, Table):
                 self.parts.append(_table(content))
             else:
                 self._line += _html_with_style(_text(content), style)
-        if end == "\n" and self._line.strip():
+        if end == "\n":
             self.parts += [f"<p>{line}</p>" for line in self._line.split("\n") if line.strip()]
             self._line = ""
 
@@ -120,8 +127,7 @@ def _text(content: object) -> Text:
 
 def _html_with_style(text: Text, style: str | Style | None = None) -> str:
     """Return a text as HTML: each part in its own style, and all of it in a further one."""
-    plain = Console(file=io.StringIO(), width=LINE_LENGTH)
-    parts = [_styled_html(escape(part.text), part.style) for part in text.render(plain)]
+    parts = [_styled_html(escape(part.text), part.style) for part in text.render(_PLAIN)]
     return _styled_html("".join(parts), Style.parse(style) if isinstance(style, str) else style)
 
 

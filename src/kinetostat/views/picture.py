@@ -30,7 +30,7 @@ from kinetostat.views.rendering.light import (
     veil_over,
 )
 from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
+from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene, Solid
 
 Theme: TypeAlias = Literal["light", "dark"]
 
@@ -45,6 +45,11 @@ UNSHADOWED = frozenset(("springs", "frames", "directions", "ellipsoids", "deflec
 FONT = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans-Bold.ttf"
 LETTERS, SMALLEST_LETTERS = 0.017, 9
 """Height of letters as a share of the picture's shorter side, and at least, pixels."""
+DISC_RADIUS, DISC_MARGIN = 0.95, 0.45
+"""Radius of the disc below the number of a leg, and room beside a long number, as shares of the height of letters: two
+digits fit into a round disc."""
+LETTERS_PER_RIM, LETTERS_PER_HALO = 14, 8
+"""Widths of a disc's rim, and of the halo of a letter of a frame, that make up the height of letters."""
 INK, DISC, RIM = (20, 28, 38, 255), (255, 255, 255, 235), (120, 132, 146, 255)
 """Colours of letters, of the disc below the number of a leg, and of its rim."""
 
@@ -74,8 +79,8 @@ class Paper:
 
 
 PAPERS: dict[str, Paper] = {
-    "light": Paper((1.0, 1.0, 1.0), (0.55, 0.6, 0.66), 0.5, 0.55, 1.0),
-    "dark": Paper((0.094, 0.118, 0.153), (0.47, 0.54, 0.62), 0.62, 0.45, 0.86),
+    "light": Paper(color=(1.0, 1.0, 1.0), ink=(0.55, 0.6, 0.66), shadow=0.5, grid=0.55, brightness=1.0),
+    "dark": Paper(color=(0.094, 0.118, 0.153), ink=(0.47, 0.54, 0.62), shadow=0.62, grid=0.45, brightness=0.86),
 }
 
 
@@ -128,21 +133,26 @@ def picture(
     if not solids:
         raise InputError(f"hidden leaves nothing to draw; hide fewer of {', '.join(LAYERS)}.")
     opaque_solids = [solid for solid in solids if LOOKS[solid.material].opacity == 1.0]
-    translucent = [[s for s in solids if s.material == m] for m, look in LOOKS.items() if look.opacity < 1.0]
-    bodies = [Triangles(opaque_solids), *(Triangles(group) for group in translucent if group)]
+    bodies = _bodies_of(solids, opaque_solids)
     points = np.concatenate([body.points for body in bodies])
     camera = camera_on(points, _direction(view), *size)
-    layers = [hits_of(body, camera, SAMPLES_PER_SIDE) for body in bodies]
+    hits = [hits_of(body, camera, SAMPLES_PER_SIDE) for body in bodies]
     foot = np.array([*scene.centre.components()[:2], scene.floor], dtype=float)
     ground = Ground(foot, scene.size, min(LARGEST_GROUND_MAP, max(size) // 2))
     casters = Triangles([solid for solid in opaque_solids if solid.layer not in UNSHADOWED])
-    *lights, on_ground = _lights(layers, ground, casters, max(size))
-    machine = _solids_seen(layers, lights, camera, paper.brightness)
+    *lights, on_ground = _lights(hits, ground, casters, max(size))
+    machine = _solids_seen(hits, lights, camera, paper.brightness)
     image = Image.fromarray(_pixels(machine, *veil_over(ground, on_ground, camera), paper, transparent))
     _draw_labels(image, [label for label in scene.labels if label.layer not in hidden], camera)
     stream = io.BytesIO()
     (image if transparent else image.convert("RGB")).save(stream, "PNG")
     return Picture(stream.getvalue())
+
+
+def _bodies_of(solids: Sequence[Solid], opaque: Sequence[Solid]) -> list[Triangles]:
+    """Return the opaque solids as one body, which hides others, then those of each translucent material as one."""
+    translucent = [[s for s in solids if s.material == m] for m, look in LOOKS.items() if look.opacity < 1.0]
+    return [Triangles(opaque), *(Triangles(group) for group in translucent if group)]
 
 
 def _check_size(size: tuple[int, int]) -> None:
@@ -160,30 +170,30 @@ def _direction(view: str | Sequence[float]) -> Sequence[float]:
     return view
 
 
-def _lights(layers: Sequence[Hits], ground: Ground, casters: Triangles, detail: int) -> list[Light]:
-    """The light on the samples of each layer, and on the ground; computed together, so that lamps are set up once."""
-    ends = np.cumsum([len(layer.points) for layer in layers])
-    points = np.concatenate([*(layer.points for layer in layers), ground.points])
+def _lights(hits: Sequence[Hits], ground: Ground, casters: Triangles, detail: int) -> list[Light]:
+    """The light on the samples of each body, and on the ground; computed together, so that lamps are set up once."""
+    ends = np.cumsum([len(body.points) for body in hits])
+    points = np.concatenate([*(body.points for body in hits), ground.points])
     up = np.broadcast_to((0.0, 0.0, 1.0), (len(points) - ends[-1], 3))
-    light = light_on(points, np.concatenate([*(layer.normals for layer in layers), up]), casters, detail)
+    light = light_on(points, np.concatenate([*(body.normals for body in hits), up]), casters, detail)
     parts = [np.split(values, ends) for values in (light.sun, light.sky, light.openness)]
     return [Light(*part) for part in zip(*parts, strict=True)]
 
 
-def _solids_seen(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
+def _solids_seen(hits: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
     """Return the solids as the camera sees them [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
 
-    The opaque layer comes first; translucent ones are laid over it where nothing opaque hides them.
+    The opaque body comes first; translucent ones are laid over it where nothing opaque hides them.
     """
     opacities = np.array([[look.opacity] for look in LOOKS.values()], dtype=np.float32)
     canvas = np.zeros((camera.height * camera.width * SAMPLES_PER_SIDE**2, 4), dtype=np.float32)
-    for layer, light in zip(layers, lights, strict=True):
-        color = srgb_of(np.minimum(brightness * shaded_colors(layer.look, layer.normals, layer.to_eye, light), 1.0))
-        opacity = opacities[layer.look]
-        ahead = layer.nearness[layer.pixel] >= layers[0].nearness[layer.pixel]
-        at, sample = layer.pixel[ahead], layer.sample[ahead]
-        canvas[at] *= 1.0 - opacity[sample]
-        canvas[at] += np.concatenate([color, np.ones_like(opacity)], axis=1)[sample] * opacity[sample]
+    for body, light in zip(hits, lights, strict=True):
+        color = srgb_of(np.minimum(brightness * shaded_colors(body.look, body.normals, body.to_eye, light), 1.0))
+        opacity = opacities[body.look]
+        ahead = body.nearness[body.pixel] >= hits[0].nearness[body.pixel]
+        pixel, sample = body.pixel[ahead], body.sample[ahead]
+        canvas[pixel] *= 1.0 - opacity[sample]
+        canvas[pixel] += np.concatenate([color, np.ones_like(opacity)], axis=1)[sample] * opacity[sample]
     finer = canvas.reshape(camera.height, SAMPLES_PER_SIDE, camera.width, SAMPLES_PER_SIDE, 4)
     summed = np.add.reduce([finer[:, y, :, x] for y in range(SAMPLES_PER_SIDE) for x in range(SAMPLES_PER_SIDE)])
     return summed / np.float32(SAMPLES_PER_SIDE**2)
@@ -211,9 +221,11 @@ def _draw_labels(image: Image.Image, labels: Sequence[Label], camera: Camera) ->
     places, _ = camera.project(np.array([label.point.components() for label in labels], dtype=float))
     for label, (x, y) in zip(labels, places.tolist(), strict=True):
         if label.layer == "labels":
-            half = max(0.5 * pen.textlength(label.text, font) + 0.45 * size, 0.95 * size)
-            box = (x - half, y - 0.95 * size, x + half, y + 0.95 * size)
-            pen.rounded_rectangle(box, 0.95 * size, fill=DISC, outline=RIM, width=max(1, size // 14))
+            radius = DISC_RADIUS * size
+            half = max(0.5 * pen.textlength(label.text, font) + DISC_MARGIN * size, radius)
+            box, rim = (x - half, y - radius, x + half, y + radius), max(1, size // LETTERS_PER_RIM)
+            pen.rounded_rectangle(box, radius, fill=DISC, outline=RIM, width=rim)
             pen.text((x, y), label.text, INK, font, anchor="mm")
         else:
-            pen.text((x, y), label.text, INK, font, anchor="mm", stroke_width=max(1, size // 8), stroke_fill=DISC)
+            halo = max(1, size // LETTERS_PER_HALO)
+            pen.text((x, y), label.text, INK, font, anchor="mm", stroke_width=halo, stroke_fill=DISC)

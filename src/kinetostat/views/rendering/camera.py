@@ -1,15 +1,17 @@
 """The perspective camera: its place, the pixels to which it projects points, and the solids that it sees in each pixel.
 
-Nothing here knows light or colours. The same rasteriser serves the camera and the shadow maps of the lamps.
+Nothing here knows light or colours.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from kinetostat.arrays import Array, Float32s, Integers
 from kinetostat.frozen import dataclass
+from kinetostat.views.rendering.rasteriser import CHUNK_PIXELS, LAST, NEXT, nearest_triangles
 from kinetostat.views.scene.mesh import placed_mesh
 from kinetostat.views.scene.solids import LOOKS, Solid
 
@@ -19,13 +21,15 @@ VIEWPOINTS = {
     "side": (1.0, 0.0, 0.02),
     "top": (0.0, -0.02, 1.0),
 }
-"""Direction from the machine to the camera, base axes."""
+"""Direction from the machine to the camera, base axes; those along an axis are a little tilted, so that flat parts show
+a second side."""
 FIELD_OF_VIEW = math.radians(32.0)
 """Angle of view across the picture's shorter side: that of a moderate telephoto lens, which bends no parallels."""
 EMPTY_MARGIN = 0.07
 """Share of the picture that stays empty on each side, so that nothing touches its edge."""
 FITTING_STEPS = 12
-"""Number of times the camera is moved until the machine fills the picture."""
+"""Number of times the camera is moved until the machine fills the picture. Each leaves a fifth of the error: six leave a
+hundredth of a pixel for usual machines, and the others are for very long or flat ones."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +100,6 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
 
 LIKE_NORMALS = 0.97
 """Cosine between normals above which samples of one pixel on one solid share their shading."""
-CHUNK_PIXELS = 1_000_000
-"""Pixels that are worked on together: some hundred megabytes at a time, however large the picture is."""
-NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""The two corners of a triangle that lie opposite each corner."""
 
 
 class Triangles:
@@ -123,6 +123,13 @@ class Triangles:
         self.solid = np.repeat(np.arange(len(solids)), counts)
         self.look = np.repeat(np.array([names.index(s.material) for s in solids], dtype=np.int64), counts)
 
+    @cached_property
+    def edges(self) -> tuple[Array, Array]:
+        """Start of the edge opposite each corner, m, and the vector on that edge that points inwards [m x 3 x 3]."""
+        corners = self.points[self.triangles]
+        opposite = corners[:, LAST] - corners[:, NEXT]
+        return corners[:, NEXT], np.cross(np.cross(opposite[:, 0], opposite[:, 1])[:, None], opposite)
+
 
 @dataclass(frozen=True)
 class Hits:
@@ -145,13 +152,13 @@ class Hits:
     look: Integers
 
 
-def hits_of(body: Triangles, camera: Camera, finer: int) -> Hits:
-    """Find the points of a body that a camera sees, in `finer` times as many pixels across and down.
+def hits_of(body: Triangles, camera: Camera, samples_per_side: int) -> Hits:
+    """Find the points of a body that a camera sees, with so many samples of a pixel across and down.
 
-    The finer pixels smooth the edges. Light is costly, so those that lie within one pixel of the picture, on the same
-    solid and with like normals, share one sample.
+    The pixels of this finer picture smooth the edges. Light is costly, so those that lie within one pixel of the
+    picture, on the same solid and with like normals, share one sample.
     """
-    fine = camera.with_finer_pixels(finer)
+    fine = camera.with_finer_pixels(samples_per_side)
     near, triangle = nearest_triangles(*fine.project(body.points), body.triangles, fine.width, fine.height)
     pixel = np.flatnonzero(triangle >= 0)
     met = triangle[pixel]
@@ -159,7 +166,7 @@ def hits_of(body: Triangles, camera: Camera, finer: int) -> Hits:
     for start in range(0, len(pixel), CHUNK_PIXELS):
         part = slice(start, start + CHUNK_PIXELS)
         normals[part] = normals_at(body, met[part], _points(fine, near, pixel[part])[0])
-    owner = _owners(pixel, body.solid[met], normals, fine.width, finer)
+    owner = _owners(pixel, body.solid[met], normals, fine.width, samples_per_side)
     chosen, sample = np.unique(owner, return_inverse=True)
     points, rays = _points(fine, near, pixel[chosen])
     to_eye = -rays / np.linalg.norm(rays, axis=1, keepdims=True)
@@ -182,10 +189,8 @@ def normals_at(body: Triangles, triangle: Integers, points: Array) -> Array:
     The weight of a corner is the area of the triangle between the point and the other two corners. In space that holds
     as it is; on the picture it would have to be corrected for perspective.
     """
-    corners = body.points[body.triangles]
-    opposite = corners[:, LAST] - corners[:, NEXT]
-    inward = np.cross(np.cross(opposite[:, 0], opposite[:, 1])[:, None], opposite)
-    weights = np.einsum("nij,nij->ni", inward[triangle], points[:, None] - corners[:, NEXT][triangle])
+    ends, inward = body.edges
+    weights = np.einsum("nij,nij->ni", inward[triangle], points[:, None] - ends[triangle])
     mixed = np.einsum("ni,nij->nj", weights, body.normals[body.triangles[triangle]])
     size: Array = np.linalg.norm(mixed, axis=1, keepdims=True)
     return mixed / np.where(size > 0.0, size, 1.0)
@@ -198,69 +203,3 @@ def _owners(pixel: Integers, solid: Integers, normals: Float32s, width: int, fin
     alike = (pixel[first] == corner) & (solid[first] == solid)
     alike &= np.einsum("ij,ij->i", normals[first], normals) > LIKE_NORMALS
     return np.where(alike, first, np.arange(len(pixel)))
-
-
-def nearest_triangles(
-    pixels: Array, nearness: Array, triangles: Integers, width: int, height: int
-) -> tuple[Float32s, Integers]:
-    """Find the nearest triangle in each pixel [height * width]: its nearness and number, 0 and -1 where there is none.
-
-    Args:
-        pixels: the places of all points [n x 2], from the upper left corner.
-        nearness: the nearness of all points [n], positive, greater is nearer: linear on the picture of every plane.
-        triangles: [m x 3] numbers of points, counter-clockwise as seen by the viewer; others are not seen.
-        width, height: the size of the picture.
-    """
-    best = np.zeros(width * height, dtype=np.uint64)
-    for pixel, near, triangle in _fragments(pixels, nearness, triangles, width, height):
-        # Positive floats sort like integers: nearness in the upper half and number in the lower make one maximum.
-        order = near.astype(np.float32).view(np.uint32).astype(np.uint64)
-        np.maximum.at(best, pixel, order << np.uint64(32) | (triangle + 1).astype(np.uint64))
-    number = (best & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
-    return (best >> np.uint64(32)).astype(np.uint32).view(np.float32), number
-
-
-def _fragments(
-    pixels: Array, nearness: Array, triangles: Integers, width: int, height: int
-) -> Iterator[tuple[Integers, Array, Integers]]:
-    """Generate pixels, their nearness and their triangle, a pixel as often as triangles cover it, some at a time.
-
-    Every triangle is cut into rows, and every row into pixels: long thin triangles have few pixels in a large box.
-    """
-    x, y = pixels[triangles.T].transpose(2, 0, 1)
-    area = (y[1] - y[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (y[2] - y[0])
-    first = np.clip(np.ceil(y.min(axis=0) - 0.5), 0, height).astype(np.int64)
-    last = np.clip(np.floor(y.max(axis=0) - 0.5), -1, height - 1).astype(np.int64)
-    kept = np.flatnonzero((last >= first) & (area > 0.0))
-    x, y, area, first, rows = x[:, kept], y[:, kept], area[kept], first[kept], (last - first + 1)[kept]
-    # The line opposite each corner: a x + b y + c is positive inside, and the share of the corner there times the area.
-    lines = np.stack([y[LAST] - y[NEXT], x[NEXT] - x[LAST], x[LAST] * y[NEXT] - x[NEXT] * y[LAST]])
-    plane = np.einsum("kim,im->km", lines, nearness[triangles[kept].T] / area)
-    sizes = np.cumsum(rows + 0.5 * area)
-    for chosen in np.split(np.arange(len(kept)), np.flatnonzero(np.diff(sizes // CHUNK_PIXELS)) + 1):
-        triangle, row = _runs(chosen, first[chosen], rows[chosen])
-        left, right = _spans(lines[:, :, triangle], row, width)
-        at, column = _runs(np.arange(len(triangle)), left, np.maximum(right - left + 1, 0))
-        triangle, row = triangle[at], row[at]
-        across, down, rest = plane[:, triangle]
-        yield row * width + column, across * (column + 0.5) + down * (row + 0.5) + rest, kept[triangle]
-
-
-def _runs(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integers, Integers]:
-    """Repeat each owner as often as it counts, with start, start + 1, ... beside it."""
-    total = np.cumsum(counts)
-    offsets = np.arange(total[-1] if len(total) else 0) - np.repeat(total - counts, counts)
-    return np.repeat(owners, counts), np.repeat(starts, counts) + offsets
-
-
-def _spans(lines: Array, row: Integers, width: int) -> tuple[Integers, Integers]:
-    """First and last pixel of triangles in rows; there is none where the last is before the first."""
-    slope, rest = lines[0], lines[1] * (row + 0.5) + lines[2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = -rest / slope
-    low = np.where(slope > 0.0, crossing, -np.inf).max(axis=0)
-    high = np.where(slope < 0.0, crossing, np.inf).min(axis=0)
-    high = np.where(np.any((slope == 0.0) & (rest < 0.0), axis=0), -np.inf, high)
-    left = np.ceil(np.clip(low - 0.5, 0.0, width)).astype(np.int64)
-    right = np.floor(np.clip(high - 0.5, -1.0, width - 1.0)).astype(np.int64)
-    return left, right

@@ -16,7 +16,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from kinetostat.arrays import Array, Float32s, Integers, Mask
 from kinetostat.engine.batch import available_cores
 from kinetostat.frozen import dataclass
-from kinetostat.views.rendering.camera import Camera, Triangles, axes_towards, nearest_triangles
+from kinetostat.views.rendering.camera import Camera, Triangles, axes_towards
+from kinetostat.views.rendering.rasteriser import nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear
 
 Lamp: TypeAlias = tuple[Float32s, Callable[[Float32s, Float32s], Mask]]
