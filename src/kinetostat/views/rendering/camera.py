@@ -28,8 +28,8 @@ FIELD_OF_VIEW = math.radians(32.0)
 EMPTY_MARGIN = 0.07
 """Share of the picture that stays empty on each side, so that nothing touches its edge."""
 FITTING_STEPS = 12
-"""Number of times the camera is moved until the machine fills the picture. Each leaves a fifth of the error: six leave a
-hundredth of a pixel for usual machines, and the others are for very long or flat ones."""
+"""Number of times the camera is moved until the machine fills the picture. Each leaves a fifth of the error: six leave
+a hundredth of a pixel for usual machines, and the others are for very long or flat ones."""
 
 
 @dataclass(frozen=True)
