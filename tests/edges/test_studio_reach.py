@@ -8,7 +8,8 @@ from browser import browser, needs_chromium, served
 
 pytestmark = needs_chromium
 AUDIT = (Path(__file__).parent / "page_audit.js").read_text("utf-8")
-MODES = ("Explore", "Design")
+MODES = {"Explore": ".studio:not(.texting, .designing, .asking)", "Design": ".studio.designing"}
+"""What a page is that shows them: the server says so some time after a click."""
 PROJECTORS = ((1024, 768), (1280, 720), (1280, 800))
 """Widths and heights in pixels of the page; the second is a full HD screen at 150 %."""
 
@@ -27,6 +28,7 @@ def page(tmp_path_factory):
 
 def to(page, mode):
     page.tab.get_by_role("button", name=mode, exact=True).click()
+    page.tab.locator(MODES[mode]).first.wait_for()
     page.tab.mouse.move(0, 0)
 
 
