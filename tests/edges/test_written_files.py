@@ -13,6 +13,7 @@ from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.commands.report import REPORT_PARTS
 from kinetostat.exchange.formats import KNOWN, export
 from kinetostat.machine.loading import load
+from kinetostat.studies import storage
 from kinetostat.studies.storage import PREFIX, scratch, write_text
 from refusals import refused
 from studies import SMALL
@@ -217,6 +218,16 @@ def test_what_kill_9_leaves_is_removed_by_the_next_run_and_a_living_process_is_l
         other.communicate()
     assert (tmp_path / "file.txt").read_text() == "half"
     assert tree(tmp_path) == ["file.txt"]
+
+
+def test_on_disks_without_locks_folders_count_as_abandoned_after_a_day(tmp_path, monkeypatch):
+    monkeypatch.setattr(storage, "_lock_folder", lambda _: storage.UNLOCKED)
+    old, new = (tmp_path / f"{PREFIX}{name}" for name in ("old", "new"))
+    for folder in (old, new):
+        folder.mkdir()
+    os.utime(old, (0.0, 0.0))
+    write_text(tmp_path / "file", "text")
+    assert (old.exists(), new.exists()) == (False, True)
 
 
 def test_scratch_folders_of_one_process_do_not_disturb_each_other(tmp_path):

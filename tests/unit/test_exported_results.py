@@ -48,6 +48,13 @@ def test_the_tool_point_is_where_the_tool_is(tmp_path):
     assert np.array(rotation).T @ away == pytest.approx([0.01, 0.0, -0.08])
 
 
+def test_the_tool_point_of_a_planar_machine_lies_in_its_plane(tmp_path):
+    """K and C refer to it there, wherever the tool ends."""
+    _, path = written("planar-3rpr", "netcdf", tmp_path, "tool.offset=[0.01, 0.02, 0.3]")
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        assert dataset["tool_point"].values[2] == dataset["platform_position"].values[2]
+
+
 @pytest.mark.parametrize("name", ["zhang-gosselin-4dof", "planar-3rpr"])
 def test_csv_has_a_number_a_line_with_its_unit(name, tmp_path):
     found, path = written(name, "csv", tmp_path)

@@ -154,7 +154,8 @@ class _PencilCode:
             corner = matrix + first * (stride + 1)
             with code.loop(0, leg) as rows:
                 i = rows.index
-                # Rows before row i have 2 leg - i + 1 entries in the mean, of which the row's own i are not there.
+                # The i rows before row i have (2 leg - i + 1) / 2 entries each in the mean, and row i begins at its
+                # diagonal: entry j of it stands j - i further.
                 before = code.index("sdiv", code.index("mul", i, code.index("sub", 2 * leg - 1, i)), 2)
                 start = code.index("add", before, column)
                 with code.loop(i, leg) as columns:

@@ -118,15 +118,17 @@ def program_of(recipe: Recipe, native: bool = True) -> Runnable:
     """Return the program of a recipe, compiled or run node by node in NumPy; derivatives come after all results."""
     if native:
         with suppress(ModuleNotFoundError):  # without LLVM all runs in NumPy, fifty times as long
-            return machine_program_of(recipe)
+            return Program(_machine_code(recipe))
     formula = recipe.formula()
     return Interpreted(formula.body, formula.inputs)
 
 
-@lru_cache(PROGRAMS_KEPT)
 def machine_program_of(recipe: Recipe) -> Program:
-    """Return the machine code of a recipe; without LLVM, a ModuleNotFoundError says so."""
-    return Program(_machine_code(recipe))
+    """Return the program of a recipe as machine code; without LLVM there is none, as a ModuleNotFoundError says."""
+    program = program_of(recipe)
+    if not isinstance(program, Program):
+        raise ModuleNotFoundError("machine code needs llvmlite")
+    return program
 
 
 def _machine_code(recipe: Recipe) -> MachineCode:

@@ -82,7 +82,8 @@ class ElasticLeg:
         """The leg at some of n poses [rows]."""
         parts = {name: getattr(self, name)[rows] for name in ("stiffness", "preload", "idle", "rotors", "dampers")}
         spin = self.spin and (self.spin[0], self.spin[1][rows])
-        return replace(self, chain=self.chain.at(rows), masses=self.masses.at(rows), spin=spin, **parts)
+        rod = self.rod and (self.rod[0][rows], self.rod[1][rows])
+        return replace(self, chain=self.chain.at(rows), masses=self.masses.at(rows), spin=spin, rod=rod, **parts)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from scipy.io import savemat
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, frame_of
@@ -37,10 +36,9 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def reference_point(analysis: Analysis) -> list[float]:
-    """Return the tool point T, or P without a tool, in the base frame, m [3]."""
+    """Return the point of K and C in the base frame, m [3]: the tool point T, in the plane of a planar machine."""
     _platform_of(analysis)
-    machine = analysis.machine
-    point = machine.tool_point(state_of(machine).configuration.platform)
+    point = analysis.machine.reference_point(analysis.state.configuration)
     return [float(c) for c in point.components()]
 
 
@@ -79,7 +77,7 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "component": names,
         "spring": [contribution.spring for contribution in analysis.attribution],
         "part": ("spring", [contribution.part for contribution in analysis.attribution]),
-        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(state_of(machine).configuration)]),
+        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(analysis.state.configuration)]),
         "axis": list(AXES),
         "base_axis": list(AXES),
     }

@@ -12,7 +12,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import Display
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Spring
-from kinetostat.machine.limits import LIMITS, About, Limit, Parts, limits_set
+from kinetostat.machine.limits import About, Limit, Parts, limits_set
 from kinetostat.machine.machine import Chains, Configuration, Machine
 from kinetostat.machine.rods import driven_slides
 from kinetostat.tolerances import LIMIT_SLACK
@@ -134,13 +134,11 @@ def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]
 
 def why_beyond(checks: Sequence[Check], display: Display) -> str:
     """Return one sentence for each limit that is passed, on the part that passes it furthest; floats only."""
-    passed = ([c for c in checks if c.limit is limit and not c.kept] for limit in _limits_of(checks))
-    sentences = (_sentence(of_limit, display) for of_limit in passed)
-    return " ".join(sentence for sentence in sentences if sentence)
-
-
-def _limits_of(checks: Sequence[Check]) -> list[Limit]:
-    return [LIMITS[name] for name in dict.fromkeys(check.limit.name for check in checks if not check.kept)]
+    passed: dict[str, list[Check]] = {}
+    for check in checks:
+        if not check.kept:
+            passed.setdefault(check.limit.name, []).append(check)
+    return " ".join(_sentence(of_limit, display) for of_limit in passed.values())
 
 
 def _sentence(passed: Sequence[Check], display: Display) -> str:

@@ -65,7 +65,7 @@ def _file_model(family: str, tables: Mapping[str, type]) -> type[BaseModel]:
     """Make the model of a machine file of one family."""
     content: dict[str, Any] = {
         "schema_version": (
-            Literal[1],
+            Literal[SCHEMA_VERSION],
             Field(alias="schema", description="version of the file format", default=SCHEMA_VERSION),
         ),
         "name": (

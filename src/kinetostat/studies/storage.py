@@ -217,13 +217,12 @@ def scratch(parent: Path) -> Iterator[Path]:
 
 
 def _remove_abandoned(folder: Path) -> None:
-    if sys.platform == "win32":
+    handle = _lock_folder(folder)
+    if handle == UNLOCKED:
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > ABANDONED:
                 shutil.rmtree(folder, ignore_errors=True)
-        return
-    handle = _lock_folder(folder)
-    if handle not in (None, UNLOCKED):
+    elif handle is not None:
         shutil.rmtree(folder, ignore_errors=True)
         os.close(handle)
 

@@ -1,6 +1,6 @@
 """A path of poses that the machine follows on the page: from a CSV file, or from poses that the designer has kept.
 
-Poses are read by `studies.evaluation`; every shown pose is a pose of the session, so that all linked views follow.
+Files are read by `studies.poses`; every shown pose is a pose of the session, so that all linked views follow.
 """
 
 import tempfile

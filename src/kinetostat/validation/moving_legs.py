@@ -87,7 +87,7 @@ class LegPart:
         if isinstance(element, Beam):
             ends = moved_point(before, element.start), moved_point(before, element.end)
             return Beam(element.name, *ends, turned_direction(before, element.up), element.rigidity)
-        raise InputError(f"A {type(element).__name__} cannot be rebuilt in an independent engine.")
+        raise InputError(f"The independent engines have no {type(element).__name__}; validate the machine without one.")
 
 
 @dataclass(frozen=True)

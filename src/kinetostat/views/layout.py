@@ -26,9 +26,11 @@ def fix_layout(figure: Figure) -> None:
     if layout := figure.get_layout_engine():
         for panel in figure.axes:
             panel.get_tightbbox = _Surroundings(panel).box  # type: ignore[method-assign, assignment]
-        layout.execute(figure)
-        for panel in figure.axes:
-            del panel.get_tightbbox
+        try:
+            layout.execute(figure)
+        finally:
+            for panel in figure.axes:
+                del panel.get_tightbbox
     figure.set_layout_engine("none")
     for panel in figure.axes:
         panel.apply_aspect()
@@ -38,7 +40,8 @@ def fix_layout(figure: Figure) -> None:
 def steady_ticks(panels: Sequence[Axes]) -> Iterator[None]:
     """Let Matplotlib place and measure the numbers along axes once, while nothing moves that they depend on.
 
-    It would do so again for the edges, the labels and the axes themselves, four times for each picture.
+    It would do so again for the edges, the labels and the axes themselves, four times for each picture. Not to be
+    nested: the inner one would give the methods of the outer one back.
     """
     axes = [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)]
     replaced = [(axis, name) for axis in axes for name in MEASURING if hasattr(axis, name)]

@@ -28,7 +28,7 @@ from kinetostat.views.scene.overlays import overlays_of, swing_data
 from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, solid_data
 
 PICTURE_SIZE = (800, 560)
-"""Pixels of a picture of the machine: 150 to an inch on A4; they take a quarter of the time of a report."""
+"""Pixels of a picture of the machine: 200 to an inch of an A4 page; they take a quarter of the time of a report."""
 PICTURE_WIDTH = 0.6
 """Width of that picture as a share of the width of the text: its caption and the text around it stay on the page."""
 FULL_WIDTH = 7.4
