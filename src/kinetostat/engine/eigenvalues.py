@@ -211,7 +211,7 @@ class _PencilCode:
             share = code.mul(scale, loop.values[0])
             with code.loop(0, size) as loop:
                 moved = code.mul(share, code.load(self._mirror, loop.index))
-                code.store(code.less(code.load(start, loop.index), moved), start, loop.index)
+                code.store(code.sub(code.load(start, loop.index), moved), start, loop.index)
         for matrix in matrices:
             self._reflect(matrix, str(size), scale)
 
@@ -233,13 +233,13 @@ class _PencilCode:
             loop.after = [code.add(loop.values[0], code.mul(entry, entry))]
         square, last = loop.values[0], code.index("sub", size, 1)
         entry, length = code.load(self._mirror, last), code.call("sqrt", square)
-        negative = code.below(entry, self._zero)
-        signed = code.where(negative, code.less(self._zero, length), length)
+        negative = code.is_less(entry, self._zero)
+        signed = code.where(negative, code.sub(self._zero, length), length)
         code.store(code.add(entry, signed), self._mirror, last)
         for beyond in range(BLOCK):
             code.store(self._zero, self._mirror, code.index("add", size, beyond))
         half = code.add(square, code.mul(signed, entry))
-        positive = code.below(self._zero, half)
+        positive = code.is_less(self._zero, half)
         unit = code.number(1.0)
         return code.where(positive, code.div(unit, code.where(positive, half, unit)), self._zero), square
 
@@ -267,8 +267,8 @@ class _PencilCode:
             place = code.index("add", starts[row], column)
             entry = code.load(matrix, place)
             if turned:
-                entry = code.less(entry, code.mul(here[row][1], there[2]))
-                entry = code.less(entry, code.mul(here[row][2], there[1]))
+                entry = code.sub(entry, code.mul(here[row][1], there[2]))
+                entry = code.sub(entry, code.mul(here[row][2], there[1]))
                 code.store(entry, matrix, place)
             return entry
 
@@ -307,7 +307,7 @@ class _PencilCode:
         back = code.mul(code.mul(code.number(0.5), code.mul(scale, scale)), loop.values[0])
         with code.loop(0, size) as loop:
             mirror = code.load(self._mirror, loop.index)
-            moved = code.less(code.mul(scale, code.load(self._image, loop.index)), code.mul(back, mirror))
+            moved = code.sub(code.mul(scale, code.load(self._image, loop.index)), code.mul(back, mirror))
             code.store(moved, self._moved, loop.index)
             code.store(mirror, self._before, loop.index)
         for beyond in range(BLOCK):
@@ -331,7 +331,7 @@ class _PencilCode:
                 with code.loop(0, columns.index, [code.load(matrix, place)]) as loop:
                     left = code.load(matrix, code.index("add", start, loop.index))
                     right = code.load(matrix, code.index("add", other, loop.index))
-                    loop.after = [code.less(loop.values[0], code.mul(left, right))]
+                    loop.after = [code.sub(loop.values[0], code.mul(left, right))]
                 code.store(loop.values[0], self._image, 0)
                 inverse = code.load(self._inverses, columns.index)
                 code.store(code.mul(loop.values[0], inverse), matrix, place)
@@ -357,7 +357,7 @@ class _PencilCode:
                     above = code.index("mul", loop.index, stride)
                     solved = [code.load(self._mass, code.index("add", above, place)) for place in places]
                     loop.after = [
-                        code.less(value, code.mul(factor, other))
+                        code.sub(value, code.mul(factor, other))
                         for value, other in zip(loop.values, solved, strict=True)
                     ]
                 for place, value in zip(places, loop.values, strict=True):
@@ -371,7 +371,7 @@ class _PencilCode:
                 with code.loop(0, columns.index, [code.load(self._mass, place)]) as loop:
                     factor = code.load(self._stiffness, code.index("add", start, loop.index))
                     before = code.load(self._mass, code.index("add", row, loop.index))
-                    loop.after = [code.less(loop.values[0], code.mul(factor, before))]
+                    loop.after = [code.sub(loop.values[0], code.mul(factor, before))]
                 entry = code.mul(loop.values[0], inverse)
                 code.store(entry, self._mass, place)
                 code.store(entry, self._mass, code.index("add", start, rows.index))
@@ -392,8 +392,8 @@ class _PencilCode:
             before, moved = code.load(self._before, left), code.load(self._moved, left)
             with code.loop(0, code.index("add", left, 1)) as columns:
                 place = code.index("add", start, columns.index)
-                entry = code.less(code.load(self._mass, place), code.mul(before, code.load(self._moved, columns.index)))
-                entry = code.less(entry, code.mul(moved, code.load(self._before, columns.index)))
+                entry = code.sub(code.load(self._mass, place), code.mul(before, code.load(self._moved, columns.index)))
+                entry = code.sub(entry, code.mul(moved, code.load(self._before, columns.index)))
                 code.store(entry, self._mass, place)
             code.store(code.load(self._mass, code.index("add", start, left)), self._diagonal, left)
             scale, square = self._mirror_of(self._mass, left, start)
@@ -402,4 +402,4 @@ class _PencilCode:
             self._move(left, scale)
         # Of the first row, the entry alone is left, and its mirror has been turned with it.
         twice = code.mul(code.number(2.0), code.mul(code.load(self._before, 0), code.load(self._moved, 0)))
-        code.store(code.less(code.load(self._mass, 0), twice), self._diagonal, 0)
+        code.store(code.sub(code.load(self._mass, 0), twice), self._diagonal, 0)

@@ -51,7 +51,7 @@ class LoopCode:
     def add(self, a: Value, b: Value) -> Value:
         return self.do(f"fadd contract {self.numbers} {a}, {b}")
 
-    def less(self, a: Value, b: Value) -> Value:
+    def sub(self, a: Value, b: Value) -> Value:
         """The difference a - b."""
         return self.do(f"fsub contract {self.numbers} {a}, {b}")
 
@@ -66,7 +66,7 @@ class LoopCode:
         listed = ", ".join(f"{self.numbers} {value}" for value in given)
         return self.do(f"call {self.numbers} @llvm.{function}.v{self._lanes}f64({listed})")
 
-    def below(self, a: Value, b: Value) -> Value:
+    def is_less(self, a: Value, b: Value) -> Value:
         """Whether a < b, in each lane."""
         return self.do(f"fcmp olt {self.numbers} {a}, {b}")
 

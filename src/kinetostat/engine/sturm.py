@@ -37,12 +37,12 @@ def enclose(code: LoopCode, diagonal: int, squares: int, size: int, count: int) 
         largest, widest = loop.values
         entry, square = code.load(diagonal, loop.index), code.load(squares, loop.index)
         loop.after = [
-            code.where(code.below(largest, entry), entry, largest),
-            code.where(code.below(widest, square), square, widest),
+            code.where(code.is_less(largest, entry), entry, largest),
+            code.where(code.is_less(widest, square), square, widest),
         ]
     double = code.mul(code.number(2.0), code.call("sqrt", loop.values[1]))
     bound = code.mul(code.number(APART), code.add(loop.values[0], double))
-    sound = code.below(zero, bound)
+    sound = code.is_less(zero, bound)
     share = code.where(sound, code.div(unit, code.where(sound, bound, unit)), zero)
     with code.loop(0, size) as loop:
         code.store(code.mul(share, code.load(diagonal, loop.index)), diagonal, loop.index)
@@ -53,7 +53,7 @@ def enclose(code: LoopCode, diagonal: int, squares: int, size: int, count: int) 
     turns = math.ceil(HALVINGS * math.log(2.0) / math.log(inner + 1.0))
     with code.loop(0, turns, [zero] * shown + [unit] * shown) as turn:
         low, high = turn.values[:shown], turn.values[shown:]
-        width = [code.mul(code.number(1.0 / (inner + 1)), code.less(b, a)) for a, b in zip(low, high, strict=True)]
+        width = [code.mul(code.number(1.0 / (inner + 1)), code.sub(b, a)) for a, b in zip(low, high, strict=True)]
         inside = [
             code.add(low[k], code.mul(code.number(part), width[k]))
             for k in range(shown)
@@ -63,7 +63,7 @@ def enclose(code: LoopCode, diagonal: int, squares: int, size: int, count: int) 
         for k in range(shown):
             points = inside[k * inner : (k + 1) * inner]
             counts = above[k * inner : (k + 1) * inner]
-            beyond = [code.below(code.number(k + 0.5), count) for count in counts]
+            beyond = [code.is_less(code.number(k + 0.5), count) for count in counts]
             for more, point in zip(beyond, points, strict=True):
                 low[k] = code.where(more, point, low[k])
             for more, point in reversed([*zip(beyond, points, strict=True)]):
@@ -110,13 +110,13 @@ def _sequences(
         for k, middle in enumerate(middles):
             now, before = result[3 * k : 3 * k + 2]
             across = code.mul(square, before)
-            following = code.less(code.mul(code.less(entry, middle), now), across)
+            following = code.sub(code.mul(code.sub(entry, middle), now), across)
             signs[k] = code.sign_after(signs[k], following)
             result[3 * k : 3 * k + 2] = following, now
     for k, sign in enumerate(signs):
         now, before, count = result[3 * k : 3 * k + 3]
-        equal = code.less(code.number(float(rows)), code.changes(sign, rows))
+        equal = code.sub(code.number(float(rows)), code.changes(sign, rows))
         size = code.add(code.call("fabs", now), code.call("fabs", before))
-        scale = code.where(code.below(size, code.number(SMALL)), code.number(1.0 / SMALL), code.number(1.0))
+        scale = code.where(code.is_less(size, code.number(SMALL)), code.number(1.0 / SMALL), code.number(1.0))
         result[3 * k : 3 * k + 3] = code.mul(now, scale), code.mul(before, scale), code.add(count, equal)
     return result
