@@ -154,7 +154,9 @@ def test_an_undecided_machine_is_not_commanded(nearly_overconstrained, tmp_path,
     poses = tmp_path / "poses.csv"
     poses.write_text("z [mm]\n799\n800\n", "utf-8")
     assert main(["command", str(nearly_overconstrained), str(poses), "--set", "load.force.0=5"]) == BAD_INPUT
-    assert "undecided there which rigid parts share a load" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "2 of 2 poses have no command (2 undecided)" in said
+    assert "Rigid parts of several legs" in said
 
 
 def test_undecided_poses_of_grids_have_no_numbers(nearly_overconstrained):
