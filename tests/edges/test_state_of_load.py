@@ -72,6 +72,7 @@ def test_the_workspace_of_a_loaded_machine_is_where_it_comes_to_rest(capsys, tmp
 
 @pytest.mark.parametrize("count", [3, 3000])  # the solver for any machine, and programs
 @pytest.mark.parametrize("limits", ["", "[limits]\nactuator_force = 1e6\n"])
+@pytest.mark.numbers
 def test_what_follows_from_wrenches_has_one_number_whatever_is_asked_beside_it(count, limits):
     """At x = 0 tension alone holds upright cables: the machine rests there, and K, C and the margin have no number."""
     machine = build(CABLES.replace("min_tension = 50\n", limits))

@@ -82,6 +82,7 @@ def test_the_quick_route_and_the_modes_give_the_same_frequencies(name, links):
         *(("planar-3rrr", True), ("passive-leg-4dof-rus", True), ("orthoglide", True), ("hexapod-rus", True)),
     ],
 )
+@pytest.mark.numbers
 def test_every_way_to_evaluate_many_poses_agrees(name, links):
     machine, names = heavy(name, links), ["singularity_margin", *NAMES]
     path = next(path for path in values(machine) if path.startswith("pose."))
