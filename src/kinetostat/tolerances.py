@@ -124,7 +124,7 @@ AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
 ROUND_OFF_AT_REST = 1e-13
-"""The same for the step that Newton's method foresees: one that would be smaller is not taken."""
+"""Motion below which a step is not taken, in the same units: Newton's method foresees how long its next step is."""
 ONE_STEP_AWAY = 1e-7
 """Size of a step of a program, in the same units, after which another one is exact to round-off: its square is."""
 LAST_STEP = 1e-12

@@ -37,7 +37,7 @@ last."""
 DAY, HOUR = 86400.0, 3600.0
 SECRET, SECRET_SIZE, HASH_SIZE = "secret", 32, 32
 PRIVATE = 0o077
-"""Rights of others, none of which a folder with programs may give."""
+"""Bits of the rights of group and others: a folder with programs is not used where one of them is set."""
 
 
 def read_program(text: str) -> bytes | None:

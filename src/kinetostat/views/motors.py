@@ -27,7 +27,7 @@ from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field,
 from kinetostat.views.tables import FittedTable, numeric_table
 
 MOST_DRAWN = 4
-"""Motors that have a diagram, the best first: they fit on a page."""
+"""Number of motors that are drawn, the best of them: as many diagrams as fit on a page."""
 
 
 def _percent_text(share: float) -> str:
