@@ -13,7 +13,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.paper.reproduction import Reproduction, reproduce
+from kinetostat.studies.reproduction import Reproduction, reproduce
 from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import KNOWN, block_differences, frequency_difference, frequency_pairs, validate
 from site_build.markdown import difference, table

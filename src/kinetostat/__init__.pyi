@@ -29,11 +29,11 @@ from kinetostat.studies.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines import guidelines as guidelines
 from kinetostat.studies.identification.identification import identify as identify
 from kinetostat.studies.lobes import lobes as lobes
-from kinetostat.studies.measured.comparison import validate_measured as validate_measured
+from kinetostat.studies.measured_stiffness import validate_measured as validate_measured
 from kinetostat.studies.motors import motors as motors
 from kinetostat.studies.optimisation.problem import load_problem as load_problem
 from kinetostat.studies.optimisation.search import optimize as optimize
-from kinetostat.studies.paper.reproduction import reproduce as reproduce
+from kinetostat.studies.reproduction import reproduce as reproduce
 from kinetostat.studies.requirements import requirements as requirements
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.servo import servo as servo

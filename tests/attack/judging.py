@@ -34,7 +34,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.budget import budget
 from kinetostat.studies.datasets import evaluate
 from kinetostat.studies.identification.identification import identify
-from kinetostat.studies.measured.comparison import validate_measured
+from kinetostat.studies.measured_stiffness import validate_measured
 from kinetostat.studies.optimisation.problem import build_problem
 from kinetostat.studies.under_load import under_load
 from kinetostat.studies.vibration import modes

@@ -12,8 +12,8 @@ from kinetostat import build, identify, load
 from kinetostat.accuracy.model import error_model
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.identification.firmware import firmware_numbers, klipper_text, marlin_text, reprap_text
 from kinetostat.studies.identification.fit import Wishes, best_fit
+from kinetostat.studies.identification.fitted_values import firmware_numbers, klipper_text, marlin_text, reprap_text
 from kinetostat.studies.identification.identification import PREFERENCE, _sizes_by_name, identification_of
 from kinetostat.studies.identification.measurements import Sigmas, read_measurements
 from synthetic_printer import (

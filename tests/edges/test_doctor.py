@@ -19,8 +19,7 @@ from kinetostat.engine import program_files
 from kinetostat.spec.installation import extra_command, install_command
 from kinetostat.studies import diagnosis, self_test
 from kinetostat.studies.diagnosis import InstallationCheck, Soundness, UnsoundError
-from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.printed import table_3
+from kinetostat.studies.printed_numbers import table_3
 
 
 def test_a_sound_installation(capsys, monkeypatch):
@@ -127,7 +126,7 @@ def slightly_wrong(evaluate):
 def test_wrong_numbers_are_found(monkeypatch):
     monkeypatch.setattr(self_test, "table_3", one_digit_off)
     monkeypatch.setattr(self_test, "evaluate", slightly_wrong(self_test.evaluate))
-    monkeypatch.setattr(printed, "OPTIMISED_SUM", "1.0178")
+    monkeypatch.setattr(printed_numbers, "OPTIMISED_SUM", "1.0178")
     monkeypatch.setattr(self_test, "write_dataset", lambda path, grid: (2.0 * grid).to_netcdf(path, engine="h5netcdf"))
     found = {check.name: check for check in self_test.checks()}
     assert "Table III, row 1, rx: 0.5 for 0.52371" in found["paper"].detail

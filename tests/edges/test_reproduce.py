@@ -10,9 +10,9 @@ from report_pages import no_drawing
 
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
-from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.printed import PrintVerdict, compare, rounds_to
-from kinetostat.studies.paper.reproduction import Finding, reproduce
+from kinetostat.studies import printed_numbers
+from kinetostat.studies.printed_numbers import PrintVerdict, compare, rounds_to
+from kinetostat.studies.reproduction import Finding, reproduce
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_nothing_differs_unexplained(found):
 
 def test_every_erratum_is_met_once(found):
     met = [(one.place, one.component) for one in found.comparisons if one.verdict is PrintVerdict.MISPRINT]
-    assert sorted(met) == sorted(printed.ERRATA)
+    assert sorted(met) == sorted(printed_numbers.ERRATA)
 
 
 def test_every_claim_that_holds_in_part_says_for_what_and_for_what_not(found):
@@ -99,8 +99,11 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
 
 @pytest.mark.reports
 def test_a_wrong_model_is_found_out(monkeypatch, tmp_path, capsys):
-    wrong = (printed.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed.TABLE_4[0].values), *printed.TABLE_4[1:])
-    monkeypatch.setattr(printed, "TABLE_4", wrong)
+    wrong = (
+        printed_numbers.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed_numbers.TABLE_4[0].values),
+        *printed_numbers.TABLE_4[1:],
+    )
+    monkeypatch.setattr(printed_numbers, "TABLE_4", wrong)
     no_drawing(monkeypatch)
     assert main(["reproduce", "-o", str(tmp_path), "--json"]) == NO_ANSWER
     found = json.loads(capsys.readouterr().out)

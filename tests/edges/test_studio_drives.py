@@ -10,7 +10,7 @@ from studio_page import on_page
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import read_motion
-from kinetostat.studio.panels.drives import FRAMES, NO_MOTION, curves_of
+from kinetostat.studio.playback import FRAMES, NO_MOTION, curves_of
 
 MASSES = ("tool.mass=12 kg", "drives.lead=10 mm", "load.gravity=[0, 0, -9.81]")
 SINE = "field, amplitude, frequency [Hz]\nx, 5 mm, 4\nz, 2 mm, 8\n"

@@ -18,10 +18,9 @@ from studio_page import on_page
 
 from kinetostat import export
 from kinetostat.machine.loading import build, bundled, load
-from kinetostat.studio.admission import BoundedBody
+from kinetostat.studio.left_panes import explanation_of, reading
 from kinetostat.studio.menus import about
-from kinetostat.studio.serving import LOOPBACK
-from kinetostat.studio.text_pane import explanation_of, reading
+from kinetostat.studio.serving import LOOPBACK, BoundedBody
 
 MACHINE = "zhang-gosselin-4dof"
 

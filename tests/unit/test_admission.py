@@ -8,7 +8,16 @@ from starlette.responses import PlainTextResponse
 
 pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
 
-from kinetostat.studio.admission import CREDIT, PACE, SENDING, SHARE, OwnOrigin, Pace, Paced, timed_handler
+from kinetostat.studio.serving import (
+    PACE_KEY,
+    SECONDS_AT_ONCE,
+    SECONDS_OF_A_FILE,
+    SHARE_OF_A_TAB,
+    OwnOrigin,
+    Pace,
+    Paced,
+    timed_handler,
+)
 
 HOST = "127.0.0.1:8000"
 
@@ -75,14 +84,14 @@ def test_a_socket_is_for_pages_of_this_server():
 def test_a_tab_may_take_its_credit_at_once_and_its_share_in_the_long_run():
     time = 0.0
     pace = Pace(lambda: time)
-    pace.add(CREDIT)
+    pace.add(SECONDS_AT_ONCE)
     assert pace.wait == 0.0
     pace.add(1.0)
-    assert pace.wait == pytest.approx(1.0 / SHARE)
-    time = 1.0 / SHARE
+    assert pace.wait == pytest.approx(1.0 / SHARE_OF_A_TAB)
+    time = 1.0 / SHARE_OF_A_TAB
     assert pace.wait == pytest.approx(0.0)
     time = 1e6
-    pace.add(CREDIT)  # what was not used before is not saved up
+    pace.add(SECONDS_AT_ONCE)  # what was not used before is not saved up
     assert pace.wait == 0.0
 
 
@@ -94,16 +103,16 @@ def test_the_time_of_a_message_counts_for_its_own_connection(monkeypatch):
         waits.append(seconds)
         await pause(0)
 
-    monkeypatch.setattr("kinetostat.studio.admission.asyncio.sleep", noting)
+    monkeypatch.setattr("kinetostat.studio.serving.asyncio.sleep", noting)
 
     async def slow(scope, receive, send):
         await receive()
-        timed_handler(lambda *_: scope[PACE].add(10.0), lambda _: scope)("tab", "message")
+        timed_handler(lambda *_: scope[PACE_KEY].add(10.0), lambda _: scope)("tab", "message")
         await receive()
 
     socket(Paced(slow), b"", [{"type": "websocket.receive"}])
     assert waits[0] == 0.0
-    assert waits[1] == pytest.approx((10.0 - CREDIT) / SHARE, rel=0.01)
+    assert waits[1] == pytest.approx((10.0 - SECONDS_AT_ONCE) / SHARE_OF_A_TAB, rel=0.01)
 
 
 def test_a_tab_that_sends_many_files_waits_and_others_do_not(monkeypatch):
@@ -114,7 +123,7 @@ def test_a_tab_that_sends_many_files_waits_and_others_do_not(monkeypatch):
         waits.setdefault(sender, []).append(seconds)
         await pause(0)
 
-    monkeypatch.setattr("kinetostat.studio.admission.asyncio.sleep", noting)
+    monkeypatch.setattr("kinetostat.studio.serving.asyncio.sleep", noting)
 
     async def send_files():
         nonlocal sender
@@ -126,4 +135,4 @@ def test_a_tab_that_sends_many_files_waits_and_others_do_not(monkeypatch):
     sender = ""
     asyncio.run(send_files())
     assert waits["hostile"][0] == waits["other"][0] == 0.0
-    assert waits["hostile"][-1] == pytest.approx((40 * SENDING - CREDIT) / SHARE, rel=0.1)
+    assert waits["hostile"][-1] == pytest.approx((40 * SECONDS_OF_A_FILE - SECONDS_AT_ONCE) / SHARE_OF_A_TAB, rel=0.1)

@@ -9,7 +9,7 @@ from kinetostat import analyze, load, plot
 from kinetostat.accuracy.model import error_model
 from kinetostat.cli import main
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.measured.comparison import validate_measured
+from kinetostat.studies.measured_stiffness import validate_measured
 from kinetostat.views.data_forms import json_of
 from kinetostat.views.measured import MEASURED_STIFFNESS
 from machines import load_without_limits

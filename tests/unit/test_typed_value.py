@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from kinetostat.studio.typed_value import typed_value
+from kinetostat.studio.wording import typed_value
 from kinetostat.units import UnitError
 
 

@@ -157,7 +157,7 @@ def _refuse_other_options(options: argparse.Namespace) -> None:
 
 def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
     """Compare a machine with a measured stiffness."""
-    from kinetostat.studies.measured.comparison import validate_measured
+    from kinetostat.studies.measured_stiffness import validate_measured
 
     answer = validate_measured(
         machine, options.measured, fit=options.fit, sigma=options.sigma, sigma_angle=options.sigma_angle

@@ -195,7 +195,7 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _reproduce(options: argparse.Namespace) -> int:
-    from kinetostat.studies.paper.reproduction import reproduce
+    from kinetostat.studies.reproduction import reproduce
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.paper import REPRODUCTION, print_summary, write_all
 

@@ -17,6 +17,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loading import load
+from kinetostat.studies import printed_numbers
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.diagnosis import InstallationCheck, UnsoundError, check_of, reinstall
 from kinetostat.studies.grid import evaluate_grid
@@ -24,8 +25,7 @@ from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import best_feasible
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.search import search
-from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.printed import PrintVerdict, table_3, table_4
+from kinetostat.studies.printed_numbers import PrintVerdict, table_3, table_4
 from kinetostat.studies.storage import write_dataset
 from kinetostat.tolerances import EQUAL_ROUTES
 
@@ -61,10 +61,10 @@ def paper_numbers() -> str:
 
 def routes_agree() -> str:
     """K and C of the paper's machine by machine code, by NumPy and pose by pose."""
-    machine, poses = load(printed.MACHINE), _poses(COMPARED_POSES)
+    machine, poses = load(printed_numbers.MACHINE), _poses(COMPARED_POSES)
     compiled, plain = evaluate(machine, poses, DIAGONALS), responses(machine, poses)
     x, z = (float(poses.values[path][0]) for path in poses.paths)
-    single = analyze(load(printed.MACHINE, [f"pose.x={x!r}", f"pose.z={z!r}"]))
+    single = analyze(load(printed_numbers.MACHINE, [f"pose.x={x!r}", f"pose.z={z!r}"]))
     first = np.array([compiled.values[name][0] for name in DIAGONALS])
     alone = np.array([*single.stiffness_diagonal, *single.compliance_diagonal])
     difference = max(_greatest_difference(compiled, plain), float(np.abs(first / alone - 1.0).max()))
@@ -77,7 +77,7 @@ def routes_agree() -> str:
 
 def throughput() -> str:
     """Poses a second, with twelve numbers each."""
-    machine, poses = load(printed.MACHINE), _poses(TIMED_POSES)
+    machine, poses = load(printed_numbers.MACHINE), _poses(TIMED_POSES)
     evaluate(machine, _poses(COMPARED_POSES), DIAGONALS)
     start = time.perf_counter()
     evaluate(machine, poses, DIAGONALS)
@@ -90,14 +90,16 @@ def short_search() -> str:
     settings = ["optimizer.method=hybrid", "optimizer.generations=10"]
     log = search(Assessor(load_problem("zhang-gosselin-2002", settings)))
     reached = float(log.outcome(best_feasible(log)).objectives[:, 0].min(initial=np.inf))
-    if not reached <= float(printed.OPTIMISED_SUM):
-        raise UnsoundError(f"it ends at {reached:.9g} instead of below {printed.OPTIMISED_SUM}, the paper's optimum")
-    return f"the paper's optimum, {reached:.9g} (printed {printed.OPTIMISED_SUM}), in {log.count} evaluations"
+    if not reached <= float(printed_numbers.OPTIMISED_SUM):
+        raise UnsoundError(
+            f"it ends at {reached:.9g} instead of below {printed_numbers.OPTIMISED_SUM}, the paper's optimum"
+        )
+    return f"the paper's optimum, {reached:.9g} (printed {printed_numbers.OPTIMISED_SUM}), in {log.count} evaluations"
 
 
 def results_file() -> str:
     """A sweep written as NetCDF and read again, bit by bit."""
-    grid = evaluate_grid(load(printed.MACHINE), ["z=66 cm:70 cm:5"], ["compliance"])
+    grid = evaluate_grid(load(printed_numbers.MACHINE), ["z=66 cm:70 cm:5"], ["compliance"])
     with TemporaryDirectory() as folder:
         path = Path(folder) / "sweep.nc"
         write_dataset(path, grid)

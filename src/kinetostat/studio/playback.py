@@ -1,6 +1,8 @@
-"""A path of poses that the machine follows on the page: from a CSV file, or from poses that the designer has kept.
+"""Motions that the machine makes on the page: a path of poses, and a motion over time with the curves of its drives.
 
-Files are read by `studies.poses`; every shown pose is a pose of the session, so that all linked views follow.
+A path comes from a CSV file (`studies.poses`) or from poses that the designer keeps; a motion from a CSV file or from
+the requirements of the machine's file, and `answers` computes what it asks of the drives. Every pose that is shown is a
+pose of the session, so that all linked views follow.
 """
 
 import tempfile
@@ -12,46 +14,68 @@ import numpy as np
 from nicegui import events, ui
 
 from kinetostat.arrays import Array
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.drives import DriveLoads
 from kinetostat.studies.poses import read_poses
-from kinetostat.studio.elements import icon_button, refuse, upload_field
+from kinetostat.studio.answers import MotionRequest, Report, drives_along, finite
+from kinetostat.studio.elements import CurveView, icon_button, refuse, toggle, upload_field
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
+from kinetostat.studio.wording import paragraph
+from kinetostat.units import motion_unit
+from kinetostat.views.drives import DRIVES
 
-BETWEEN = 24
-"""Poses from one kept pose to the next: two seconds of motion."""
-PERIOD = 0.08
+STEPS_BETWEEN_KEPT_POSES = 24
+"""At `PATH_PERIOD` two seconds of motion."""
+PATH_PERIOD = 0.08
 """Seconds between two poses of a path, if the computer keeps up: each is a whole analysis."""
-EMPTY = "No path yet: open a CSV file of poses (as `kinetostat path` reads it), or keep two poses or more."
+NO_PATH = "No path yet: open a CSV file of poses (as `kinetostat path` reads it), or keep two poses or more."
 
 Poses: TypeAlias = dict[str, Array]
 """Values of each field along a path, SI."""
 
 
 class Player:
-    """A slider, and a button that lets it run to its end and stops it; each is built where the page is being built."""
+    """A slider over the steps of a motion, and a button that lets it run to its end and stops it.
 
-    def __init__(self, period: float, is_busy: Callable[[], bool]) -> None:
-        """Prepare it.
+    Both are made together, and can then be moved to their places on the page.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        last: int,
+        on_change: Callable[[], None],
+        is_busy: Callable[[], bool],
+        meaning: str,
+        mark: str,
+    ) -> None:
+        """Build slider and button where the page is being built.
 
         Args:
             period: the time from one step to the next, s.
+            last: the last step; the first is 0.
+            on_change: called after every change of the slider.
             is_busy: whether the last step is still being drawn; the next one then waits.
+            meaning: the tooltip of the button.
+            mark: beginning of the names by which tests know both: "path" makes "path-play" and "path-place".
         """
-        self._period, self._is_busy = period, is_busy
+        self._period, self._is_busy, self._last = period, is_busy, last
         self._timer: ui.timer | None = None
+        self.button = icon_button("play_arrow", meaning, self._toggle, f"{mark}-play")
+        self.slider = ui.slider(min=0, max=last, value=0, on_change=on_change).props("dense").mark(f"{mark}-place")
 
-    def build_slider(self, last: int, on_change: Callable[[], None]) -> ui.slider:
-        """Build the slider, whose steps are 0 to `last`."""
-        self.last = last
-        self.place = ui.slider(min=0, max=last, value=0, on_change=on_change).props("dense")
-        return self.place
-
-    def build_button(self, meaning: str, mark: str) -> ui.button:
-        """Build the button."""
-        self.button = icon_button("play_arrow", meaning, self._toggle, mark)
-        return self.button
+    def begin_again(self, last: int) -> None:
+        """Stop, and go back to the first step of a motion whose last step is `last`; a single step cannot be played."""
+        self.pause()
+        self._last = max(last, 1)
+        self.slider.props(f"max={self._last}").set_value(0)
+        for element in (self.slider, self.button):
+            element.set_enabled(last > 0)
 
     def pause(self) -> None:
         """Stop the slider where it is."""
@@ -65,8 +89,8 @@ class Player:
         if self._timer is not None:
             self.pause()
             return
-        if self.place.value >= self.last:
-            self.place.set_value(0)
+        if self.slider.value >= self._last:
+            self.slider.set_value(0)
         with self.button:  # a timer lives while something is played: an idle page asks for nothing
             self._timer = ui.timer(self._period, self._step)
         self.button.props("icon=pause")
@@ -74,10 +98,10 @@ class Player:
     def _step(self) -> None:
         if self._is_busy():
             return
-        if self.place.value >= self.last:
+        if self.slider.value >= self._last:
             self.pause()
         else:
-            self.place.set_value(int(self.place.value) + 1)
+            self.slider.set_value(int(self.slider.value) + 1)
 
 
 class Playback:
@@ -91,22 +115,22 @@ class Playback:
             on_change: called after every change of the machine.
             is_busy: whether the last pose is still being drawn; the next one then waits.
         """
-        self._session, self._on_change, self._player = session, on_change, Player(PERIOD, is_busy)
+        self._session, self._on_change = session, on_change
         self._path: Poses = {}
         self._kept: list[dict[str, float]] = []
         with icon_button("route", "Follow a path of poses", lambda: self.menu.open(), "path"):
             self.menu = ui.menu().props("no-parent-event persistent").classes("playback")
         with self.menu:
-            self.about = ui.label(EMPTY).classes("note").mark("path-about")
-            self.place = self._player.build_slider(1, self._go).mark("path-place")
+            self.about = ui.label(NO_PATH).classes("note").mark("path-about")
             with ui.row().classes("panel-tools"):
-                self.play = self._player.build_button("Play or pause", "path-play")
+                self._player = Player(PATH_PERIOD, 1, self._go, is_busy, "Play or pause", "path")
                 icon_button("add_location_alt", "Keep this pose", self._keep, "path-keep")
                 self.upload = upload_field(self._open, refuse, "path-upload", ".csv")
                 icon_button("folder_open", "Open a CSV file of poses", self._pick, "path-open")
                 icon_button("delete_outline", "Forget the path", self.clear, "path-clear")
                 ui.space()
                 icon_button("close", "Close", self.menu.close, "path-close")
+            self._player.slider.move(self.menu, 1)  # above the buttons
         self._show()
 
     @property
@@ -146,19 +170,15 @@ class Playback:
         self._show()
 
     def _show(self) -> None:
-        self._player.pause()
-        self._player.last = max(self.count - 1, 1)
-        self.place.props(f"max={self._player.last}").set_value(0)
-        self.place.set_enabled(self.count > 1)
-        self.play.set_enabled(self.count > 1)
+        self._player.begin_again(self.count - 1)
         kept = f"{len(self._kept)} kept pose{'s' if len(self._kept) > 1 else ''}. " if self._kept else ""
-        self.about.set_text(f"{kept}A path of {self.count} poses." if self.count > 1 else kept + EMPTY)
+        self.about.set_text(f"{kept}A path of {self.count} poses." if self.count > 1 else kept + NO_PATH)
 
     def _go(self) -> None:
         """Move the machine to the pose under the slider."""
-        if self.count < 2:
+        if self.count < 2:  # `begin_again` puts the slider back to 0, which also arrives here
             return
-        at = min(int(self.place.value), self.count - 1)
+        at = min(int(self._player.slider.value), self.count - 1)
         try:
             self._session.move({path: float(column[at]) for path, column in self._path.items()})
         except InputError as error:
@@ -174,5 +194,178 @@ def poses_between(kept: list[dict[str, float]]) -> Poses:
     Args:
         kept: two poses or more, values by path, SI.
     """
-    places = np.linspace(0.0, len(kept) - 1.0, (len(kept) - 1) * BETWEEN + 1)
+    places = np.linspace(0.0, len(kept) - 1.0, (len(kept) - 1) * STEPS_BETWEEN_KEPT_POSES + 1)
     return {path: np.interp(places, range(len(kept)), [pose[path] for pose in kept]) for path in kept[0]}
+
+
+FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
+FRAMES = 100
+"""Steps of a motion that is played: a movement to the eye, and each is a whole analysis."""
+FRAME_PERIOD = 0.12
+"""Seconds between two of them, if the computer keeps up: the longest at which steps still look like a motion."""
+POINTS_SHOWN = 300
+"""Points of a curve: about as many as it has pixels across."""
+NO_MOTION = (
+    "No motion yet: open a CSV file of one (poses with times, poses with a feed rate, or sines), or name it in a "
+    'requirement of the file, { fits = "MOTOR", motion = "motion.csv" }.'
+)
+
+
+class DrivesPanel(Panel):
+    """Demands of a motion on the drives over time; the machine follows a slider, or the motion is played."""
+
+    name = "Drives"
+
+    def build(self) -> None:
+        self._session: Session | None = None
+        self._answer: DriveLoads | None = None
+        self._asked: Machine | None = None
+        self._text = ""
+        self._lane = Lane(drives_along, self._deliver)
+        with ui.row().classes("panel-tools"):
+            self.upload = upload_field(self._open, refuse, "drives-upload", ".csv")
+            icon_button("folder_open", "Open a CSV file of a motion", self._pick, "drives-open")
+            self.kind = toggle([FORCE, SPEED, TORQUE, POWER, TOOL], FORCE, self._draw, "drives-kind")
+        self.about = ui.html(paragraph(NO_MOTION), sanitize=False).mark("drives-about")
+        with ui.element("div").classes("vibration") as self.content:
+            with ui.row().classes("panel-tools"):
+                self._player = Player(
+                    FRAME_PERIOD, FRAMES, self._go, self.is_busy, "Play or pause the motion", "drives"
+                )
+                self._player.slider.props('aria-label="time"').classes("grow")
+                self.time = ui.label("").classes("note").mark("drives-time")
+            self.curves = (
+                CurveView("curves of the drives over the time of the motion").classes("tall").mark("drives-curves")
+            )
+            self.further = ui.html("", sanitize=False).style("flex: none").mark("drives-further")
+        self._show_content(False)
+
+    def shows(self, report: Report) -> bool:
+        return report.answered
+
+    def show(self, _report: Report, session: Session) -> None:
+        self._session = session
+        if self._asked is None or _apart_from_pose(self._asked) != _apart_from_pose(session.machine):
+            self._ask()
+
+    def leave(self) -> None:
+        self._player.pause()
+
+    def close(self) -> None:
+        self._player.pause()
+        self._lane.close()
+
+    def _ask(self) -> None:
+        """Compute what the motion asks of the machine as it is now."""
+        if self._session is None:
+            return
+        self._player.pause()
+        self._asked = self._session.machine
+        self._lane.ask(MotionRequest(self._session.machine, self._text))
+
+    def _pick(self) -> None:
+        self.upload.run_method("pickFiles")
+
+    async def _open(self, event: events.UploadEventArguments) -> None:
+        """Take the motion of a CSV file."""
+        data, name = await event.file.read(), event.file.name
+        self.upload.reset()
+        try:
+            self._text = text_of(data, name, "CSV")
+        except InputError as error:
+            refuse(str(error))
+        else:
+            self._ask()
+
+    def _deliver(self, _request: MotionRequest, new: DriveLoads | str) -> None:
+        self._answer = None if isinstance(new, str) or new.curves is None else new
+        self._show_content(self._answer is not None)
+        self.further.set_content("")
+        if isinstance(new, str) or new.curves is None:
+            self.about.set_content(paragraph((new if isinstance(new, str) else new.message) or NO_MOTION))
+            return
+        first, *others = (sentence for _, sentence in DRIVES.sentences(new))
+        self.about.set_content(paragraph(first, "lead"))
+        self.further.set_content("".join(paragraph(text) for text in others))
+        self._player.slider.set_value(0)
+        self._draw()
+
+    def _show_content(self, shown: bool) -> None:
+        """Show the curves with what chooses them, where there is a motion."""
+        self.content.set_visibility(shown)
+        self.kind.set_visibility(shown)
+
+    def _draw(self) -> None:
+        """Draw the curves that are chosen, and mark the time."""
+        answer = self._answer
+        if answer is None or answer.curves is None:
+            return
+        times = np.linspace(answer.motion.times[0], answer.motion.times[-1], POINTS_SHOWN)
+        label, unit, lines = curves_of(answer, str(self.kind.value), times)
+        shown = [{"name": name, "values": finite(row)} for name, row in lines]
+        labels = {"x": "time (s)", "y": label}
+        options = {"signed": True, "here": self._time_shown, "across": "s", "unit": unit}
+        self.curves.run_method("show", {"x": finite(times), "lines": shown, "label": labels, **options})
+
+    @property
+    def _time_shown(self) -> float:
+        """The time under the slider, s."""
+        if self._answer is None:
+            return 0.0
+        times = self._answer.motion.times
+        return float(times[0] + (times[-1] - times[0]) * float(self._player.slider.value) / FRAMES)
+
+    def _go(self) -> None:
+        """Move the machine to where it is at the time under the slider."""
+        if self._answer is None or self._session is None or self._asked is None:
+            return
+        motion, moment = self._answer.motion, self._time_shown
+        self.time.set_text(f"{moment:.3f} s")
+        self.curves.run_method("mark", moment)
+        pose = {POSE + name: float(np.interp(moment, motion.times, row)) for name, row in motion.path.pose.items()}
+        try:
+            self._session.move(pose)
+        except InputError as error:
+            self._player.pause()
+            refuse(str(error))
+        else:
+            self.show_change()
+
+
+def _apart_from_pose(machine: Machine) -> tuple[object, ...]:
+    """Return all numbers of a machine that a motion does not change."""
+    numbers = {path: value for path, value in values(machine).items() if not path.startswith(POSE)}
+    return machine.name, machine.family.name, machine.requirements, numbers
+
+
+def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, list[tuple[str, Array]]]:
+    """Return the curves of an answer at some times: the label of their axis, their unit, and each with its name.
+
+    Drives of the kind of the first one are drawn, so that all have one unit.
+
+    Args:
+        answer: an answer with curves.
+        kind: the kind of curve, as the panel offers them.
+        times: s.
+    """
+    display, moments = answer.machine.display, answer.motion.times
+    if kind == TOOL and answer.deflection is not None:
+        scale = display.deflection("m")
+        rows = [np.interp(times, moments, row) for row in answer.deflection[:, 3:].T]
+        lines = [("at rest", np.linalg.norm(rows, axis=0) * scale.factor)]
+        if answer.along_modes is not None and answer.along_modes.modes:
+            surplus = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
+            lines.append(("modes", np.linalg.norm(np.add(rows, surplus), axis=0) * scale.factor))
+        return scale.label("deflection of the tool"), scale.unit, lines
+    if answer.curves is None:
+        return "", "", []
+    first = answer.drives[0]
+    length, force, torque = map(display.scale, (motion_unit(not first.slides), first.unit, first.motor_unit))
+    curve, factor, unit, word = {
+        SPEED: (answer.curves.speed, length.factor, f"{length.unit}/s", "speed"),
+        TORQUE: (answer.curves.motor_torque, torque.factor, torque.unit,
+                 "torque of the motor" if first.rotary else "force of the motor"),
+        POWER: (answer.curves.power, 1.0, "W", "power of the motor"),
+    }.get(kind, (answer.curves.force, force.factor, force.unit, "force"))  # fmt: skip
+    alike = [k for k, drive in enumerate(answer.drives) if drive.slides is first.slides]
+    return f"{word} ({unit})", unit, [(f"{k + 1}", np.interp(times, moments, curve[k]) * factor) for k in alike]

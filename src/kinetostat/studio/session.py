@@ -23,8 +23,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.spec.document import LARGEST_FILE, text_of
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.studio.controls import Control, controls
-from kinetostat.studio.typed_value import typed_value
-from kinetostat.studio.wording import unit_shown
+from kinetostat.studio.wording import typed_value, unit_shown
 from kinetostat.units import UnitError
 
 TEXT = "text"

@@ -13,15 +13,15 @@ import numpy as np
 from kinetostat.display import DASH, Display, Scale, number, number_and_uncertainty
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studies.identification.firmware import (
+from kinetostat.studies.identification.fit import Tell
+from kinetostat.studies.identification.fitted_values import (
     FirmwareNumbers,
     firmware_numbers,
     klipper_text,
     marlin_text,
     reprap_text,
+    with_home,
 )
-from kinetostat.studies.identification.fit import Tell
-from kinetostat.studies.identification.fitted_values import with_home
 from kinetostat.studies.identification.identification import USUALLY_FITTED, Identification, identify
 from kinetostat.studies.identification.next_poses import NextPoses, as_csv, unit_of
 from kinetostat.studies.identification.record import FitRecord, record_of

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from kinetostat.display import Display, Scale, number, number_and_uncertainty
-from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
+from kinetostat.studies.measured_stiffness import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
 from kinetostat.views.question import Description, Field, Lines, Records
 from kinetostat.views.tables import FittedTable, text_table
 

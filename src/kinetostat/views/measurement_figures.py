@@ -14,7 +14,7 @@ from kinetostat.arrays import AnyArray, Array, Mask
 from kinetostat.machine.machine import setting_of
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
-from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
+from kinetostat.studies.measured_stiffness import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
 from kinetostat.units import motion_unit
 from kinetostat.views.figures import COLOURS, new_figure, slim_bar
 from kinetostat.views.lettering import width_of

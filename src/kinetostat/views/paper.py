@@ -1,6 +1,6 @@
 """The reproduction of the paper on the terminal and in files: tables (CSV, JSON), figures and an HTML page.
 
-The page stands alone: no script, no request, pictures inside. Numbers and verdicts come from `studies.paper`.
+The page stands alone: no script, no request, pictures inside. Numbers and verdicts come from `studies.reproduction`.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,9 +20,9 @@ from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.spec.installation import command, start_command
-from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
-from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
+from kinetostat.studies import printed_numbers
+from kinetostat.studies.printed_numbers import EquationCheck, PaperNumber, PrintVerdict
+from kinetostat.studies.reproduction import Claim, Finding, Reproduction
 from kinetostat.studies.storage import write_text
 from kinetostat.views.answers import write_files
 from kinetostat.views.data_forms import csv_text
@@ -186,13 +186,13 @@ def _csv(rows: Sequence[PaperNumber | EquationCheck | Claim]) -> str:
 REPRODUCTION = Description(
     title="The paper",
     fields=(
-        Field("paper", lambda _reproduction: printed.CITATION),
+        Field("paper", lambda _reproduction: printed_numbers.CITATION),
         Field("explained"),
         Field("comparisons"),
         Field("equations", lambda answer: [asdict(check) | {"holds": check.holds} for check in answer.checks]),
         Field("statements", "claims"),
         Field("optimisation", "search_claims"),
-        Field("typography", lambda _reproduction: list(printed.TYPOGRAPHY)),
+        Field("typography", lambda _reproduction: list(printed_numbers.TYPOGRAPHY)),
     ),
     lines=_lines,
     tables=_tables,
@@ -221,7 +221,7 @@ def page(reproduction: Reproduction, drawn: Mapping[str, Figure]) -> str:
     pictures = {name: figure(as_svg(picture), CAPTIONS[name]) for name, picture in drawn.items()}
     body = [
         "<h1>Zhang and Gosselin's machine, reproduced</h1>",
-        '<p class="soft">' + escape(printed.CITATION) + ", "
+        '<p class="soft">' + escape(printed_numbers.CITATION) + ", "
         f"compared with the results of kinetostat {escape(version('kinetostat'))}. "
         "Order of components: rx ry rz x y z; SI units, base axes, at the platform point P.</p>",
         _tiles(reproduction),
@@ -244,7 +244,7 @@ def page(reproduction: Reproduction, drawn: Mapping[str, Figure]) -> str:
         _statements(reproduction.search_claims),
         pictures["figure-6"],
         "<h2>Slips of typography</h2>",
-        f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
+        f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed_numbers.TYPOGRAPHY)}</ul>",
     ]
     return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", PAPER_STYLE, body)
 
@@ -256,12 +256,12 @@ def misprints(reproduction: Reproduction) -> Iterator[str]:
         failures = list(group)
         pairs = [
             f"{_symbol(place, each.component)} {each.printed} should read "
-            f"{printed.ERRATA[place, each.component].corrected}"
+            f"{printed_numbers.ERRATA[place, each.component].corrected}"
             for each in failures
         ]
         count = COUNTS[len(failures)] if len(failures) < len(COUNTS) else str(len(failures))
         are = "number is a misprint" if len(failures) == 1 else "numbers are misprints"
-        reason = printed.ERRATA[place, failures[0].component].reason
+        reason = printed_numbers.ERRATA[place, failures[0].component].reason
         yield f"{place}: {count} {are} of the paper. {'; '.join(pairs)}. Reason: {reason}."
 
 

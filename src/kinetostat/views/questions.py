@@ -103,10 +103,10 @@ ANSWERS: Mapping[str, str] = {
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.Budget": "views.budget.BUDGET",
     "accuracy.toleranced_parts.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
-    "studies.measured.comparison.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
+    "studies.measured_stiffness.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
     "validation.comparison.Validation": "views.validation.VALIDATION",
     "studies.optimisation.result.Result": "views.optimisation.RESULT",
-    "studies.paper.reproduction.Reproduction": "views.paper.REPRODUCTION",
+    "studies.reproduction.Reproduction": "views.paper.REPRODUCTION",
     "studies.comparison.Comparison": "views.comparison.COMPARISON",
 }
 """Place of the `Description` of each class of answers."""

@@ -21,8 +21,7 @@ from kinetostat.studies.optimisation.problem import Problem, problem_of, setting
 from kinetostat.studies.optimisation.terms import ALONG
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
-from kinetostat.studio.typed_value import typed_value
-from kinetostat.studio.wording import shown_value
+from kinetostat.studio.wording import shown_value, typed_value
 from kinetostat.units import UNIT, UnitError
 
 AROUND = 0.2

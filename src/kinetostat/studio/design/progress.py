@@ -18,8 +18,7 @@ from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import machine_of_design
 from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_problem
 from kinetostat.studies.study_folder import Record, read_history
-from kinetostat.studio.design.runs import RESULT, Run, Stage
-from kinetostat.studio.design.worker import FAILURE
+from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
 EXACT = 9
 """Digits with which objectives are shown: the last ones still change while a search converges."""

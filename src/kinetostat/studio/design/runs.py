@@ -1,11 +1,13 @@
-"""Searches, each in its own process and folder: start, stop, go on, list, delete.
+"""Searches, each in its own process and folder: start, stop, resume, list, delete, and what the process does.
 
-What the process does stands in `worker`. It ends after its present step when its standard input is closed, which also
-happens when the server that started it dies: no search runs on unnoticed.
+The process is `python -m kinetostat.studio.design.runs`. It is started before a search needs it, because importing
+takes longer than the first steps. It ends after its present step when its standard input is closed, which also happens
+when the server that started it dies: no search runs on unnoticed.
 """
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -14,21 +16,24 @@ from enum import StrEnum
 from pathlib import Path
 
 from kinetostat.frozen import dataclass
+from kinetostat.late import hide_array_libraries
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.search import begin_search
+from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
+from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import holds_study, in_use, read_history, read_question
 from kinetostat.studio.design.state_folder import RUNS, numbered_entries, slug
-from kinetostat.studio.design.worker import FAILURE
 from kinetostat.studio.processes import make_modest
+from kinetostat.views.optimisation import write_result
 
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""
 MOST_RUNS = 60
 """Searches that are kept: more than anybody reads in a list."""
-WORKER = "kinetostat.studio.design.worker"
+SEARCHING_PROGRAM = "kinetostat.studio.design.runs"
 RESULT = "result.json"
-
+FAILURE = "failed.txt"
+"""File in the folder of a search that could not go on, with the reason."""
 UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError)
 """Exceptions that reading a damaged folder of a search may raise."""
 
@@ -243,7 +248,39 @@ def _complete(folder: Path) -> bool:
 
 def _started_worker() -> subprocess.Popen[bytes]:
     """Start a process that waits for the folder of a search."""
-    words = [sys.executable, "-m", WORKER]
+    words = [sys.executable, "-m", SEARCHING_PROGRAM]
     process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     make_modest(process.pid)
     return process
+
+
+def work() -> None:
+    """Search on from the records in a folder and write the result so far.
+
+    The folder is the first line of the standard input, which comes when a search needs the process, or never.
+    """
+    line = sys.stdin.buffer.readline()
+    if not line:
+        return
+    folder, stopped = Path(json.loads(line)), threading.Event()
+    threading.Thread(target=_wait_for_end_of_input, args=(stopped,), daemon=True).start()
+    try:
+        write_result(optimize(stored_problem(folder), folder, stop=stopped.is_set), folder)
+    except InputError as error:
+        if not in_use(folder):  # otherwise another process is at work here, and the search is not a failure
+            write_text(folder / FAILURE, str(error))
+    except Exception as error:
+        write_text(folder / FAILURE, f"The search ended with an error of the program: {error!r}")
+        raise
+
+
+def _wait_for_end_of_input(stopped: threading.Event) -> None:
+    """Ask the search to stop after its step once the server has closed the standard input."""
+    sys.stdin.buffer.read()
+    stopped.set()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server, which closes the input
+    hide_array_libraries()
+    work()

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from kinetostat.frozen import dataclass
-from kinetostat.studies.paper.printed import CITATION
+from kinetostat.studies.printed_numbers import CITATION
 from kinetostat.views.report.content import Formula, Listing, Paragraph, Section, Table
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")

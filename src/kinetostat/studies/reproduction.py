@@ -1,8 +1,8 @@
 """Reproduce the whole paper in one call: numbers, equations, statements, the optimisation and the data of the figures.
 
-Numbers and equations are computed in `printed`. This file tests the design guidelines (i)-(vii), the three further
-facts and the statements about the optimisation. Statements are in our words. If one holds only in part, `limits` says
-for what it holds and for what it fails, with figures. If the paper leaves a threshold open, ours is named as such.
+Numbers and equations are judged in `printed_numbers`. This file tests the design guidelines (i)-(vii), the three
+further facts and the statements about the optimisation. Statements are in our words. `limits` says, with figures, for
+what a statement holds and for what it fails. Where the paper leaves a threshold open, ours is named as such.
 """
 
 from collections import Counter
@@ -24,14 +24,14 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies import printed_numbers
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import optimize
 from kinetostat.studies.optimisation.slopes import ridge_sentences
-from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.printed import (
+from kinetostat.studies.printed_numbers import (
     EquationCheck,
     PaperNumber,
     PrintVerdict,
@@ -151,7 +151,7 @@ class Reproduction(Immutable):
 @checked
 def reproduce(progress: Progress = silent) -> Reproduction:
     """Reproduce the whole paper; `progress` gets the number of steps done and of all steps, after each."""
-    machine = load(printed.MACHINE)
+    machine = load(printed_numbers.MACHINE)
     parts: dict[str, Callable[[], Iterable[Any]]] = {
         "table_3": table_3,
         "table_4": table_4,
@@ -199,7 +199,7 @@ def _nearly_rigid() -> Claim:
     rigid = _free_compliances("rigid")
     ratios = [10.0**n for n in range(8)]
     gaps = [float(np.max(_free_compliances(1e3 * ratio) / rigid - 1)) for ratio in ratios]
-    response = respond(load(printed.MACHINE))
+    response = respond(load(printed_numbers.MACHINE))
     links = with_links_together(elements(response.configuration))[-1]
     within = float(np.max(1.0 / rigid_from(response, links, 0.01)[list(FREE_AXES)]))
     falling = all(later < earlier for earlier, later in pairwise(gaps))
@@ -264,7 +264,7 @@ def _held_by_both() -> Claim:
 def _first_link() -> Claim:
     here = coefficients()
     ratios = [here["k52"][i] / here["k54"][i] for i in HELD_AXES]
-    links = analyze(load(printed.MACHINE)).attribution[:2]
+    links = analyze(load(printed_numbers.MACHINE)).attribution[:2]
     shares = [float(np.nan_to_num(link.compliance_share[HELD_AXES[1]])) for link in links]
     return Claim(
         "Guideline (v)",
@@ -390,13 +390,13 @@ def search_again() -> tuple[Result, tuple[Claim, ...]]:
 def _search_claims(genetic: Result, gradient: Result) -> Iterator[Claim]:
     """Test the statements about the optimum and about convergence (Fig. 6)."""
     reached, reached_by_gradient = (float(search.outcome.objectives[0, 0]) for search in (genetic, gradient))
-    target, study = float(printed.OPTIMISED_SUM), genetic.problem.study.optimizer
+    target, study = float(printed_numbers.OPTIMISED_SUM), genetic.problem.study.optimizer
     ridges = " ".join(ridge_sentences(genetic.ridges, genetic.problem))
     agree = abs(reached / reached_by_gradient - 1.0) < 1e-6
     yield Claim(
         "Section 4.3, optimum",
         f"A genetic algorithm with {study.population} designs and {study.generations} generations lowers the sum of "
-        f"compliances to {printed.OPTIMISED_SUM}.",
+        f"compliances to {printed_numbers.OPTIMISED_SUM}.",
         f"Our genetic algorithm finds {reached:.9g} in {genetic.log.count:,} evaluations; a gradient search from "
         f"{study.starts} starts finds {reached_by_gradient:.9g} in {gradient.log.count:,}.",
         Finding.HOLDS if agree and reached <= target else Finding.FAILS,

@@ -28,7 +28,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
 from kinetostat.studies.identification.record import read_fit
-from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
+from kinetostat.studies.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
 from kinetostat.tolerances import LEAST_DIVISOR
 
 GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")

@@ -1,1 +1,0 @@
-"""A measured stiffness beside the computed one, with the uncertainties of both."""

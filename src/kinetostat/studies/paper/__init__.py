@@ -1,1 +1,0 @@
-"""The paper by our own means: its numbers, equations and statements, each beside what this program computes."""
