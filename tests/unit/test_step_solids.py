@@ -11,7 +11,7 @@ from kinetostat.views.scene.solids import Extruded, Swept, Turned
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
 
-from kinetostat.exchange.step_solids import solid_of
+from kinetostat.exchange.step_file import solid_of
 from step_files import box, is_valid, surfaces, volume
 
 EXACT = 1e-9

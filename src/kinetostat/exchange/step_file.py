@@ -1,23 +1,41 @@
-"""A scene as a STEP file: its solids as an assembly with places, names and colours, always in the same order.
+"""A scene as a STEP file: exact solids in mm, as an assembly with places, names and colours, always in the same order.
 
-A part stands in the document once, however often and wherever it is built in.
+A mesh has facets; these solids are round: cylinders, cones, spheres and tori, and wires along smooth curves. A scene
+gives outlines as points, so that the lines and arcs of an outline are first recovered from its points. A part is in the
+document once, however often and wherever it is built in.
 
 Source: ISO 10303-214:2010 (automotive design), which every CAD program reads; ISO 10303-21:2016 (the file).
 """
 
+import cmath
 import io
+import math
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeAlias
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
-from OCP.gp import gp_Ax3, gp_Dir, gp_Trsf
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_GTransform,
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeWire,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
+from OCP.BRepOffsetAPI import BRepOffsetAPI_MakePipe
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+from OCP.collections import HArray1_gp_Pnt
+from OCP.GC import GC_MakeArcOfCircle
+from OCP.GeomAPI import GeomAPI_Interpolate
+from OCP.gp import gp, gp_Ax2, gp_Ax3, gp_Circ, gp_Dir, gp_GTrsf, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.Interface import Interface_InterfaceModel, Interface_Static
 from OCP.Message import Message, Message_Fail
 from OCP.Quantity import Quantity_Color, Quantity_ColorRGBA, Quantity_TOC_RGB
+from OCP.Standard import Standard_Failure
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
 from OCP.StepVisual import StepVisual_ColourRgb
@@ -27,19 +45,190 @@ from OCP.TCollection import TCollection_HAsciiString as Text
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 from OCP.UnitsMethods import UnitsMethods_LengthUnit_Millimeter
 from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.exchange.formats import one_line
-from kinetostat.exchange.step_solids import point_of, solid_of
-from kinetostat.views.scene.solids import BASE, LOOKS, Point3, Scene, Solid, linear, solid_data
+from kinetostat.tolerances import EVEN_CHORDS, NO_CIRCLE, OPEN_CASCADE_POINT
+from kinetostat.views.scene.solids import (
+    BASE,
+    LOOKS,
+    Extruded,
+    Point2,
+    Point3,
+    Scene,
+    Shape,
+    Solid,
+    Swept,
+    Turned,
+    linear,
+    solid_data,
+)
 
-COUNTED = re.compile(r" \d+$")
-"""A number at the end of a name: it belongs to the place, not to the part that is built in there."""
+OutlinePiece: TypeAlias = tuple[Point2, Point2] | tuple[Point2, Point2, Point2]
+"""A line by its two ends, or an arc by its start, a point in between, and its end."""
+PartKey = tuple[str, Point3, str]
+"""A shape as text, its scale along the axes, and its material: what makes solids the same part."""
 
-Key = tuple[str, Point3, str]
+CORNER = math.radians(30)
+"""Smallest turn from one chord to the next that is a corner, rad: a scene draws roundings in finer steps."""
+LEAST_CHORDS_OF_ARC = 3
+"""Least number of chords that are taken for an arc: any two chords of equal length fit some circle."""
+MILLIMETRES = 1e3
+"""Millimetres in a metre. CAD programs work in mm, and Open CASCADE's tolerances are made for them."""
+UNSCALED = (1.0, 1.0, 1.0)
+NUMBER_AT_END = re.compile(r" \d+$")
+"""A number at the end of a name, as in "ball 3": it tells places apart, and a part has none."""
+BODY_LAYER = "machine"
+"""The layer whose solids are bodies; springs and frames are only signs."""
+SETTINGS = {"write.step.schema": "AP214IS", "write.step.unit": "MM", "write.surfacecurve.mode": "Off"}
+"""Settings of the writer, for the whole process. Without the curves on surfaces, which readers compute, a file is half
+as large."""
+STRING = re.compile(rb"'[^']*'")
+"""A string of the file; the writer breaks long ones into lines, even within a character beyond ASCII."""
+UNDATED = "1970-01-01T00:00:00"
+"""The time in the header, which is always the same, so that equal machines give equal files."""
+
+
+def solid_of(shape: Shape, scale: Point3 = UNSCALED) -> TopoDS_Shape:
+    """Return the exact solid of a shape in the axes of the shape, scaled along them."""
+    match shape:
+        case Turned():
+            solid_shape = _turned_solid(shape)
+        case Extruded():
+            solid_shape = _extruded_solid(shape)
+        case Swept():
+            solid_shape = _swept_solid(shape)
+    (solid,) = _parts_of(solid_shape, TopAbs_SOLID)
+    return solid if scale == UNSCALED else _scaled_solid(solid, scale)
+
+
+def point_of(x: float, y: float, z: float) -> gp_Pnt:
+    """Return the point with coordinates in m."""
+    return gp_Pnt(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES)
+
+
+def _turned_solid(shape: Turned) -> TopoDS_Shape:
+    # A radius that is only round-off is set to 0, so that the profile meets the axis and the solid has no hole in it.
+    least = NO_CIRCLE * max(radius for radius, _ in shape.profile)
+    profile = [(radius if radius > least else 0.0, height) for radius, height in shape.profile]
+    return BRepPrimAPI_MakeRevol(_face(profile, lambda x, z: point_of(x, 0.0, z)), gp.OZ_s()).Shape()
+
+
+def _extruded_solid(shape: Extruded) -> TopoDS_Shape:
+    outline = _face(shape.outline, lambda x, y: point_of(x, y, 0.0))
+    prism = BRepPrimAPI_MakePrism(outline, gp_Vec(0.0, 0.0, shape.height * MILLIMETRES))
+    rounded = _rounded_prism(prism, shape.chamfer * MILLIMETRES) if shape.chamfer > 0.0 else None
+    return rounded or prism.Shape()
+
+
+def _rounded_prism(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None:
+    """Return a prism with rounded edges at both ends (radius in mm), or None if the radius does not fit."""
+    fillet = BRepFilletAPI_MakeFillet(prism.Shape())
+    for end in (prism.FirstShape(), prism.LastShape()):
+        for edge in _parts_of(end, TopAbs_EDGE):
+            fillet.Add(radius, TopoDS.Edge(edge))
+    # Open CASCADE reports a radius that does not fit in two ways: by an error, or by a solid that is not valid.
+    try:
+        shape = fillet.Shape()
+    except Standard_Failure:
+        return None
+    return shape if BRepCheck_Analyzer(shape).IsValid() else None
+
+
+def _swept_solid(shape: Swept) -> TopoDS_Shape:
+    points = HArray1_gp_Pnt(1, len(shape.path))
+    for number, corner in enumerate(shape.path, 1):
+        points.SetValue(number, point_of(*corner))
+    smooth = GeomAPI_Interpolate(points, shape.closed, OPEN_CASCADE_POINT)
+    smooth.Perform()
+    # The wire is a disc, set at right angles to the start of the curve and pulled along it; D1 fills in `start` and
+    # `along`, the tangent there.
+    curve, start, along = smooth.Curve(), gp_Pnt(), gp_Vec()
+    curve.D1(curve.FirstParameter(), start, along)
+    rim = gp_Circ(gp_Ax2(start, gp_Dir(along)), shape.radius * MILLIMETRES)
+    path = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge()).Wire()
+    return BRepOffsetAPI_MakePipe(path, _enclosed_face([BRepBuilderAPI_MakeEdge(rim).Edge()])).Shape()
+
+
+def _face(outline: Sequence[Point2], point_in_space: Callable[[float, float], gp_Pnt]) -> TopoDS_Face:
+    """Return the plane face within a closed outline, of which a function gives each corner as a point in space."""
+    corners = [corner for corner, following in pairwise([*outline, outline[0]]) if corner != following]
+    # Beginning with the last corner closes the outline.
+    rim = outline_pieces([corners[-1], *corners])
+    return _enclosed_face([_edge([point_in_space(*corner) for corner in piece]) for piece in rim])
+
+
+def _edge(points: Sequence[gp_Pnt]) -> TopoDS_Edge:
+    """Return the line between two points, or the arc through three."""
+    curve = points if len(points) == 2 else [GC_MakeArcOfCircle(*points).Value()]
+    return BRepBuilderAPI_MakeEdge(*curve).Edge()
+
+
+def _enclosed_face(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
+    """Return the plane face that edges enclose."""
+    rim = BRepBuilderAPI_MakeWire()
+    for edge in edges:
+        rim.Add(edge)
+    return BRepBuilderAPI_MakeFace(rim.Wire(), True).Face()
+
+
+def _parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    """Go through the parts of a shape that are of one kind, such as its solids or edges."""
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _scaled_solid(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
+    stretch = gp_GTrsf()
+    for axis, factor in enumerate(scale, 1):
+        stretch.SetValue(axis, axis, factor)
+    return BRepBuilderAPI_GTransform(solid, stretch).Shape()
+
+
+def outline_pieces(points: Sequence[Point2]) -> Iterator[OutlinePiece]:
+    """Split a path through points into lines and arcs; points at even distances round a circle become an arc.
+
+    An arc is at most half a circle, so that the three points by which it is given lie well apart.
+
+    Args:
+        points: points of the path, m; no two in a row coincide.
+    """
+    chords = [complex(x2 - x1, y2 - y1) for (x1, y1), (x2, y2) in pairwise(points)]
+    start = 0
+    while start < len(chords):
+        count = _chords_of_arc(chords, start)
+        if count < LEAST_CHORDS_OF_ARC:
+            yield points[start], points[start + 1]
+            start += 1
+        else:
+            yield points[start], points[start + count // 2], points[start + count]
+            start += count
+
+
+def _chords_of_arc(chords: Sequence[complex], start: int) -> int:
+    """Count the chords from `start` on that have equal lengths and turn by equal angles, up to half a circle.
+
+    Chords are complex numbers. The ratio of a chord to the one before it gives both: its modulus is the ratio of the
+    lengths, and its phase is the turn.
+    """
+    if start + 1 == len(chords):
+        return 1
+    turn = chords[start + 1] / chords[start]
+    angle = abs(cmath.phase(turn))
+    if abs(abs(turn) - 1.0) > EVEN_CHORDS or not EVEN_CHORDS < angle < CORNER:
+        return 1
+    # The tolerance keeps an exact half circle from losing its last chord to round-off.
+    end = min(len(chords), start + math.floor(math.pi / angle + EVEN_CHORDS))
+    following = range(start + 1, end)
+    return next((i for i in following if abs(chords[i] / chords[i - 1] - turn) > EVEN_CHORDS), end) - start
 
 
 class Assembly:
@@ -52,7 +241,7 @@ class Assembly:
         self._colors = XCAFDoc_DocumentTool.ColorTool_s(self._document.Main())
         self._whole = self._with_name(self._shapes.NewShape(), name)
         self._groups: dict[str, TDF_Label] = {}
-        self._parts: dict[Key, TDF_Label] = {}
+        self._parts: dict[PartKey, TDF_Label] = {}
         self._names: Counter[str] = Counter()
 
     def add(self, solid: Solid) -> None:
@@ -72,10 +261,10 @@ class Assembly:
         return self._groups[name]
 
     def _part(self, solid: Solid) -> TDF_Label:
-        """The part of which a solid is an instance: equal in shape, to as many digits as a scene has, and in look."""
+        """Return the part of which a solid is an instance: equal in shape, to all digits of a scene, and in look."""
         key = (str(solid_data(solid)["shape"]), solid.scale, solid.material)
         if key not in self._parts:
-            kind = COUNTED.sub("", solid.name.rpartition("/")[2])
+            kind = NUMBER_AT_END.sub("", solid.name.rpartition("/")[2])
             self._names[kind] += 1
             name = kind if self._names[kind] == 1 else f"{kind} {self._names[kind]}"
             part = self._with_name(self._shapes.AddShape(solid_of(solid.shape, solid.scale), False), name)
@@ -96,10 +285,10 @@ def step_text(text: str) -> str:
 
     Source: ISO 10303-21:2016, encoding of strings: \X2\ and \X4\.
     """
-    return "".join(c if c.isascii() else _by_number(ord(c)) for c in one_line(text))
+    return "".join(c if c.isascii() else _escape_of(ord(c)) for c in one_line(text))
 
 
-def _by_number(code: int) -> str:
+def _escape_of(code: int) -> str:
     return f"\\X2\\{code:04X}\\X0\\" if code < 0x10000 else f"\\X4\\{code:08X}\\X0\\"
 
 
@@ -124,16 +313,6 @@ def _direction(vector: Vector) -> gp_Dir:
     return gp_Dir(*vector.components())
 
 
-BODY_LAYER = "machine"
-"""The layer whose solids are bodies; springs and frames are only signs."""
-SETTINGS = {"write.step.schema": "AP214IS", "write.step.unit": "MM", "write.surfacecurve.mode": "Off"}
-"""Settings of the writer. Without the curves on surfaces, which readers compute, a file is half as large."""
-STRING = re.compile(rb"'[^']*'")
-"""A string of the file; the writer breaks long ones into lines, even within a character beyond ASCII."""
-UNDATED = "1970-01-01T00:00:00"
-"""The time in the header: equal machines are equal files."""
-
-
 def step_bytes(scene: Scene, name: str) -> bytes:
     """Return the solids of a scene as exact bodies in an assembly: mm, z up, base frame, with names and colours.
 
@@ -149,19 +328,19 @@ def step_bytes(scene: Scene, name: str) -> bytes:
         if solid.layer == BODY_LAYER:
             assembly.add(solid)
     stream = io.BytesIO()
-    with _quiet():
+    with _without_messages():
         writer = STEPCAFControl_Writer()
-        with _set(SETTINGS):
+        with _writer_settings(SETTINGS):
             writer.Transfer(assembly.document())
         model = writer.ChangeWriter().Model()
-        _sign(model, name)
+        _fill_header(model, name)
         _sort_styles(model)
         _number_instances(model)
         writer.WriteStream(stream)
     return STRING.sub(lambda string: string[0].replace(b"\n", b""), stream.getvalue())
 
 
-def _sign(model: Interface_InterfaceModel, name: str) -> None:
+def _fill_header(model: Interface_InterfaceModel, name: str) -> None:
     """Fill in the header."""
     header = APIHeaderSection_MakeHeader(model)
     header.SetName(Text(step_text(name)))
@@ -206,7 +385,7 @@ def _entities(model: Interface_InterfaceModel) -> list[Any]:
 
 
 @contextmanager
-def _set(settings: dict[str, str]) -> Iterator[None]:
+def _writer_settings(settings: dict[str, str]) -> Iterator[None]:
     """Apply settings of the writer, which belong to the whole process, and undo them at the end."""
     with ExitStack() as undoing:
         for name, value in settings.items():
@@ -216,7 +395,7 @@ def _set(settings: dict[str, str]) -> Iterator[None]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _without_messages() -> Iterator[None]:
     """Keep the writer from printing on the terminal, but for failures."""
     with ExitStack() as undoing:
         for printer in Message.DefaultMessenger_s().Printers():
