@@ -48,9 +48,9 @@ def test_a_slot_has_the_factors_of_altintas_and_budak():
     """Full immersion: the mean directional factors are those of the paper, pi (-r, -1; 1, -r)."""
     engagement = milling(PRESSURE, 0.07, 3, 0.0, math.pi, np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
     np.testing.assert_allclose(
-        engagement.mean, 3 / (4 * math.pi) * math.pi * np.array([[-0.07, -1.0], [1.0, -0.07]]), atol=1e-15
+        engagement.mean_force, 3 / (4 * math.pi) * math.pi * np.array([[-0.07, -1.0], [1.0, -0.07]]), atol=1e-15
     )
-    np.testing.assert_allclose(engagement.ways, [[1, 0, 0], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_allclose(engagement.directions, [[1, 0, 0], [0, 1, 0]], atol=1e-15)
 
 
 def grown(machine, ways, force, width, period):

@@ -37,8 +37,8 @@ from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.motion.response import response_in_motion
+from kinetostat.vibration.cutting import cut_receptances
 from kinetostat.vibration.modes import frequencies
-from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
 from kinetostat.vibration.springwise import ModeCounts, mode_counts_of
 

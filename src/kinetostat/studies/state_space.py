@@ -1,6 +1,6 @@
 """A machine as a state space between forces and motions that are chosen by name, for control and simulation.
 
-The matrices are `vibration.state_space`; files of them are written by `exchange.vibration_files`.
+The matrices are made by `vibration.receptance`; files of them are written by `exchange.vibration_files`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,8 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.vibration import modes
 from kinetostat.vibration.modes import Modes
-from kinetostat.vibration.state_space import Equations
-from kinetostat.vibration.state_space import state_space as equations_of
+from kinetostat.vibration.receptance import Equations
+from kinetostat.vibration.receptance import state_space as equations_of
 
 WRENCH = dict(zip(("mx", "my", "mz", "fx", "fy", "fz"), COMPONENTS, strict=True))
 """Names of moments and forces at the tool point, and the components along which they act."""

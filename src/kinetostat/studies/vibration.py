@@ -29,20 +29,17 @@ from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
 from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.tolerances import EQUAL_FREQUENCIES
-from kinetostat.vibration.cutting import tried_frequencies
+from kinetostat.vibration.cutting import LeastRealPart, least_real_part, least_real_part_of, tried_frequencies
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
 from kinetostat.vibration.receptance import (
     ASSUMED_RATIO,
     Damper,
     FreeTool,
-    Softest,
     along,
     couple,
     damper,
-    least_real_part,
     receptance,
-    softest_of,
 )
 from kinetostat.vibration.servo import ClosedLoops, servo_loops, with_standing_motors
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, small_motions, strain_shares
@@ -186,7 +183,7 @@ class Vibration(AnswerInState):
         return along(self.receptance(frequencies), np.array(unit_direction(direction, "direction")))
 
     @checked
-    def softest(self, direction: Sequence[float]) -> Softest:
+    def softest(self, direction: Sequence[float]) -> LeastRealPart:
         """The least real part of the receptance along a direction, which limits the width of a cut, and its frequency.
 
         Args:
@@ -199,7 +196,9 @@ class Vibration(AnswerInState):
         way = np.array(unit_direction(direction, "direction"))
         if self.tool is None and self.loops is None:
             return least_real_part(solution, damping, way)
-        return softest_of(lambda given: along(self.receptance(given.tolist()), way), self.search_frequencies)
+        return least_real_part_of(
+            lambda frequencies: along(self.receptance(frequencies.tolist()), way), self.search_frequencies
+        )
 
     @property
     def search_frequencies(self) -> Array:

@@ -1,31 +1,27 @@
-"""Motion of the tool under a force that varies as a sine: its receptance, with a tool of its own, and unstable cuts.
+"""A machine under forces that vary: the receptance of its tool, alone and with a tool that is coupled to it, and its
+equations of first order.
 
-All motions of the modes carry their part, those without mass as springs do; so the receptance at no frequency is the
-compliance.
+A receptance is the motion under a force that varies as a sine. All motions of the modes carry their part of it, those
+without mass as springs do; so the receptance at no frequency is the compliance.
 
-Source: theory (59), (60) and (108); the limit of a cut, J. Tlusty and M. Polacek (1963). SI, base axes.
+Source: theory (59)-(62) and (108). SI, base axes, at the tool point.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
-from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.state import MachineState
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.frozen import dataclass
-from kinetostat.machine.column import stacked_columns
-from kinetostat.vibration.modes import Modes, damping_matrix, modes
+from kinetostat.tolerances import UNRESISTED
+from kinetostat.vibration.modes import Modes, damping_matrix
 
 ASSUMED_RATIO = 0.02
 """Damping ratio of every mode where a file says nothing about damping: that of many machine tools."""
-TRIED = 200
-"""Frequencies that are tried about each mode, and then about the best of them: that gives 1e-8 of the real part."""
-LEAST_RATIO = 1e-9
-"""Damping ratio below which a peak is as sharp as this one: then it has no least real part that means anything."""
-BANDWIDTHS = 6.0
-"""Distance from a mode's frequency, in multiples of its half-power bandwidth."""
+PARTS_BETWEEN = (0.25, 0.5, 0.75)
+"""Places of further frequencies between two of a tool's own, as shares of their distance: a peak of machine and tool
+together may lie between two of the tool's."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +29,7 @@ class Damper:
     """Damping of the modes.
 
     Attributes:
-        friction: of joints and rotors, and Rayleigh's damping, between the modes [m x m], s.
+        friction: friction of joints and rotors, and Rayleigh's damping, between the modes [m x m], s.
         ratio: damping ratio that every mode has besides.
     """
 
@@ -48,10 +44,10 @@ class Damper:
 
 
 def damper(equations: Balance, modes: Modes, ratio: float, per_mass: float, per_stiffness: float) -> Damper:
-    """The damping of the modes of one pose.
+    """Return the damping of the modes of one pose.
 
     Args:
-        equations: at the state.
+        equations: the machine at its state.
         modes: the vibrations of the machine.
         ratio: damping ratio of every mode.
         per_mass, per_stiffness: Rayleigh's factors, 1/s and s.
@@ -62,10 +58,10 @@ def damper(equations: Balance, modes: Modes, ratio: float, per_mass: float, per_
 
 
 def receptance(modes: Modes, damping: Damper, frequencies: Array) -> Complex:
-    """Motion of the tool per unit of a varying wrench on it, rad and m per N·m and N [frequencies x 6 x 6].
+    """Return the motion of the tool per unit of a varying wrench on it, rad and m per N·m and N [frequencies x 6 x 6].
 
     Args:
-        modes: at the pose.
+        modes: modes at the pose.
         damping: the damping of the modes.
         frequencies: Hz [frequencies].
     """
@@ -80,11 +76,11 @@ def receptance(modes: Modes, damping: Damper, frequencies: Array) -> Complex:
 
 
 def along(receptances: Complex, direction: Array) -> Complex:
-    """The receptance of a point in a direction, m/N [frequencies]: of the force along it, the motion along it.
+    """Return the receptance of a point along a direction, m/N [frequencies]: motion along it by a force along it.
 
     Args:
-        receptances: [frequencies x 6 x 6].
-        direction: any length, base axes [3].
+        receptances: receptances of the point [frequencies x 6 x 6].
+        direction: a vector of any length, base axes [3].
     """
     unit = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     return np.asarray(np.einsum("i,fij,j->f", unit, receptances[:, 3:, 3:], unit))
@@ -113,7 +109,7 @@ class FreeTool:
     @property
     def search_frequencies(self) -> Array:
         """Frequencies that are close enough to follow it: its own, and some between them, Hz."""
-        between = [self.frequencies[:-1] + share * np.diff(self.frequencies) for share in (0.25, 0.5, 0.75)]
+        between = [self.frequencies[:-1] + share * np.diff(self.frequencies) for share in PARTS_BETWEEN]
         return np.unique(np.concatenate([self.frequencies, *between]))
 
 
@@ -124,9 +120,9 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     Components that the tool does not give for its tip are those of the flange, where a wrench then acts on the machine.
 
     Args:
-        machine: receptance at the tool point, base axes [n x 6 x 6].
-        tool: between its frequencies, straight lines are followed.
-        frequencies: within those of the tool, Hz [n].
+        machine: receptance of the machine at the tool point, base axes [n x 6 x 6].
+        tool: the tool; between its frequencies, its receptance follows straight lines.
+        frequencies: frequencies within those of the tool, Hz [n].
 
     Source: theory (108); R. E. D. Bishop and D. C. Johnson, The Mechanics of Vibration (1960); T. L. Schmitz and R. R.
     Donaldson, "Predicting high-speed machining dynamics by substructure analysis", CIRP Annals 49 (2000).
@@ -151,7 +147,7 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
 
 
 def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Any:
-    """Values at frequencies between those of a tool, along straight lines [n x ...]."""
+    """Return values at frequencies between those of a tool, along straight lines [n x ...]."""
     place = np.clip(np.searchsorted(tool.frequencies, frequencies) - 1, 0, len(tool.frequencies) - 2)
     start, end = tool.frequencies[place], tool.frequencies[place + 1]
     share = ((frequencies - start) / (end - start))[:, None, None]
@@ -159,70 +155,86 @@ def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Any:
 
 
 @dataclass(frozen=True)
-class Softest:
-    """Least real part of a receptance, and its frequency.
+class Equations:
+    """The matrices of a state space.
 
     Attributes:
-        frequency: Hz.
-        real: the least real part, m/N; it is negative unless nothing rings.
+        a: rates of the states by the states, 1/s [states x states].
+        b: rates of the states by the inputs [states x inputs].
+        c: outputs by the states [outputs x states].
+        d: outputs by the inputs [outputs x inputs].
+        states: what each state is, in words.
     """
 
-    frequency: float
-    real: float
-
-    def depth(self, pressure: float) -> float:
-        """Width of cut up to which every spindle speed is stable, m; infinite where nothing rings.
-
-        Args:
-            pressure: cutting force per area of the chip, N/m².
-        """
-        return -0.5 / (pressure * self.real) if self.real < 0.0 and pressure else float("inf")
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    states: tuple[str, ...]
 
 
-def least_real_part(modes: Modes, damping: Damper, direction: Array) -> Softest:
-    """Find where the receptance along a direction has its least real part: near one of the modes, a little above it."""
-    tried = [np.zeros(1)]
-    spread = np.linspace(-BANDWIDTHS, BANDWIDTHS, TRIED)
-    for frequency, ratio in zip(modes.frequencies, damping.ratios(modes), strict=True):
-        tried.append(frequency * np.abs(1.0 + max(float(ratio), LEAST_RATIO) * spread))
-    return softest_of(
-        lambda given: along(receptance(modes, damping, given), direction), np.unique(np.concatenate(tried))
+def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, count: int | None = None) -> Equations:
+    """Write the vibrations of a machine as equations of first order.
+
+    Args:
+        modes: modes at the pose.
+        damping: damping of the modes.
+        inputs: motion in each mode of each point and direction in which a force acts [inputs x m], SI per root of a
+            joule.
+        outputs: motion in each mode of each point and direction whose motion is an output [outputs x m].
+        count: number of the lowest modes that become states; all that have mass if None. The others follow at once,
+            without friction, and what they add to the compliance stays in D.
+    """
+    with_mass = modes.ringing
+    kept = with_mass if count is None else min(count, with_mass)
+    friction = damping.friction
+    least = UNRESISTED * float(np.abs(friction).max())
+    creeping, turns = _principal_friction(friction[with_mass:, with_mass:], least)
+    without_mass = with_mass + np.arange(turns.shape[1])
+    creep, free = turns[:, : len(creeping)], turns[:, len(creeping) :]
+    # What follows at once: modes with mass that are no states, and motions without mass that no friction slows.
+    direct_inputs, direct_outputs = (
+        np.concatenate([rows[:, kept:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
+    )
+    # Amplitudes are scaled to the kinetic energy, so that the mass matrix of the modes is 1.
+    roots, size = np.sqrt(modes.squares[:kept]), len(creeping)
+    coupling = creep.T @ friction[with_mass:, :kept] / roots
+    by_creep = coupling.T / creeping
+    mode_friction = friction[:kept, :kept] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
+    mode_forces, creep_forces = inputs[:, :kept].T / roots[:, None], creep.T @ inputs[:, without_mass].T
+    rates_by_states = [
+        [np.zeros((kept, kept)), np.eye(kept), np.zeros((kept, size))],
+        [-np.diag(1.0 / roots**2), by_creep @ coupling - mode_friction, by_creep],
+        [np.zeros((size, kept)), -coupling / creeping[:, None], -np.diag(1.0 / creeping)],
+    ]
+    rates_by_inputs = [
+        np.zeros((kept, len(inputs))),
+        mode_forces - by_creep @ creep_forces,
+        creep_forces / creeping[:, None],
+    ]
+    outputs_by_states = [outputs[:, :kept] / roots, np.zeros((len(outputs), kept)), outputs[:, without_mass] @ creep]
+    states = [f"{kind} of mode {k + 1}" for kind in ("amplitude", "speed") for k in range(kept)]
+    states += [f"creeping motion {k + 1}" for k in range(size)]
+    return Equations(
+        a=np.block(rates_by_states),
+        b=np.vstack(rates_by_inputs),
+        c=np.hstack(outputs_by_states),
+        d=direct_outputs @ direct_inputs.T,
+        states=tuple(states),
     )
 
 
-def softest_of(response: Callable[[Array], Complex], tried: Array) -> Softest:
-    """Find where a response has its least real part: at the frequencies that are tried, then closer about the best.
+def _principal_friction(friction: Array, least: float) -> tuple[Array, Array]:
+    """Return the principal frictions of the motions without mass, of which those with friction creep.
 
     Args:
-        response: motion per force at frequencies, m/N [n].
-        tried: frequencies, Hz, ascending.
+        friction: friction between these motions, s [n x n].
+        least: friction up to which it is round-off, s.
+
+    Returns:
+        The frictions beyond round-off, the greatest first [k]; all principal directions as columns [n x n], in the same
+        order.
     """
-    near = int(np.argmin(response(tried).real))
-    fine = np.linspace(tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)], TRIED)
-    lowest = int(np.argmin(response(fine).real))
-    return Softest(float(fine[lowest]), float(response(fine[lowest : lowest + 1]).real[0]))
-
-
-def cut_receptances(state: MachineState) -> Array:
-    """The least real part of the receptance across the cut at n poses, m/N [n]; NaN where nothing holds the machine.
-
-    Poses are taken in turn: a few milliseconds each.
-
-    Args:
-        state: of a machine with its tables [cutting] and [damping], at n poses.
-    """
-    machine, mechanism, count = state.machine, state.free_equations.mechanism, state.count
-    table, result = machine.tables["damping"], np.full(count, np.nan)
-    directions = stacked_columns(machine.tables["cutting"].direction, count)
-    damping = stacked_columns([table.ratio, table.per_mass, table.per_stiffness], count)
-    for row in range(count):
-        here = mechanism.at(np.array([row]))
-        equations = balance(here, free_state(here))
-        solution = modes(equations)
-        if solution is not None:
-            ratio, per_mass, per_stiffness = damping[row]
-            friction = any(leg.dampers.any() for leg in here.legs)
-            ratio = ratio if friction or damping[row].any() else ASSUMED_RATIO
-            damped = damper(equations, solution, ratio, per_mass, per_stiffness)
-            result[row] = least_real_part(solution, damped, directions[row]).real
-    return result
+    sizes, directions = np.linalg.eigh(friction)
+    sizes, directions = sizes[::-1], directions[:, ::-1]
+    return sizes[sizes > least], directions

@@ -20,8 +20,7 @@ from kinetostat.machine.drives import numbers_of_drive, rotor_turns, with_every_
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.modes import Modes
-from kinetostat.vibration.receptance import Damper, receptance
-from kinetostat.vibration.state_space import state_space
+from kinetostat.vibration.receptance import Damper, receptance, state_space
 
 UNSTABLE_REAL_PART = 1e-9
 """Real part of a pole, as a share of its size, above which the motion grows; below it is round-off."""
