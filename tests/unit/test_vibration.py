@@ -20,7 +20,7 @@ from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.vibration import NOTHING_RINGS, TOO_DIFFERENT, modes
-from kinetostat.vibration.reduced import free_frequencies, legs_without_mass, pose_frequencies, reducible
+from kinetostat.vibration.scalar_frequencies import free_frequencies, legs_without_mass, pose_frequencies, reducible
 from machines import with_bodies
 
 BODY = {"tool.mass": 12.0, "tool.inertia.0": 0.3, "tool.inertia.1": 0.3, "tool.inertia.2": 0.5}

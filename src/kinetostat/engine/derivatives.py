@@ -39,8 +39,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, IDLE_FREEDOM, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
-from kinetostat.vibration.reduced import reducible
-from kinetostat.vibration.slopes import EQUALS, mode_columns
+from kinetostat.vibration.scalar_frequencies import SPARE_MODES, mode_columns, reducible
 from kinetostat.vibration.springwise import mode_counts_of
 
 MACHINE_CODE_FROM = 20_000
@@ -142,7 +141,7 @@ def _modes_to_know(machine: Machine, weights: Sequence[Weights], paths: Sequence
     """Count the modes to be solved for before a program takes derivatives; 0 where it finds the frequencies itself."""
     named = {name: QUANTITIES[name] for objective in weights for name, _ in objective}
     wanted = [int(name.rpartition("_")[2]) for name, row in named.items() if row.modal and not row.loaded]
-    return max(wanted) + EQUALS if wanted and not reducible(machine, paths) else 0
+    return max(wanted) + SPARE_MODES if wanted and not reducible(machine, paths) else 0
 
 
 def _fill(

@@ -31,11 +31,10 @@ if TYPE_CHECKING:
     from kinetostat.equilibrium import reduced
     from kinetostat.equilibrium import state as machine_state
     from kinetostat.motion import rigid
-    from kinetostat.vibration import reduced as vibrations
-    from kinetostat.vibration import slopes, springwise
+    from kinetostat.vibration import scalar_frequencies, springwise
 else:  # most programs are of machines that are free and stand still
     reduced, machine_state = LateModule("kinetostat.equilibrium.reduced"), LateModule("kinetostat.equilibrium.state")
-    vibrations, slopes = LateModule("kinetostat.vibration.reduced"), LateModule("kinetostat.vibration.slopes")
+    scalar_frequencies = LateModule("kinetostat.vibration.scalar_frequencies")
     rigid, springwise = LateModule("kinetostat.motion.rigid"), LateModule("kinetostat.vibration.springwise")
 
 
@@ -199,7 +198,8 @@ def objectives_of(
             under load, coordinates of its state follow, see `step_of`.
         limited: whether the limits of a machine meant under its loads judge its points at rest.
         plan: which motions there are, where quantities need them, see `plan_for`.
-        modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
+        modes: how many modes are known, as further columns (`scalar_frequencies.vibrating`); 0 to solve for frequencies
+            inside.
         mode_counts: how many modes over springs are known, as further columns, where legs that have masses close loops.
         stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
             of its size, so that the program can be repeated until this is small.
@@ -256,11 +256,11 @@ def _response_at_rest(
         status = where(motions.sure, status, int(Status.NOT_CONVERGED))
         if mode_counts.loaded:
             squares = [motions.square(mode) for mode in modes[: mode_counts.loaded]]
-            loaded["frequency"] = vibrations.lowest_frequencies(squares)
+            loaded["frequency"] = scalar_frequencies.lowest_frequencies(squares)
         if mode_counts.factor:
             loaded["factor"] = motions.factor(modes[-1])
     if "frequency" in wanted and "frequency" not in loaded:
-        loaded["frequency"] = vibrations.frequencies_at(equations.cut, there, differentiated)
+        loaded["frequency"] = scalar_frequencies.frequencies_at(equations.cut, there, differentiated)
     columns = (*state, *(column for mode in modes for column in mode))
     return replace(response, loaded=loaded, status=status), columns
 
@@ -282,17 +282,17 @@ def _response_vibrating(
     if mode_counts is not None and mode_counts.free:
         motions = springwise.motions_without_loads(given.machine, response, joints)
         shapes = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
-        squares = vibrations.lowest_frequencies([motions.square(shape) for shape in shapes])
+        squares = scalar_frequencies.lowest_frequencies([motions.square(shape) for shape in shapes])
         status = where(motions.sure, response.status, int(Status.SINGULAR))
         columns = tuple(column for shape in shapes for column in shape)
         return replace(response, frequencies=squares, status=status), columns
     if modes:
-        vibration = slopes.vibrating(given.machine, response, joints, modes)
+        vibration = scalar_frequencies.vibrating(given.machine, response, joints, modes)
         unknowns = new_inputs(given.graph, vibration.columns)
-        squares = vibrations.lowest_frequencies(vibration.squares(unknowns))
+        squares = scalar_frequencies.lowest_frequencies(vibration.squares(unknowns))
         return replace(response, frequencies=squares), unknowns
     if any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
-        squares = vibrations.free_frequencies(given.machine, response, joints, differentiated)
+        squares = scalar_frequencies.free_frequencies(given.machine, response, joints, differentiated)
         return replace(response, frequencies=squares), ()
     return response, ()
 

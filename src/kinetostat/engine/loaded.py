@@ -39,7 +39,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.motion.response import response_in_motion
 from kinetostat.vibration.cutting import cut_receptances
 from kinetostat.vibration.modes import frequencies
-from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
+from kinetostat.vibration.scalar_frequencies import leaves_plane, platform_alone, pose_frequencies, reducible
 from kinetostat.vibration.springwise import ModeCounts, mode_counts_of
 
 

@@ -9,10 +9,11 @@ eigenvalues are in 1/s².
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.scalar import is_zero
+from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.masses import Masses
@@ -85,6 +86,15 @@ def energies(masses: Masses, rates: Sequence[PartRates], length: Array) -> Itera
     for first, second in masses.pairs:
         both = np.swapaxes(rates[first].moving, 1, 2) @ rates[second].moving
         yield masses.names[first], (both + np.swapaxes(both, 1, 2)) * coupled[:, first, None, None]
+
+
+def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
+    """Twice the kinetic energy of some masses in a motion of their coordinates."""
+    moving = [
+        replace(part, moving=(part.moving @ motion)[..., None], turning=(part.turning @ motion)[..., None])
+        for part in rates
+    ]
+    return total([matrix[0, 0, 0] for _, matrix in energies(masses, moving, length)])
 
 
 def _columns(amounts: Array, length: Array) -> Array:

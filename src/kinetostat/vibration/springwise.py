@@ -38,9 +38,8 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import SURELY_MORE, UNRESISTED
-from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
-from kinetostat.vibration.reduced import platform_alone
-from kinetostat.vibration.slopes import EQUALS, energy_of
+from kinetostat.vibration.inertia import energies, energy_of, leg_rates, platform_inertia
+from kinetostat.vibration.scalar_frequencies import SPARE_MODES, platform_alone
 
 Modal: TypeAlias = Literal["free", "loaded", "factor"]
 """Numbers that follow from modes: frequencies with relaxed springs, those at rest under loads, and the load factor."""
@@ -380,7 +379,7 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
         max([int(row.name.rpartition("_")[2]) for row in modal if row.modal and bool(row.loaded) == at_rest], default=0)
         for at_rest in (True, False)
     ]
-    loaded, free = (min(most, number + EQUALS) if number and not alone else 0 for number in highest)
+    loaded, free = (min(most, number + SPARE_MODES) if number and not alone else 0 for number in highest)
     result = ModeCounts(loaded, int(any(row.loaded == "factor" for row in modal)), free)
     return result if result != ModeCounts() else None
 

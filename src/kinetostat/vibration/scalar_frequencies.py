@@ -1,10 +1,16 @@
-"""Natural frequencies over scalars, by sums and Jacobi's rotations without branches, for machine code at many poses.
+"""Natural frequencies over scalars, for machine code and for derivatives: by rotations, or from modes that are known.
 
 Where the platform alone is massive, the compliance at the tool is all that is needed, whatever the legs are. Where
-links or rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. Machines
-that allow neither are left to `modes`.
+links or rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. In both
+cases the eigenvalues are found by sums and Jacobi's rotations, without branches.
 
-Source: theory (63); with the platform alone, (58) with C. Units are those of `equilibrium.mechanism`.
+Machines that allow neither are solved by `modes`, and modes that it has found are given back to the formulas as columns
+of numbers. A mode is a stationary point of its mu = 1 / omega² over all motions that obey the closing of the legs. So a
+change of the machine changes mu as if the mode and the forces that close the legs stayed as they are: no eigenvalue
+problem is differentiated, and any machine will do.
+
+Source: theory (58), with C where the platform alone is massive, (63) and what follows it. Units are those of
+`equilibrium.mechanism`.
 """
 
 import math
@@ -19,25 +25,36 @@ from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
 from kinetostat.equilibrium.legwise import LegwiseTangent
-from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.numerics.motions import of_scalars
-from kinetostat.tolerances import UNRESISTED
-from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
-from kinetostat.vibration.modes import frequencies, hertz
+from kinetostat.numerics.motions import of_scalars, still
+from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
+from kinetostat.vibration.inertia import energies, energy_of, leg_rates, platform_inertia, platform_rates
+from kinetostat.vibration.modes import (
+    frequencies,
+    hertz,
+    mass_matrix,
+    motions_left_out,
+    solved_modes,
+    stiffness_matrix,
+)
 
 EQUAL_SQUARES = 1e-9
-"""Relative difference of the squares of two frequencies up to which they count as equal."""
+"""Relative difference of the squares of two frequencies up to which they count as equal: far above round-off, and far
+below what two parts that are meant to differ do."""
 PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.(.*\.)?rotor_inertia|legs\..*\.mass|sections\..*\.density")
 """Leaf paths of parameters that may give links or rotors a mass."""
+SPARE_MODES = 5
+"""Modes beyond the last one that is wanted: equal frequencies share their mean, so that equal ones must be known."""
 
 
 def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
@@ -72,10 +89,10 @@ def legs_without_mass(machine: Machine, configuration: Configuration) -> bool:
 
 
 def free_frequencies(machine: Machine, response: Response, joints: Joints | None, sloped: bool = False) -> list[Scalar]:
-    """The lowest natural frequencies of a machine with relaxed springs, Hz [MODES]; infinite where there are fewer.
+    """Return the lowest natural frequencies of a machine with relaxed springs, Hz [MODES]; infinite beyond the last.
 
     Args:
-        machine: with its masses; numbers of any kind.
+        machine: the machine with its masses, and numbers of any kind.
         response: the response of the machine at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
         sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
@@ -113,10 +130,10 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
     parts, length = machine.family.components, response.configuration.length
     units = [length if part in range(3) else 1.0 for part in range(6)]  # so that all rows are in m/N and kg
     inertia = _platform_inertia(machine, response)
-    soft = [[response.compliance.entry(i, j) * units[i] * units[j] for j in parts] for i in parts]
-    heavy = [[inertia[i][j] * (1.0 / (units[i] * units[j])) for j in parts] for i in parts]
-    factor = np.array(semidefinite_root(soft), dtype=object)
-    return (factor.T @ np.array(heavy, dtype=object) @ factor).tolist()
+    compliance = [[response.compliance.entry(i, j) * units[i] * units[j] for j in parts] for i in parts]
+    mass = [[inertia[i][j] * (1.0 / (units[i] * units[j])) for j in parts] for i in parts]
+    factor = np.array(semidefinite_root(compliance), dtype=object)
+    return (factor.T @ np.array(mass, dtype=object) @ factor).tolist()
 
 
 def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
@@ -208,3 +225,98 @@ def _frequency(square: Scalar, largest: Scalar) -> Scalar:
     """The frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
     finite = square > UNRESISTED * largest
     return where(finite, 0.5 / math.pi / sqrt(where(finite, square, 1.0)), math.inf)
+
+
+def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
+    """Return the lowest modes of a machine with relaxed springs at n poses as columns for `Vibrating.squares` [n].
+
+    Args:
+        machine: the machine, with columns of n poses.
+        count: number of poses, n.
+        most: number of modes; those that a pose does not have are zero.
+
+    Returns:
+        The unit of force, then for each mode its 1 / omega², its motion of all coordinates, and the forces that close
+        the legs. NaN where springs do not hold the machine.
+    """
+    equations = MachineState(machine, count).free_equations
+    mechanism = equations.mechanism
+    stiff, conditions = stiffness_matrix(equations)
+    mass, closing = mass_matrix(equations), conditions.shape[1]
+    constraints = np.concatenate([conditions, motions_left_out(equations, mass)], axis=1)
+    columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
+    for part in solved_modes(equations):
+        known = min(most, part.squares.shape[1])
+        squares, shapes = part.squares[:, :known], part.shapes[:, :, :known]
+        # Along allowed motions mu K y = M y; across them, the forces of the constraints balance the difference.
+        imbalance = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes
+        forces = np.linalg.pinv(np.swapaxes(constraints[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ imbalance
+        rows = np.concatenate([squares[:, None], shapes, forces[:, :closing]], axis=1)
+        columns[part.rows] = 0.0
+        columns[part.rows, :known] = np.swapaxes(rows, 1, 2)
+    return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
+
+
+@dataclass(frozen=True)
+class Vibrating:
+    """A machine with relaxed springs whose modes are known, over scalars.
+
+    Attributes:
+        mechanism: the machine as coordinates and masses.
+        most: number of modes that are known.
+    """
+
+    mechanism: Mechanism
+    most: int
+
+    @property
+    def sizes(self) -> list[int]:
+        """Number of coordinates of the platform, and of each leg."""
+        return [self.mechanism.ways.shape[1], *(leg.size for leg in self.mechanism.legs)]
+
+    @property
+    def columns(self) -> int:
+        """Number of columns that `mode_columns` makes of it."""
+        return 1 + self.most * (1 + sum(self.sizes) + self.sizes[0] * len(self.mechanism.legs))
+
+    def squares(self, columns: Sequence[Scalar]) -> list[Scalar]:
+        """1 / omega² of each mode, s² [most]: exact, as their derivatives by the machine's parameters are.
+
+        Args:
+            columns: the columns that `mode_columns` makes.
+        """
+        force_unit, *of_modes = columns
+        size = len(of_modes) // self.most
+        ratio = self.mechanism.force[0] / force_unit
+        return [self._square(of_modes[k * size : (k + 1) * size], ratio) for k in range(self.most)]
+
+    def _square(self, columns: Sequence[Scalar], ratio: Scalar) -> Scalar:
+        """Return mu + y^T M y - mu y^T K y + 2 forces . what opens the legs, of which all but mu add up to 0."""
+        mechanism, remaining = self.mechanism, iter(columns)
+        square = next(remaining)
+        rates, *leg_motions = [of_scalars([next(remaining) for _ in range(size)])[0] for size in self.sizes]
+        forces = [mechanism.ways @ [next(remaining) for _ in range(self.sizes[0])] for _ in mechanism.legs]
+        twist = mechanism.ways @ rates
+        kinetic = energy_of(mechanism.platform, platform_rates(mechanism.platform, still(1)), twist, mechanism.length)
+        strain, opening_work = 0.0, 0.0
+        amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
+        for leg, motion, force in zip(mechanism.legs, leg_motions, forces, strict=True):
+            placed = leg.chain.place(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
+            kinetic = kinetic + energy_of(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
+            kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
+            strain = strain + total(list(leg.stiffness[0] * motion * motion))
+            end_twist = placed.screws[0].T @ (leg.chain.follows @ motion)
+            opening_work = opening_work + total(list(force * (end_twist - twist)))
+        return square + ratio * (kinetic - square * strain) + 2.0 * opening_work
+
+
+def vibrating(machine: Machine, response: Response, joints: Joints | None, most: int) -> Vibrating:
+    """Return a machine with numbers of any kind, whose modes will be known.
+
+    Args:
+        machine: the machine with its masses.
+        response: the response of the machine at its pose.
+        joints: coordinates that close its legs, if it is written leg by leg.
+        most: number of modes.
+    """
+    return Vibrating(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0), most)
