@@ -17,7 +17,7 @@ from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.commands.doctor import _program_folder, print_checks
 from kinetostat.engine import program_files
 from kinetostat.spec.installation import extra_command, install_command
-from kinetostat.studies import diagnosis, self_test
+from kinetostat.studies import diagnosis, printed_numbers, self_test
 from kinetostat.studies.diagnosis import InstallationCheck, Soundness, UnsoundError
 from kinetostat.studies.printed_numbers import table_3
 
