@@ -10,7 +10,6 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 SMALL = 35
 """Nodes of a body up to which functions may be alike: a property that passes a value on, a sum of three products."""
 CALLED_FROM_OUTSIDE = {
-    "WITH_CRANKS": "the catalogue takes every family that a module defines",
     "dask_setup": "called by workers of a cluster, by this name",
     "_fill_text": "called by argparse, by this name",
     "_split_lines": "called by argparse, by this name",

@@ -6,7 +6,9 @@ here. Points and axes are in the base frame, points of the platform's ring befor
 Source: theory (13)-(15) for the cranks.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from itertools import chain
 from typing import Annotated, Any
 
 from kinetostat.algebra.lines import crank_end, crank_range
@@ -57,6 +59,16 @@ class CrankLinks:
     axial: Scalar = RIGID
 
 
+PlacedLeg = tuple[Leg, tuple[Closure, ...]]
+"""A leg at a pose, and what it needs to close there."""
+
+
+def legs_and_closures(placed: Iterable[PlacedLeg]) -> tuple[tuple[Leg, ...], tuple[Closure, ...]]:
+    """Return the actuated legs of a family with their numbers, and what all of them need to close."""
+    legs, closures = zip(*placed, strict=True)
+    return tuple(with_numbers(legs)), tuple(chain.from_iterable(closures))
+
+
 CRANK_LINKS = (
     LinkKind("cranks", ("crank_bending",), in_each_leg("crank", "crank_length", 0)),
     LinkKind("rods", ("leg_axial",), in_each_leg("rod", "rod_length", 1)),
@@ -88,9 +100,7 @@ def place(name: str, base: Vector, tip: Vector, axis: Vector, links: CrankLinks)
     return crank_end(base, tip, axis, links.crank, links.rod), limits
 
 
-def crank_leg(
-    name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Scalar, links: CrankLinks
-) -> tuple[Leg, tuple[Closure, ...]]:
+def crank_leg(name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Scalar, links: CrankLinks) -> PlacedLeg:
     """R-U-S with the revolute actuated: a force along the rod and nothing else (theory section 4).
 
     The crank bends at its built-in end, in its plane and across it, by 3 E I / length each: of the four torsional
@@ -106,7 +116,7 @@ def crank_leg(
     elbow, limits = place(name, base, tip, axis, links)
     along, crank = (tip - elbow) * reciprocal(links.rod), (elbow - base) * reciprocal(links.crank)
     bending, part = per_length(links.bending, links.crank, 3.0), PartName(name, "crank")
-    chain: tuple[Element, ...] = (
+    elements: tuple[Element, ...] = (
         Spring(PartName(name, "actuator"), Joint(axis, base), stiffness, actuated=True),
         *if_elastic(
             Spring(f"{part} in plane", Joint(axis, base), bending, part),
@@ -117,7 +127,7 @@ def crank_leg(
         *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(links.axial, links.rod))),
         *revolutes(tip, AXES, f"{name} platform joint"),
     )
-    return Leg(name, chain, (Line(tip, along),)), limits
+    return Leg(name, elements, (Line(tip, along),)), limits
 
 
 def crank_legs(
@@ -125,7 +135,7 @@ def crank_legs(
     sides: Sequence[Vector],
     stiffness: Sequence[Scalar],
     links: CrankLinks,
-) -> tuple[list[Leg], list[Closure]]:
+) -> tuple[tuple[Leg, ...], tuple[Closure, ...]]:
     """R-U-S legs "leg 1", "leg 2", ... whose cranks turn in vertical planes, and their limits.
 
     For a platform joint above its base joint the crank points to its side, else away from it.
@@ -136,14 +146,15 @@ def crank_legs(
         stiffness: the stiffness of the actuators, N·m/rad.
         links: crank and rod, alike in all legs.
     """
-    placed = [
+    return legs_and_closures(
         crank_leg(f"leg {i}", base, tip, Z_AXIS.cross(side), k, links)
         for i, (base, tip, side, k) in enumerate(zip(*ends, sides, stiffness, strict=True), 1)
-    ]
-    return with_numbers(leg for leg, _ in placed), [limit for _, limits in placed for limit in limits]
+    )
 
 
 Three = tuple[float, float, float]
+of_three_legs = partial(Quantity, count=3, per_leg=True)
+"""A quantity with a value for each of three legs."""
 
 
 @table

@@ -1,7 +1,8 @@
 """The families of machines in closed form: those whose modules are here, and those that other packages register.
 
-A machine is pickled for other processes as numbers, with its family by name or by how it is made: functions and classes
-of a family are made while a program runs and cannot be pickled.
+A module has its family as `FAMILY`, or several in a row as `FAMILIES`. A machine is pickled for other processes as
+numbers, with its family by name or by how it is made: functions and classes of a family are made while a program runs
+and cannot be pickled.
 """
 
 import copyreg
@@ -53,8 +54,9 @@ def _modules() -> list[str]:
 
 @cache
 def _families_in(module: str) -> dict[str, Family]:
-    content = vars(importlib.import_module(f"{__name__}.{module}")).values()
-    return {value.name: value for value in content if isinstance(value, Family)}
+    content = vars(importlib.import_module(f"{__name__}.{module}"))
+    listed = (*content.get("FAMILIES", ()), *content.values())
+    return {value.name: value for value in listed if isinstance(value, Family)}
 
 
 @checked

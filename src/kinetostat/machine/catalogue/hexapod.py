@@ -1,6 +1,7 @@
-"""Gough-Stewart hexapods: six U-P-S legs between two rings of joints, six freedoms.
+"""Gough-Stewart hexapods: six struts U-P-S, or cranks R-U-S, between two rings of joints; six freedoms.
 
-What people may write about one and its closed-form kinematics. Leg i goes from base joint i to platform joint i.
+The fields of their files and their kinematics in closed form are here. Leg i goes from base joint i to platform joint
+i. Points and axes are in the base frame.
 """
 
 from typing import Annotated
@@ -58,13 +59,12 @@ def placement(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placemen
     return Placement(platform, joints)
 
 
-TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY, WITH_CRANKS = with_struts_or_cranks(
+FAMILIES = with_struts_or_cranks(
     "hexapod",
     (
         "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw",
         "6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw",
     ),
-    TABLES,
+    {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     placement,
 )
