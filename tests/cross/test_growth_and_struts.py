@@ -12,7 +12,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.assembly import forward
 from kinetostat.studies.commanding import command
 from kinetostat.studies.under_load import Rest, under_load
-from kinetostat.views.loaded_tables import stability_of
+from kinetostat.views.loaded import stability_of
 from machines import load_without_limits, written
 
 GROWTH = 12e-6 * 40.0

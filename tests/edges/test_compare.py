@@ -13,8 +13,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison import compare, read_design
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studio.design.texts import comparison_text
-from kinetostat.views.comparison import COMPARISON
-from kinetostat.views.comparison_figure import comparison_figure
+from kinetostat.views.comparison import COMPARISON, comparison_figure
 from kinetostat.views.data_forms import json_of
 
 PAPER = "zhang-gosselin-4dof"

@@ -22,10 +22,10 @@ from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import save_figure
 from kinetostat.views.grid_figures import contour_maps, grid_curves
-from kinetostat.views.guideline_figures import guideline_figures
+from kinetostat.views.guidelines import guideline_figures
 from kinetostat.views.layout import _Surroundings
 from kinetostat.views.map_scales import levels_of
-from kinetostat.views.sensitivity_figures import sensitivity_figure
+from kinetostat.views.sensitivity import sensitivity_figure
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"

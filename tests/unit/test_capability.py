@@ -11,8 +11,7 @@ import kinetostat
 from driven_sets import LINEAR, MACHINES, greatest_motion, greatest_wrench
 from kinetostat import InputError, capability, drives, dynamics, evaluate, load, save
 from kinetostat.numerics.polytopes import outline, reach_along, vertices
-from kinetostat.views.capability import CAPABILITY
-from kinetostat.views.capability_figures import capability_figures
+from kinetostat.views.capability import CAPABILITY, capability_figures
 
 COMPONENTS = {"force": slice(3, 6), "moment": slice(0, 3), "speed": slice(3, 6), "rate": slice(0, 3)}
 

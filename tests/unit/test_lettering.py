@@ -8,7 +8,7 @@ from matplotlib.font_manager import fontManager
 from kinetostat.views import lettering
 from kinetostat.views.figures import set_title
 from kinetostat.views.layout import fix_layout
-from kinetostat.views.sensitivity_figures import coloured_table
+from kinetostat.views.sensitivity import coloured_table
 
 
 def test_a_character_without_a_font_is_shown_by_its_number(monkeypatch):

@@ -29,14 +29,13 @@ if TYPE_CHECKING:
     from kinetostat.equilibrium import solving
     from kinetostat.studies import requirements, under_load
     from kinetostat.studies.under_load import LoadedState
-    from kinetostat.views import data_forms
-    from kinetostat.views import loaded_tables as loaded
+    from kinetostat.views import data_forms, loaded
 else:
     solving = LateModule("kinetostat.equilibrium.solving")
     data_forms = LateModule("kinetostat.views.data_forms")
     requirements = LateModule("kinetostat.studies.requirements")
     under_load = LateModule("kinetostat.studies.under_load")
-    loaded = LateModule("kinetostat.views.loaded_tables")
+    loaded = LateModule("kinetostat.views.loaded")
 
 INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
 
@@ -251,7 +250,7 @@ LOADED = Description(
     ),
     lines=_loaded_lines,
     tables=lambda state, full: _filled_parts(_loaded_parts(state, full)),
-    figures="views.loaded_figures.loaded_figures",
+    figures="views.loaded.loaded_figures",
     state=lambda state: f"under load: {state.rest.word}",
     answered=lambda state: state.has_rest,
     kept=lambda state: (

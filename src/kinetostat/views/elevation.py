@@ -22,7 +22,7 @@ from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.data_forms import columns_csv
 from kinetostat.views.figures import COLOURS, look_of, new_figure
-from kinetostat.views.loaded_tables import KINDS_OF_LOADS
+from kinetostat.views.loaded import KINDS_OF_LOADS
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LAW_TOLERANCE,

@@ -17,7 +17,7 @@ from kinetostat.machine.machine import Configuration, Machine, setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
 from kinetostat.views.drawing import Points
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, new_figure
-from kinetostat.views.loaded_figures import moved_legend, moved_machine
+from kinetostat.views.loaded import moved_legend, moved_machine
 from kinetostat.views.question import Drawing
 from kinetostat.views.rendering.camera import VIEWPOINTS, axes_towards
 from kinetostat.views.scene.anatomy import proportions_of

@@ -24,7 +24,7 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table, titled_table
 from kinetostat.units import component_units, load_unit, motion_unit
 from kinetostat.views.analysis_tables import actuator_table, entry_unit, matrix_units
-from kinetostat.views.loaded_tables import (
+from kinetostat.views.loaded import (
     actuator_sentence,
     named_leg_springs,
     sag_sentence,

@@ -21,10 +21,12 @@ from kinetostat.views.answers import description_of
 from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
-from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
-from kinetostat.views.loaded_tables import (
+from kinetostat.views.loaded import (
     SIGNS,
+    bars_figure,
     displacement_table,
+    load_figure,
+    shape_figure,
     springs_or_kinds_table,
     stability_of,
     strut_table,

@@ -27,7 +27,7 @@ from kinetostat.units import load_unit
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.analysis_tables import first_lines, margin_sentence
 from kinetostat.views.drawing import three_views
-from kinetostat.views.loaded_tables import KINDS_OF_LOADS, actuator_springs, loaded_lines
+from kinetostat.views.loaded import KINDS_OF_LOADS, actuator_springs, loaded_lines
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of

@@ -1,0 +1,402 @@
+"""A machine under load for people: its sentences, tables and figures.
+
+Sentences and tables say what holds at rest; figures show its shape over the unloaded one, what each leg carries, and
+the curve while the load grows. Nothing is computed here.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from kinetostat.algebra.scalar import reciprocal
+from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
+from kinetostat.display import DASH, Display, Scale, number, with_minus_signs
+from kinetostat.kinetostatics.loading import Deflection
+from kinetostat.kinetostatics.response import Response
+from kinetostat.late import LateModule
+from kinetostat.machine.machine import Machine, setting_of
+from kinetostat.studies.under_load import LoadedState, SpringState, load_curve
+from kinetostat.units import component_units, load_unit, motion_unit
+from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiffness_sentence
+from kinetostat.views.question import Drawing, Lines
+from kinetostat.views.tables import FittedTable, numeric_table
+
+if TYPE_CHECKING:
+    import matplotlib as mpl
+    from matplotlib import lines
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import drawing, figures, layout, lettering
+    from kinetostat.views.scene import anatomy, overlays
+else:
+    mpl = LateModule("matplotlib")
+    lines = LateModule("matplotlib.lines")
+    drawing = LateModule("kinetostat.views.drawing")
+    figures = LateModule("kinetostat.views.figures")
+    layout = LateModule("kinetostat.views.layout")
+    lettering = LateModule("kinetostat.views.lettering")
+    anatomy = LateModule("kinetostat.views.scene.anatomy")
+    overlays = LateModule("kinetostat.views.scene.overlays")
+
+KINDS_OF_LOADS = ((False, "force"), (True, "moment"))
+"""Whether an actuator turns, and the kind of its load."""
+MOST_LISTED_SPRINGS = 12
+"""Springs that have a row each: a machine with more has many alike, which are told by kind."""
+NOTHING_LOADS = "[load] has no force, no moment and no preload, and no mass under gravity"
+SIGNS = (
+    "A load is positive where it pulls: of an actuator, cable or link, where it pulls its ends together. Of a bearing "
+    "or flexure it is positive along the axis that the file gives, so that mirrored copies of a leg differ in sign."
+)
+"""Meaning of the signs of loads, which stands beside their tables."""
+UNLOADED_COLOUR = "#9a9a9a"
+"""Colour of the machine without its loads, behind the loaded one."""
+BAR_HEIGHT = 0.24
+"""Height of the figure for each bar, inches: names of legs stand line by line beside them."""
+LEAST_NAME_WIDTH = 2.0
+"""Least room for the names of legs, inches: figures of different machines then begin alike."""
+PIECES_OF_LINK = 12
+"""Straight pieces of which a bent link is drawn: its corners cannot be seen in a view of a few centimetres."""
+MOST_CURVES = 12
+"""Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
+Projection: TypeAlias = Callable[[list[Vector]], tuple[list[float], list[float]]]
+"""Gives the coordinates of points in a picture, across and up."""
+
+
+def stability_of(state: LoadedState) -> str:
+    """Say how far the load may grow, for the springs and for the struts."""
+    first = min(state.struts, key=lambda strut: strut.factor, default=None)
+    if first is None or math.isinf(first.factor):
+        return _stability_of_springs(state.factor)
+    bends = f"Strut {first.name} bends away at about {number(first.factor, digits=3)} times this load."
+    return f"{bends} {_stability_of_springs(state.factor)}"
+
+
+def _stability_of_springs(factor: float | None) -> str:
+    if factor is None:
+        return "The springs alone hold nothing here: weight and tension do."
+    if math.isinf(factor):
+        return "No growth of this load makes the springs unstable."
+    if factor < 1.0:
+        return f"The springs are unstable beyond {number(factor)} times this load."
+    return f"The load may grow to {number(factor)} times its size until the springs become unstable."
+
+
+def loaded_lines(state: LoadedState) -> Lines:
+    """Say what a machine at rest does under its loads: stiffness, softest direction, sag, actuators, stability.
+
+    Args:
+        state: a state of rest.
+    """
+    display, names = state.machine.display, state.components
+    if not state.loaded:
+        yield "Loads", f"Nothing loads the machine: {NOTHING_LOADS}."
+    if state.compliance is not None:
+        felt = stiffness_sentence(names, [row[i] for i, row in enumerate(state.compliance)], display)
+        yield "Stiffness", f"{felt} (against further loads, at the loaded {state.machine.reference}, base axes)."
+    if state.softest:
+        yield "Softest", softest_sentence(state.softest, display)
+    if state.loaded:
+        yield "Sag", sag_sentence(state)
+        yield "Actuators", actuator_sentence(state)
+        yield "Stability", stability_of(state)
+
+
+def sag_sentence(state: LoadedState) -> str:
+    """Say how far the loads move and turn the tool."""
+    show = state.machine.display.show_deflection
+    moved, turned = map(show, state.tool_motion, ("m", "rad"))
+    return f"The loads move the {state.machine.reference} by {moved} and turn it by {turned}."
+
+
+def actuator_sentence(state: LoadedState) -> str:
+    """Say which actuators carry most, and how much of their limits they use."""
+    show, parts = state.machine.display.show, []
+    for turns, kind in KINDS_OF_LOADS:
+        driven = [spring for spring in actuator_springs(state) if spring.turning is turns]
+        if driven:
+            most = max(driven, key=lambda spring: abs(spring.load))
+            direction = "" if turns or not most.load else ", which pulls" if most.load > 0.0 else ", which pushes"
+            size = show(abs(most.load), load_unit(turns))
+            parts.append(f"the greatest {kind} of an actuator is {size} ({most.name}{direction})")
+    if not parts:
+        return ""
+    text, use = "; ".join(parts), state.limit_use
+    if use is None:
+        use_text = "the file limits no load of actuators"
+    else:
+        use_text = f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
+    return f"{text[0].upper()}{text[1:]}; {use_text}."
+
+
+def actuator_springs(state: LoadedState) -> list[SpringState]:
+    """Return the spring of each actuator: the first of those in series, because all of these carry the same load."""
+    first: dict[tuple[str, bool], SpringState] = {}
+    for spring in state.springs:
+        if spring.actuated:
+            first.setdefault((spring.leg, spring.turning), spring)
+    return list(first.values())
+
+
+def displacement_table(state: LoadedState, display: Display) -> FittedTable:
+    """Return the displacement of the tool under its loads, beside that of linear equations."""
+    units = component_units(state.components)
+    scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
+    table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
+    for what, values in (("under load", state.displacement), ("to first order", state.linear)):
+        if values is not None:
+            shown = (display.show_deflection(v, unit).split()[0] for v, unit in zip(values, units, strict=True))
+            table.add_row(what, *shown)
+    return table
+
+
+def named_leg_springs(state: LoadedState) -> list[tuple[str, SpringState]]:
+    """Name what carries each leg: its actuator by the name of the leg, or by its own where a leg has several."""
+    shown = [spring for spring in state.springs if spring.actuated] or list(state.springs)
+    count = Counter(spring.leg for spring in shown)
+    return [(spring.leg if count[spring.leg] == 1 else spring.name, spring) for spring in shown]
+
+
+def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequence[float] = ()) -> FittedTable | None:
+    """Return the stiffness to further loads in each direction, beside that of the machine without loads.
+
+    Args:
+        state: a state of rest; None is returned where its stiffness is not finite.
+        free: diagonal of 1/C without loads, SI; left out if empty.
+        stiff: diagonal of K without loads, SI.
+    """
+    if state.tangent is None or state.compliance is None:
+        return None
+    display, names = state.machine.display, state.components
+    columns = {
+        "1/C under load": [reciprocal(entry) for entry in np.diag(state.compliance).tolist()],
+        "1/C free state": list(free),
+        "K under load": np.diag(state.tangent).tolist(),
+        "of springs": [] if state.elastic is None else np.diag(state.elastic).tolist(),
+        "K free state": list(stiff),
+    }
+    columns = {head: values for head, values in columns.items() if values}
+    table = numeric_table("Stiffness to further loads", "", list(columns))
+    for i, name in enumerate(names):
+        unit = entry_unit("stiffness", name, name)
+        cells = (display.number(values[i], unit, "rigid") for values in columns.values())
+        table.add_row(display.scale(unit).label(name), *cells)
+    return table
+
+
+def springs_or_kinds_table(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
+    """Return the table of the springs: each by itself where they are few or `full`, else by kind."""
+    few = len(state.springs) <= MOST_LISTED_SPRINGS
+    return spring_table(state, display) if few or full else _kinds_table(state, display)
+
+
+def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
+    """Least and greatest load and greatest deformation of the springs of each kind, and how many are slack."""
+    kinds: dict[tuple[str, bool], list[SpringState]] = {}
+    for spring in state.springs:
+        kinds.setdefault((spring.name.removeprefix(f"{spring.leg} "), spring.turning), []).append(spring)
+    table = numeric_table("Springs by kind", "spring", ["least load", "greatest load", "deformation", "slack"])
+    for (kind, turning), members in kinds.items():
+        loads = [spring.load for spring in members]
+        ends = (display.show(end, load_unit(turning)) for end in (min(loads), max(loads)))
+        most = max((spring.deformation for spring in members), key=abs)
+        name = f"{kind} ×{len(members)}" if len(members) > 1 else members[0].name
+        slack = sum(spring.slack for spring in members)
+        deformation = display.show_deflection(most, motion_unit(turning))
+        table.add_row(name, *ends, deformation, str(slack) if slack else DASH)
+    return table
+
+
+def spring_table(state: LoadedState, display: Display) -> FittedTable:
+    """Return the load, deformation and state of every spring."""
+    table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
+    for spring in state.springs:
+        load = display.show(spring.load, load_unit(spring.turning))
+        amount = display.show_deflection(spring.deformation, motion_unit(spring.turning))
+        table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
+    return table
+
+
+def strut_table(state: LoadedState, display: Display) -> FittedTable:
+    """Return the compression of each strut, and the load at which it would buckle."""
+    table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
+    for strut in state.struts:
+        reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"
+        table.add_row(strut.name, display.show(strut.compression, "N"), display.show(strut.euler_load, "N"), reserve)
+    return table
+
+
+def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "Figure":
+    """Draw displacement and spring loads over the share of the load, with the linear answer as thin lines.
+
+    Args:
+        state: the state of the machine under its whole load.
+        title: over the figure, with braces for the name of the machine.
+    """
+    machine, curve = state.machine, load_curve(state.state)
+    display, share = machine.display, 100.0 * curve.shares
+    rotations = [i for i, name in enumerate(state.components) if name.startswith("r")]
+    displacements = [i for i in range(len(state.components)) if i not in rotations]
+    turning = {spring.name: spring.turning for spring in state.springs}
+    kinds = [turns for turns, _ in KINDS_OF_LOADS if turns in turning.values()]
+    with figures.new_figure(
+        (6.6, 0.7 + 1.8 * (2 + len(kinds))),
+        title.format(machine.name),
+        setting_of(machine, []),
+        "thin lines: to first order" if state.linear is not None else "",
+    ) as figure:
+        panels = list(figure.subplots(2 + len(kinds), 1, sharex=True, squeeze=False).flat)
+        motions = ((rotations, "rotation", "rad"), (displacements, "displacement", "m"))
+        for panel, (places, meaning, unit) in zip(panels, motions, strict=False):
+            scale = display.fitting(unit, curve.displacement[:, places].flat)
+            named = {state.components[i]: curve.displacement[:, i] * scale.factor for i in places}
+            _curves(panel, share, named, scale.label(meaning))
+            if state.linear is not None:
+                _first_order(panel, share, [state.linear[i] for i in places], scale)
+        for panel, turns in zip(panels[2:], kinds, strict=True):
+            scale = display.scale(load_unit(turns))
+            loads = {n: curve.loads[:, i] * scale.factor for i, n in enumerate(curve.springs) if turning[n] is turns}
+            largest = sorted(loads, key=lambda name: -abs(loads[name]).max())[:MOST_CURVES]
+            _curves(panel, share, {name: loads[name] for name in loads if name in largest}, scale.label("load"))
+        panels[-1].set_xlabel("share of the loads (%)")
+    return figure
+
+
+def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
+    """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed.
+
+    Args:
+        state: the state of a machine that is at rest.
+        title: over the figure, with braces for the name of the machine.
+    """
+    machine, response = state.machine, state.state.free
+    moved, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
+    draw, factor = moved_machine(machine, response, moved, state.slack_legs)
+    with mpl.rc_context(figures.STYLE):
+        figure = drawing.views_of(
+            response.configuration,
+            lambda panel, across, up: draw(panel, lambda points: drawing.flat(points, across, up)),
+        )
+        moved_legend(figure, named, f"{setting_of(machine, [])}\n{drawn_larger(factor)}", bool(state.slack_legs))
+        figures.set_title(figure, title.format(machine.name))
+        layout.fix_layout(figure)
+    return figure
+
+
+def moved_machine(
+    machine: Machine, response: Response, moved: Deflection, slack_legs: Sequence[str] = ()
+) -> tuple[Callable[["Axes", Projection], None], float]:
+    """Return a function that draws a moved machine over the machine at its pose, and the factor of exaggeration.
+
+    Args:
+        machine: the machine at its pose.
+        response: the response of the machine there.
+        moved: motions of tool and links from that pose.
+        slack_legs: the names of the legs whose links are dashed.
+    """
+    configuration, (moved_colour, slack_colour) = response.configuration, figures.COLOURS[:2]
+    factor = overlays.exaggeration_of(response, moved, anatomy.proportions_of(machine, configuration).diagonal)
+    point = machine.tool_point(configuration.platform)
+    motion = overlays.exaggerated_displacement(moved.motion, point, factor)
+    heads = drawing.ring_of([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
+
+    def draw(panel: "Axes", project: Projection) -> None:
+        for leg in configuration.legs:
+            panel.plot(*project(list(leg.path)), color=UNLOADED_COLOUR, linewidth=1.6, solid_capstyle="round")
+        for points, colour in ((heads, UNLOADED_COLOUR), ([motion.apply(head) for head in heads], moved_colour)):
+            panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
+        for link in moved.links:
+            bent = [link.point(i / PIECES_OF_LINK, factor) for i in range(PIECES_OF_LINK + 1)]
+            slack = link.leg in slack_legs
+            dash, wide = ("--", 0.9) if slack else ("-", 1.6)
+            panel.plot(*project(bent), dash, color=slack_colour if slack else moved_colour, linewidth=wide)
+        for tip, colour in ((point, UNLOADED_COLOUR), (motion.apply(point), moved_colour)):
+            panel.plot(*project([tip]), "+", color=colour, markersize=7, markeredgewidth=1.2)
+
+    return draw, factor
+
+
+def moved_legend(figure: "Figure", named: tuple[str, str], setting: str, slack: bool = False) -> None:
+    """Name the grey and the blue machine of a figure below it, and the setting for which it holds.
+
+    Args:
+        figure: the figure of a moved machine.
+        named: words for the machine at its pose, and for the moved one.
+        setting: lines on where the machine is, and how much larger its motions are drawn.
+        slack: whether dashed legs are explained as well.
+    """
+    moved_colour, slack_colour = figures.COLOURS[:2]
+    styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED_COLOUR, "-"), (named[1], moved_colour, "-")]
+    styles += [("slack", slack_colour, "--")] if slack else []
+    legend = figure.legend(
+        handles=[lines.Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
+        loc="outside lower center", ncols=len(styles), title_fontsize=6.5, title=with_minus_signs(setting),
+    )  # fmt: skip
+    legend.get_title().set(multialignment="center", color="#555555")
+
+
+def bars_figure(state: LoadedState) -> "Figure":
+    """Draw a bar for the load of each leg: to the right where it pulls, to the left where it pushes, none if slack."""
+    shown, display = named_leg_springs(state), state.machine.display
+    by_kind = {
+        turns: [(name, spring) for name, spring in shown if spring.turning is turns] for turns, _ in KINDS_OF_LOADS
+    }
+    groups = {turns: group for turns, group in by_kind.items() if group}
+    beside = max(LEAST_NAME_WIDTH, lettering.width_of(name for name, _ in shown))
+    with figures.new_figure((beside + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
+        heights = [len(group) + 1 for group in groups.values()]
+        panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
+        for panel, (turns, group) in zip(panels, groups.items(), strict=True):
+            scale, places = display.scale(load_unit(turns)), range(len(group))
+            loads = [spring.load * scale.factor for _, spring in group]
+            colours = [figures.COLOURS[0 if load > 0.0 else 1] for load in loads]
+            panel.barh(places, loads, height=0.6, color=colours)
+            for place, load, (_, spring) in zip(places, loads, group, strict=True):
+                text = "slack" if spring.slack else number(load, digits=display.digits)
+                panel.annotate(
+                    text, (load, place), xytext=(-4 if load < 0.0 else 4, 0), textcoords="offset points",
+                    ha="right" if load < 0.0 else "left", va="center",
+                )  # fmt: skip
+            panel.set_yticks(places, [name for name, _ in group])
+            panel.axvline(0.0, color="#444444", linewidth=0.8)
+            panel.set_xlabel(scale.label("load, positive where it pulls"))
+            panel.margins(x=0.15)
+            panel.set_axisbelow(True)
+            panel.invert_yaxis()
+    return figure
+
+
+def drawn_larger(factor: float) -> str:
+    """Say how much larger than they are displacements are drawn."""
+    return "displacements to scale" if factor == 1.0 else f"displacements drawn {factor:,.0f} times larger"
+
+
+def _curves(panel: "Axes", share: Array, curves: dict[str, Array], label: str) -> None:
+    for place, (name, values) in enumerate(curves.items()):
+        panel.plot(share, values, label=name, **figures.look_of(place))
+    panel.axvline(100.0, color="#999999", linewidth=0.8)
+    panel.set_ylabel(label)
+    panel.margins(x=0.0)
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _first_order(panel: "Axes", share: Array, values: Sequence[float], scale: Scale) -> None:
+    for colour, value in zip(figures.COLOURS, values, strict=False):
+        panel.plot(share, value * scale.factor * share / 100.0, color=colour, linewidth=0.6)
+
+
+def loaded_figures(state: LoadedState) -> dict[str, Drawing]:
+    """Return the curve over the growing load, and the shape; a machine without rest has neither."""
+    if not state.has_rest:
+        return {}
+    growing = "Displacement and loads while the loads grow, beside the linear answer."
+    shape = "The machine at rest under its loads over the machine without them."
+    return {
+        "growing load": Drawing(growing, partial(load_figure, state), file="growing-load"),
+        "shape": Drawing(shape, partial(shape_figure, state)),
+    }
