@@ -28,7 +28,7 @@ from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
-from kinetostat.numerics.least_norm import with_damping
+from kinetostat.numerics.iteration import with_damping
 from kinetostat.tolerances import CLOSED, LEAST_NORM_DAMPING, UNDETERMINED
 
 

@@ -17,8 +17,7 @@ from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
-from kinetostat.numerics.iteration import largest, newton
-from kinetostat.numerics.least_norm import least_norm
+from kinetostat.numerics.iteration import largest, least_norm, newton
 from kinetostat.tolerances import (
     CLOSED,
     DEPENDENT,

@@ -20,8 +20,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.machine import Chains, Step
-from kinetostat.numerics.iteration import Steps, largest
-from kinetostat.numerics.least_norm import least_norm
+from kinetostat.numerics.iteration import Steps, largest, least_norm
 
 Coordinates = dict[str, Scalar]
 """Coordinates of the platform: x, y, z (m) and roll, pitch, yaw (rad), one for each problem, or a float for all."""

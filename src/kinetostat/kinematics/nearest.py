@@ -10,8 +10,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import ANGLES, POINT, free_coordinates
 from kinetostat.kinematics.leg_gaps import Problems, problems_of
 from kinetostat.machine.machine import Machine
-from kinetostat.numerics.iteration import Steps, largest, newton
-from kinetostat.numerics.least_norm import least_norm
+from kinetostat.numerics.iteration import Steps, largest, least_norm, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8

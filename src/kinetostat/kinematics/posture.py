@@ -10,8 +10,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at
-from kinetostat.numerics.iteration import largest, newton
-from kinetostat.numerics.least_norm import with_damping
+from kinetostat.numerics.iteration import largest, newton, with_damping
 from kinetostat.tolerances import CLOSED, IDLE_FREEDOM, LEAST_DIVISOR, NEAREST_POSTURE, NEWTON_SETTLED
 
 MOST_STEPS, MOST_CORRECTIONS = 40, 8

@@ -1,11 +1,12 @@
 """Iterations over many problems at once: Newton's method, and damped least squares. The equations are stated elsewhere.
 
 Each problem of a batch goes its own way and ends by itself, so that its result does not depend on the others. Problems
-that have ended cost no more time.
+that have ended cost no more time. `least_norm` gives a single step where linear equations have many solutions.
 
 Source: Newton's method and its criteria: P. Deuflhard, Newton Methods for Nonlinear Problems (2011), sections 1.4 and
 2.1; E. Hairer and G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.8. Damped least squares:
-D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11, 1963.
+D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11, 1963. Least norm:
+G. Golub and C. Van Loan, Matrix Computations (2013), sections 5.5 and 6.1.4.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.tolerances import LEAST_DIVISOR
+from kinetostat.tolerances import LEAST_DIVISOR, LEAST_NORM_DAMPING
 
 SHRINKING = 0.1
 """Ratio of a step to the one before it below which steps shrink fast, as those of Newton's method near a solution."""
@@ -270,3 +271,39 @@ def damped_steps(residuals: Array, rates: Array, damping: Array) -> Array:
     mean = np.trace(square, axis1=1, axis2=2) / square.shape[1] + LEAST_DIVISOR
     square = square + (damping * mean)[:, None, None] * np.eye(square.shape[1])
     return np.asarray(np.linalg.solve(square, back @ residuals[:, :, None])[:, :, 0])
+
+
+def least_norm(rates: Array, gaps: Array) -> Array:
+    """Least-squares solutions x of rates x = gaps, of least norm where equations leave x open; NaN where not finite.
+
+    They come from a damping so small that it changes only what the equations leave open. This takes a fraction of the
+    time of singular values, which give the same solutions.
+
+    Args:
+        rates: [problems x rows x unknowns].
+        gaps: [problems x rows].
+
+    Returns:
+        The solutions [problems x unknowns].
+    """
+    finite = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(gaps).all(axis=1)
+    if not finite.all():  # one problem with NaN would spoil the linear algebra of all
+        solutions = np.full((len(rates), rates.shape[2]), np.nan)
+        if finite.any():
+            solutions[finite] = least_norm(rates[finite], gaps[finite])
+        return solutions
+    transposed = np.swapaxes(rates, 1, 2)
+    if rates.shape[2] >= rates.shape[1]:
+        multipliers = np.linalg.solve(with_damping(rates @ transposed), gaps[:, :, None])
+        return np.asarray((transposed @ multipliers)[:, :, 0])
+    return np.asarray(np.linalg.solve(with_damping(transposed @ rates), transposed @ gaps[:, :, None])[:, :, 0])
+
+
+def with_damping(squares: Array) -> Array:
+    """Add `LEAST_NORM_DAMPING` times their trace to the diagonals of squared rates, so that these can be inverted.
+
+    Args:
+        squares: a product J^T J or J J^T of rates J for each problem [problems x n x n].
+    """
+    trace = np.trace(squares, axis1=1, axis2=2)[:, None, None]
+    return np.asarray(squares + LEAST_NORM_DAMPING * (trace + LEAST_DIVISOR) * np.eye(squares.shape[1]))
