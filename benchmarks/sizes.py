@@ -23,7 +23,7 @@ from kinetostat.engine.program_files import VARIABLE
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
-from kinetostat.studies.compiled import compile as function_from
+from kinetostat.studies.evaluation import compile as function_from
 
 MACHINES = ("zhang-gosselin-4dof", "hexapod", "tripteron", "hexapod-hardware")
 QUANTITIES = tuple(f"stiffness_{name}" for name in ("rx", "ry", "rz", "x", "y", "z"))
@@ -33,7 +33,7 @@ NEW_PROCESS = """
 import sys, time
 import numpy as np
 from kinetostat.machine.loading import load
-from kinetostat.studies.compiled import compile as function_from
+from kinetostat.studies.evaluation import compile as function_from
 machine = load(sys.argv[1])
 x, z = (np.full(10_000, getattr(machine.tables["pose"], name)) for name in "xz")
 started = time.process_time()

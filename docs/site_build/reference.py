@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 from matplotlib.figure import Figure
 
 import kinetostat
-from kinetostat.studies.compiled import Buffers, CompiledFunction
+from kinetostat.studies.evaluation import Buffers, CompiledFunction
 
 COMPILED = (CompiledFunction, Buffers)
 """What `compile` returns, and what that returns: classes that are no data."""

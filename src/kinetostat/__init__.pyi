@@ -13,19 +13,20 @@ from kinetostat.machine.loading import load as load
 from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError
 from kinetostat.studies.analysis import analyze as analyze
-from kinetostat.studies.assembly import forward as forward
+from kinetostat.studies.assembly_modes import forward as forward
 from kinetostat.studies.budget import budget as budget
 from kinetostat.studies.capability import capability as capability
-from kinetostat.studies.carrying import carrying_legs as carrying_legs
 from kinetostat.studies.commanding import command as command
 from kinetostat.studies.comparison import compare as compare
-from kinetostat.studies.compiled import compile as compile  # noqa: A004
+from kinetostat.studies.control import servo as servo
+from kinetostat.studies.control import state_space as state_space
 from kinetostat.studies.corrections import correction_table as correction_table
 from kinetostat.studies.datasets import evaluate as evaluate
+from kinetostat.studies.datasets import evaluate_grid as evaluate_grid
 from kinetostat.studies.drives import drives as drives
 from kinetostat.studies.dynamics import dynamics as dynamics
 from kinetostat.studies.elevation import elevation as elevation
-from kinetostat.studies.grid import evaluate_grid as evaluate_grid
+from kinetostat.studies.evaluation import compile as compile  # noqa: A004
 from kinetostat.studies.guidelines import guidelines as guidelines
 from kinetostat.studies.identification.identification import identify as identify
 from kinetostat.studies.lobes import lobes as lobes
@@ -36,8 +37,7 @@ from kinetostat.studies.optimisation.search import optimize as optimize
 from kinetostat.studies.reproduction import reproduce as reproduce
 from kinetostat.studies.requirements import requirements as requirements
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
-from kinetostat.studies.servo import servo as servo
-from kinetostat.studies.state_space import state_space as state_space
+from kinetostat.studies.tensions import carrying_legs as carrying_legs
 from kinetostat.studies.tensions import tensions as tensions
 from kinetostat.studies.under_load import under_load as under_load
 from kinetostat.studies.vibration import modes as modes

@@ -23,6 +23,7 @@ from kinetostat.equilibrium.solving import Rest
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
@@ -31,7 +32,6 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.assembly import actuators_at
 from kinetostat.studies.under_load import LoadedState, under_load
 from kinetostat.studies.vibration import modes
 from kinetostat.tolerances import AGREED
@@ -383,7 +383,7 @@ def work_of_drives(case: Case) -> str | None:
     if any(int(response.status) != Status.OK for response in responses):
         return None
     placed = [placement_of(response) for response in responses]
-    stands = [{a.name: float(a.coordinate) for a in actuators_at(end)} for end in ends]
+    stands = [{a.name: float(a.coordinate) for a in stand(end)} for end in ends]
     carried = {spring.name: spring.load for spring in load.springs if spring.actuated}
     if stands[0].keys() - carried.keys():
         return None  # parts in a row, or rigid drives, have loads under other names

@@ -13,7 +13,7 @@ from kinetostat.machine.loading import build, changed, load
 from kinetostat.machine.parameters import values
 from kinetostat.numerics.motions import exponential
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.assembly import forward
+from kinetostat.studies.assembly_modes import forward
 from kinetostat.studies.commanding import command
 from synthetic_measurements import truth_of
 

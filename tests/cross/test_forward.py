@@ -8,8 +8,8 @@ import pytest
 from kinetostat import Status, analyze, bundled, forward
 from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.kinematics.forward import stand as actuators_of
 from kinetostat.machine.loading import build
-from kinetostat.studies.assembly import actuators_at
 from kinetostat.views.answers import plain_of
 from machines import load_without_limits
 from refusals import refused
@@ -18,7 +18,7 @@ ANGLES = ("roll", "pitch", "yaw", "angle")
 
 
 def stand(machine):
-    return {actuator.name: actuator.coordinate for actuator in actuators_at(machine)}
+    return {actuator.name: actuator.coordinate for actuator in actuators_of(machine)}
 
 
 def distance(first, second):
@@ -195,5 +195,5 @@ def test_an_analysis_shows_where_the_actuators_stand():
 
 def test_a_slide_at_the_end_of_its_leg_has_the_position_of_the_platform():
     machine = load_without_limits("tricept").with_values({"stiffness.tube_actuator": 1e8})
-    (tube,) = (actuator for actuator in actuators_at(machine) if actuator.leg == "tube")
+    (tube,) = (actuator for actuator in actuators_of(machine) if actuator.leg == "tube")
     assert tube.coordinate == pytest.approx(machine.tables["pose"].length, abs=1e-15)

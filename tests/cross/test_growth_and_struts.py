@@ -9,7 +9,7 @@ from kinetostat import evaluate_grid
 from kinetostat.machine.loading import build, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.assembly import forward
+from kinetostat.studies.assembly_modes import forward
 from kinetostat.studies.commanding import command
 from kinetostat.studies.under_load import Rest, under_load
 from kinetostat.views.loaded import stability_of

@@ -14,7 +14,7 @@ from kinetostat.machine.link import seat_springs
 from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.spec import document
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 
 NAME = "hexapod-hardware"
 POSES = [(), ("pose.x=20 mm", "pose.z=310 mm", "pose.pitch=8 deg", "pose.yaw=-5 deg")]

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.io import loadmat
 
 from kinetostat import analyze, export, load
-from kinetostat.studies.state_space import state_space
+from kinetostat.studies.control import state_space
 from kinetostat.studies.vibration import modes
 from refusals import refused
 

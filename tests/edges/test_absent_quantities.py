@@ -5,7 +5,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import load
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.sensitivity import sensitivity
 from refusals import refused
 

@@ -11,7 +11,7 @@ from kinetostat.machine.loading import as_toml, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison import compare, read_design
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studio.design.texts import comparison_text
 from kinetostat.views.comparison import COMPARISON, comparison_figure
 from kinetostat.views.data_forms import json_of

@@ -9,7 +9,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
-from kinetostat.studies import grid
+from kinetostat.studies import datasets
 from kinetostat.studies.storage import LIST
 from kinetostat.studies.study_folder import read_history, read_question
 from refusals import refused
@@ -34,7 +34,7 @@ FILES = {"grid": ("map.nc", "history.jsonl", "study.json"), "search": ("designs.
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
-    monkeypatch.setattr(grid, "IN_MEMORY", 1000)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 1000)
     monkeypatch.setattr("kinetostat.views.optimisation_figures.pictures", lambda *_: {})
 
 
@@ -45,7 +45,7 @@ def undisturbed(tmp_path_factory):
     (folder / "study.toml").write_text(f"{SMALL}\n[optimizer]\npopulation = 8\ngenerations = 5\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
-        patch.setattr(grid, "IN_MEMORY", 1000)
+        patch.setattr(datasets, "IN_MEMORY", 1000)
         assert main([*GRID, str(folder / "grid")]) == DONE
         patch.setattr("kinetostat.views.optimisation_figures.pictures", lambda *_: {})
         assert main(["optimize", str(folder / "study.toml"), "-o", str(folder / "search")]) == DONE

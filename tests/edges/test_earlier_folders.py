@@ -14,7 +14,7 @@ import xarray as xr
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import load
-from kinetostat.studies import grid
+from kinetostat.studies import datasets
 
 FOLDERS = Path(__file__).parents[1] / "folders"
 SEARCHES = sorted(path.name for path in FOLDERS.glob("search-*"))
@@ -24,7 +24,7 @@ CUT = {"as it was": None, "stopped after a step": 1}
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(grid, "IN_MEMORY", 50)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 50)
     monkeypatch.setattr("kinetostat.views.optimisation_figures.pictures", lambda *_: {})
 
 

@@ -14,7 +14,7 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.spec.document import parse
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import evaluate_grid, failures
+from kinetostat.studies.datasets import evaluate_grid, failures
 from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.sensitivity import sensitivity

@@ -15,8 +15,8 @@ from kinetostat.commands.common import BAD_INPUT, DONE, STOPPED
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
-from kinetostat.studies import grid, result_file, stored_grid
-from kinetostat.studies.grid import grid_question
+from kinetostat.studies import datasets, result_file, stored_grid
+from kinetostat.studies.datasets import grid_question
 from kinetostat.studies.storage import LIST
 from kinetostat.studies.stored_grid import answer_into
 from refusals import refused
@@ -33,7 +33,7 @@ IN_THIS_PROCESS = chunks.in_this_process
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
-    monkeypatch.setattr(grid, "IN_MEMORY", 1000)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 1000)
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +69,8 @@ def history(folder):
 
 
 def test_the_file_is_that_of_a_small_grid(question, undisturbed, monkeypatch):
-    monkeypatch.setattr(grid, "IN_MEMORY", 10**6)
-    expected = grid.answer(question)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 10**6)
+    expected = datasets.answer(question)
     with xr.open_dataset(undisturbed / "map.nc") as found:
         xr.testing.assert_identical(found.drop_vars("status"), expected.drop_vars("status"))
         np.testing.assert_array_equal(found["status"], expected["status"])
@@ -94,7 +94,7 @@ import os, signal, sys
 from pathlib import Path
 from kinetostat.engine import chunks
 from kinetostat.machine.loading import load
-from kinetostat.studies.grid import grid_question
+from kinetostat.studies.datasets import grid_question
 from kinetostat.studies.result_file import ResultFile
 from kinetostat.studies.stored_grid import answer_into
 from kinetostat.studies.study_folder import StudyFolder
@@ -208,7 +208,7 @@ def test_a_folder_with_another_study_is_refused(changed, named, undisturbed, tmp
 
 
 def test_a_small_grid_does_not_take_the_place_of_a_large_one(undisturbed, monkeypatch, capsys):
-    monkeypatch.setattr(grid, "IN_MEMORY", 10**6)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 10**6)
     assert main([*WORDS, "-o", str(undisturbed)]) == BAD_INPUT
     assert "study of a larger grid" in capsys.readouterr().err
 
@@ -245,7 +245,7 @@ def test_nothing_to_resume_is_said(tmp_path, monkeypatch, capsys):
     assert main([*WORDS, "-o", str(tmp_path / "typo"), "--resume"]) == BAD_INPUT
     assert "does not hold a study that could be resumed" in capsys.readouterr().err
     assert not (tmp_path / "typo").exists()
-    monkeypatch.setattr(grid, "IN_MEMORY", 10**6)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 10**6)
     assert main([*WORDS, "-o", str(tmp_path), "--resume"]) == BAD_INPUT
     assert "cannot be resumed" in capsys.readouterr().err
 

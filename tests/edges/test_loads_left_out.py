@@ -14,8 +14,7 @@ from report_pages import no_drawing, no_pictures
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import load
-from kinetostat.studies.datasets import evaluate
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate, evaluate_grid
 from kinetostat.views.grid_figures import setting_lines
 from kinetostat.views.report import writing
 

@@ -19,7 +19,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import extra_command
 from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import usual_ranges
+from kinetostat.studies.datasets import usual_ranges
 from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.studies.requirements import requirements
 from kinetostat.views.report import pdf, pictures

@@ -18,7 +18,7 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.installation import extra_command
-from kinetostat.studies import grid
+from kinetostat.studies import datasets
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
@@ -76,7 +76,7 @@ def test_commands_take_a_cluster_and_write_the_same_file(dask, tmp_path, monkeyp
     alone = capsys.readouterr().out
     assert main([*WORDS, "--json", "--cluster", dask]) == DONE
     assert capsys.readouterr().out == alone
-    monkeypatch.setattr(grid, "IN_MEMORY", 1000)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 1000)
     for folder, more in (("alone", []), ("together", ["--cluster", dask])):
         assert main([*WORDS, "-o", str(tmp_path / folder), *more]) == DONE
     assert (tmp_path / "alone" / "map.nc").read_bytes() == (tmp_path / "together" / "map.nc").read_bytes()

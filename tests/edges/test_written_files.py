@@ -100,7 +100,7 @@ def test_a_command_on_a_full_disk_is_one_sentence(command, given, capsys):
 
 
 def test_a_large_grid_on_a_full_disk_is_one_sentence(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("kinetostat.studies.grid.IN_MEMORY", 2)
+    monkeypatch.setattr("kinetostat.studies.datasets.IN_MEMORY", 2)
     words = ["map", MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2", "-o", str(tmp_path / "out")]
     with files_of_at_most(100_000):
         assert main(words) == BAD_INPUT

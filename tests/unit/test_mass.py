@@ -14,7 +14,7 @@ from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.spec.document import parse
 from kinetostat.spec.fields import quantities
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from machines import every_machine
 from refusals import refused
 

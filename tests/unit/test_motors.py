@@ -5,8 +5,8 @@ import pytest
 
 from kinetostat import analyze, build, forward, validate
 from kinetostat.exchange.formats import export
+from kinetostat.kinematics.forward import stand
 from kinetostat.machine.loading import as_toml
-from kinetostat.studies.assembly import actuators_at
 from refusals import refused
 
 HEAD = """schema = 1
@@ -79,9 +79,9 @@ def test_a_motor_on_one_freedom_is_that_freedom_as_a_joint_of_its_own(name):
         assert stiffness == same
         assert axis.components() == pytest.approx(other.components(), abs=1e-15)
     assert {analyze(each).status.word for each in (machine, apart)} == {"singular"}  # nothing holds what is passive
-    assert [a.meaning for a in actuators_at(machine)] == [a.meaning for a in actuators_at(apart)]
-    assert [float(a.coordinate) for a in actuators_at(machine)] == pytest.approx(
-        [float(a.coordinate) for a in actuators_at(apart)], abs=1e-9
+    assert [a.meaning for a in stand(machine)] == [a.meaning for a in stand(apart)]
+    assert [float(a.coordinate) for a in stand(machine)] == pytest.approx(
+        [float(a.coordinate) for a in stand(apart)], abs=1e-9
     )
 
 

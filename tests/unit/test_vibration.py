@@ -18,7 +18,7 @@ from kinetostat.machine.loading import bundled, changed, load
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.vibration import NOTHING_RINGS, TOO_DIFFERENT, modes
 from kinetostat.vibration.scalar_frequencies import free_frequencies, legs_without_mass, pose_frequencies, reducible
 from machines import with_bodies

@@ -8,7 +8,7 @@ import xarray as xr
 
 from kinetostat.machine.loading import changed, load
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.vibration import modes
 from kinetostat.views.answers import plot
 from kinetostat.views.figures import look_of

@@ -14,7 +14,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
-from kinetostat.studies.grid import field_of
+from kinetostat.studies.datasets import field_of
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace_verdicts import BEYOND, INSIDE, Judge, depth
 from kinetostat.views.answers import plot

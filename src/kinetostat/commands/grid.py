@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from kinetostat.engine.batch import Progress
     from kinetostat.engine.chunks import Compute
     from kinetostat.machine.machine import Machine
-    from kinetostat.studies.carrying import Carrying
-    from kinetostat.studies.grid import GridQuestion
+    from kinetostat.studies.datasets import GridQuestion
     from kinetostat.studies.stored_grid import StoredGrid
+    from kinetostat.studies.tensions import Carrying
     from kinetostat.views.question import Question
 
 MOST_WORKERS = 1024
@@ -80,7 +80,7 @@ def _answer(
     """Compute a grid by the processes that are wanted: in memory, or into the folder if it is too large for that."""
     from kinetostat.engine.chunks import Crew, compute_with
     from kinetostat.spec.errors import InputError
-    from kinetostat.studies.grid import answer
+    from kinetostat.studies.datasets import answer
     from kinetostat.views.grid import CARRYING_ALONE, map_question, sweep_question
 
     if carrying:

@@ -21,7 +21,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.grid import usual_ranges
+from kinetostat.studies.datasets import usual_ranges
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.storage import write_text
 

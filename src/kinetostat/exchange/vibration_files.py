@@ -13,7 +13,7 @@ import xarray as xr
 from kinetostat.exchange.results import origin_of, write_matlab
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.state_space import StateSpace, state_space
+from kinetostat.studies.control import StateSpace, state_space
 from kinetostat.studies.storage import write_dataset
 from kinetostat.studies.vibration import modes
 from kinetostat.views.answers import write_form

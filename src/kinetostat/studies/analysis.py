@@ -1,7 +1,12 @@
 """Analysis of a machine at one pose: how stiff it is, and why. Its tables are in `views.analysis_tables`.
 
-Numbers are computed directly, without the engine: compiling would take longer than a single pose does. `as_json` at the
-end of the file gives the analysis as plain data.
+Numbers are computed directly, without the engine: compiling would take longer than a single pose does.
+
+Some facts are known at a pose without an answer as well. At an actuation singularity the legs still resist: K is
+finite, and singular. C is finite between the loads that do no work on the free twists and the motions that these leave
+alone; its other entries are infinite.
+
+Source: theory sections 2 and 5; for C of a singular pose, a pseudo-inverse of K in units of the characteristic length.
 """
 
 import math
@@ -18,6 +23,7 @@ from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.mobility import (
     Mobility,
     actuator_jacobian,
@@ -26,24 +32,36 @@ from kinetostat.kinematics.mobility import (
     count_independent,
     describe,
 )
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.indices import twist_condition
 from kinetostat.kinetostatics.loading import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import no_limits_sentence
-from kinetostat.machine.loads import Mass
+from kinetostat.machine.loads import Mass, moving_masses
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import former_names
+from kinetostat.studies.analysis_parts import (
+    Along,
+    Indices,
+    LoadCase,
+    clean_matrix,
+    clean_statics,
+    indices_of,
+    load_case,
+    stiffness_along,
+)
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
-from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
-from kinetostat.studies.loads import LoadCase, load_case
-from kinetostat.studies.rounding import clean_matrix, clean_statics
-from kinetostat.studies.unanswered import known_fields, standing_fields
-from kinetostat.tolerances import CLOSING_ROUND_OFF
+from kinetostat.tolerances import (
+    CLOSING_ROUND_OFF,
+    FREE_COMPONENT,
+    MOST_LEG_CONTRAST,
+    ROUND_OFF_OF_ENTRY,
+    SINGULAR,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -227,7 +245,8 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     configuration = response.configuration
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
     if status is not Status.OK:
-        return Analysis(state, status, state.refusal, machine.family.component_names, axes, **known_fields(state, turn))
+        names, known = machine.family.component_names, _facts_without_answer(state, turn)
+        return Analysis(state, status, state.refusal, names, axes, **known)
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -236,7 +255,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     kept = machine.family.components
     compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
     all_springs, length = springs(configuration), float(configuration.length)
-    known = standing_fields(state)
+    known = _facts(state)
     extremes = conditioning(response.legs, length, response.guide)
     load = load_case(response, statics, turn, kept)
     indices = indices_of(stiffness_rows, compliance_rows, length, kept)
@@ -264,6 +283,82 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     )
 
 
+def _facts(state: MachineState) -> dict[str, Any]:
+    """Return the fields of an `Analysis` that are known wherever a machine has a place, answer or not."""
+    response = state.free
+    configuration = response.configuration
+    all_springs, rotation = springs(configuration), configuration.platform.rotation
+    axes = [axis.components() for axis in (rotation.x, rotation.y, rotation.z)]
+    position = configuration.platform.translation.components()
+    return {
+        "platform": (np.array(position, dtype=float), np.array(axes, dtype=float).T),
+        "rigid": tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness)),
+        "free": tuple(spring.name for spring in all_springs if spring.stiffness == 0.0),
+        "masses": tuple(moving_masses(state.machine, configuration)),
+        "actuators": tuple(replace(a, coordinate=float(a.coordinate)) for a in stand(state.machine, state.joints)),
+        "singularity_margin": float(response.singularity_margin),
+        "leg_singularity_margin": min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
+        "platform_singularity_margin": float(response.statics.singularity_margin),
+        "characteristic_length": float(configuration.length),
+    }
+
+
+def _facts_without_answer(state: MachineState, turn: Rotation) -> dict[str, Any]:
+    """Return the fields of an `Analysis` that are known at a pose without an answer; none where it has no place.
+
+    `turn` leads from base axes to those of K and C.
+    """
+    if Status(int(state.free.joint_status)) is not Status.OK or state.status in PLACELESS:
+        return {}
+    if state.status is not Status.SINGULAR:
+        return _facts(state)
+    return _facts(state) | {"mobility": state.mobility} | _singular_matrices(state, turn)
+
+
+def _singular_matrices(state: MachineState, turn: Rotation) -> dict[str, Any]:
+    """K, and C with NaN for what is not finite, of a singular pose; nothing where K is not finite either."""
+    length, kept = float(state.free.configuration.length), list(state.machine.family.components)
+    whole = _stiffness_by_legs(state.free, turn, length)
+    if whole is None:
+        return {}
+    units = np.repeat([1.0 / length, 1.0], 3)[kept]
+    scaled = units[:, None] * whole[np.ix_(kept, kept)] * units
+    scaled[np.abs(scaled) < ROUND_OFF_OF_ENTRY * np.abs(scaled).max()] = 0.0
+    values, vectors = np.linalg.eigh(scaled)
+    resisted = values > SINGULAR**2 * values[-1]
+    free = np.abs(vectors[:, ~resisted]).max(axis=1, initial=0.0) > FREE_COMPONENT
+    compliance = units[:, None] * ((vectors[:, resisted] / values[resisted]) @ vectors[:, resisted].T) * units
+    compliance[free, :] = compliance[:, free] = math.nan
+    stiffness = scaled / units[:, None] / units
+    return {
+        "stiffness": stiffness,
+        "stiffness_diagonal": np.diag(stiffness),
+        "finite_compliance": np.array(clean_matrix(compliance.tolist())),
+        "compliance_diagonal": np.where(free, math.inf, np.diag(compliance)),
+        "rank": int(resisted.sum()),
+    }
+
+
+def _stiffness_by_legs(response: Response, turn: Rotation, length: float) -> Array | None:
+    """K [6 x 6] as the sum over legs of W G^-1 W^T (theory (3)); None where a leg is rigid, free or locked."""
+    whole = np.zeros((6, 6))
+    for leg in response.legs:
+        compliance = np.array(leg.compliance, dtype=float)
+        if not (float(leg.singularity_margin) > SINGULAR and np.isfinite(compliance).all()):
+            return None
+        wrenches = np.array([w.rotated(turn).components() for w in leg.wrenches], dtype=float).reshape(-1, 6).T
+        loads = np.array(leg.loads, dtype=float).reshape(len(compliance), -1)
+        if not (np.isfinite(wrenches).all() and np.isfinite(loads).all()):
+            return None
+        # Wrenches of one size, so that a leg with a long and a short one is not taken for an ill-conditioned one.
+        sizes = np.linalg.norm(wrenches * np.repeat([1.0 / length, 1.0], 3)[:, None], axis=0)
+        flexibility = (loads / sizes).T @ (compliance[:, None] * (loads / sizes))
+        if wrenches.shape[1] and np.linalg.cond(flexibility) > MOST_LEG_CONTRAST:
+            return None
+        whole += (wrenches / sizes) @ np.linalg.solve(flexibility, (wrenches / sizes).T)
+    return whole
+
+
 def _jacobian_condition(response: Response, length: float) -> float | None:
     """Condition number of the actuators' Jacobian in the components that the actuators move, or None.
 
@@ -281,7 +376,7 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
 def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Array | None:
     """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
-    return np.array(clean_matrix(rows)) if all(math.isfinite(entry) for row in rows for entry in row) else None
+    return np.array(clean_matrix(rows)) if np.isfinite(rows).all() else None
 
 
 def _turned_statics(statics: Statics, turn: Rotation) -> Statics:
@@ -322,12 +417,12 @@ def _message(
     finite: bool,
     load: LoadCase | None,
 ) -> str:
-    """Say what is special about a pose that has been analysed; `finite` tells whether K is finite.
+    """Say what is special about a pose that has been analysed.
 
     Args:
-        state: of the machine.
-        response: of it, its statics without round-off.
-        rigid, free: names of the springs that are so.
+        state: the state of the machine.
+        response: its response, with statics without round-off.
+        rigid, free: names of the rigid and of the free springs.
         finite: whether K is finite.
         load: effects of the machine's load.
     """
@@ -335,8 +430,8 @@ def _message(
     if not finite and not rigid:
         sentences.append("At this pose a leg is rigid against some load: K is infinite against it, and C is exact.")
     if rigid:
-        infinite = "K is infinite in the directions that they hold, C is exact"
-        consequence = "other parts deflect in the same directions, so that K is finite" if finite else infinite
+        k_is_infinite = "K is infinite in the directions that they hold, C is exact"
+        consequence = "other parts deflect in the same directions, so that K is finite" if finite else k_is_infinite
         sentences.append(f"Rigid: {', '.join(rigid)}; {consequence}.")
     all_springs = springs(response.configuration)
     for spring, twist in zip(all_springs, response.statics.flexibility, strict=True):

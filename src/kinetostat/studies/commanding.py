@@ -285,7 +285,7 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
         answer,
         coordinates=record.controller_counts(answer.actuators, answer.coordinates, home),
         unloaded=record.controller_counts(answer.actuators, answer.unloaded, home),
-        message=f"{answer.message} Zeros and gains of the fit are tally in.",
+        message=f"{answer.message} Zeros and gains of the fit are counted in.",
     )
 
 

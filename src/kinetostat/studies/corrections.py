@@ -123,10 +123,10 @@ def _without_round_off(law: Law) -> Law:
     """The law without terms that only round-off has; all functions are 1 at most."""
     sizes = np.abs(law.coefficients)
     coefficients = np.where(sizes > EXACT_LAW * sizes.max(axis=0), law.coefficients, 0.0)
-    tally = np.asarray(coefficients.any(axis=1))
-    tally[0] |= not tally.any()
-    terms = tuple(term for term, kept in zip(law.terms, tally, strict=True) if kept)
-    return replace(law, terms=terms, coefficients=coefficients[tally])
+    has_effect = np.asarray(coefficients.any(axis=1))
+    has_effect[0] |= not has_effect.any()  # a law has one term at least
+    terms = tuple(term for term, kept in zip(law.terms, has_effect, strict=True) if kept)
+    return replace(law, terms=terms, coefficients=coefficients[has_effect])
 
 
 def _candidates(paths: Sequence[str], counts: Sequence[int], known: int) -> Iterator[tuple[Term, ...]]:

@@ -1,8 +1,10 @@
-"""Datasets of quantities at poses, which Python programs get from `evaluate`, and the labels of all datasets.
+"""Labelled datasets of quantities: at poses of a list, over a grid of any parameters; and the labels of all datasets.
 
-Labels are attributes as the CF conventions have them: units, long names, and the meanings of flags.
+Labels are attributes as the CF conventions have them: units, long names, and the meanings of flags. For maps for which
+no ranges are given, those of the pose are found: as far as the machine can follow.
 """
 
+import math
 from collections.abc import Collection, Sequence
 from functools import cache, lru_cache
 from importlib.metadata import version
@@ -11,16 +13,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.engine.batch import Progress, silent
+from kinetostat.arrays import Array
+from kinetostat.engine import batch
+from kinetostat.engine.batch import Evaluation, Progress, silent
+from kinetostat.engine.chunks import Compute, in_chunks, in_this_process
 from kinetostat.engine.kernel import Identical
+from kinetostat.engine.points import Grid, PointTable
+from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, frame_of, pose_of
-from kinetostat.machine.parameters import Parameter
+from kinetostat.machine.parameters import Parameter, dimension, parameters, values
 from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import Range, parse_range
 from kinetostat.studies.evaluation import MACHINES_KEPT, MATRICES, PoseAnswers, answers_at
-from kinetostat.studies.poses import given_poses
+from kinetostat.studies.poses import chosen_axes, given_poses, grid_of
+from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
 from kinetostat.units import KINDS
 
 # With its first dataset, xarray imports the other array libraries that it finds (pint 0.2 s, dask 0.5 s). This belongs
@@ -170,3 +182,218 @@ def _layout(
         coordinates,
         origin_of(machine.value, leaves, uncounted),
     ).reset_coords([field.value.dimension for field in fields])
+
+
+IN_MEMORY = 5_000_000
+"""Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
+
+
+@dataclass(frozen=True)
+class GridQuestion:
+    """A question: the quantities of a machine over a grid.
+
+    Attributes:
+        machine: gives all parameters that do not vary.
+        grid: where; one axis for each range.
+        fields: path of the field of each axis.
+        names: names of quantities.
+        labels: coordinates and attributes of the answer, without any variable.
+    """
+
+    machine: Machine
+    grid: Grid
+    fields: tuple[str, ...]
+    names: tuple[str, ...]
+    labels: xr.Dataset
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The dimensions of the answer, one for each field."""
+        return tuple(map(dimension, self.fields))
+
+    @property
+    def fits_memory(self) -> bool:
+        """Whether the answer is small enough to be computed and shown at once."""
+        return self.grid.size <= IN_MEMORY
+
+
+def grid_question(machine: Machine | MachineState, ranges: Sequence[str], quantities: Sequence[str]) -> GridQuestion:
+    """Read a question about a grid from texts; see `evaluate_grid`. The machine may be given as its state.
+
+    Raises:
+        InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
+            than six dimensions.
+    """
+    state = state_of(machine)
+    machine = state.machine
+    pairs = chosen_axes(machine, ranges)
+    chosen = [parameter for _, parameter in pairs]
+    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
+    grid = grid_of(pairs)
+    names = resolve_quantities(quantities, machine.family.component_names, cable_count(machine))
+    refuse_absent(state, names, chosen)
+    varied = [(parameter, axis.values) for parameter, axis in zip(chosen, grid.axes, strict=True)]
+    about = origin_of(machine, taken, uncounted_loads(state, names, varied))
+    labels = xr.Dataset({}, _coordinates(grid, pairs), about)
+    return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
+
+
+def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:
+    coordinates: dict[str, Any] = {}
+    for axis, (span, parameter) in zip(grid.axes, pairs, strict=True):
+        about = {**about_field(parameter), "field": parameter.path, "log": int(span.logarithmic)}
+        coordinates[parameter.dimension] = (parameter.dimension, axis.values, about)
+    return coordinates
+
+
+@checked
+def evaluate_grid(
+    machine: Machine | MachineState,
+    ranges: Sequence[str],
+    quantities: Sequence[str] = ("compliance",),
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """Evaluate quantities over all combinations of some ranges.
+
+    Args:
+        machine: gives all parameters that do not vary; or its state, as `state_of` returns it.
+        ranges: one axis each, "FIELD=from:to:count[:log]"; a field with several entries varies them together.
+        quantities: names of quantities or groups.
+        progress: receives how far the work is.
+
+    Returns:
+        One variable per quantity and `status`, over dimensions named by the fields: `x` for
+        pose.x, `geometry_base_radius` for geometry.base_radius; units in `attrs`.
+        Quantities are NaN where the status is not ok (0).
+
+    Raises:
+        InputError: an unknown field or quantity, a bad range, a field twice, too many dimensions or points.
+    """
+    return answer(grid_question(machine, ranges, quantities), progress)
+
+
+def answer(question: GridQuestion, progress: Progress = silent, compute: Compute = in_this_process) -> xr.Dataset:
+    """Answer a question about a grid in memory; see `evaluate_grid`.
+
+    Args:
+        question: a question of at most `IN_MEMORY` points.
+        progress: receives how far the work is.
+        compute: where chunks are computed; results are the same bit for bit.
+
+    Raises:
+        InputError: too many points.
+    """
+    if not question.fits_memory:
+        raise InputError(
+            f"the grid has {question.grid.size:,} points, more than the {IN_MEMORY:,} that are kept in memory: "
+            "give -o FOLDER, into which results are written while they are computed, or lower the counts."
+        )
+    evaluation = _evaluate_all(question, progress, compute)
+    shape = question.grid.shape
+    content = {
+        name: (question.dims, evaluation.values[name].reshape(shape), about_quantity(name)) for name in question.names
+    }
+    return question.labels.assign(content).assign(
+        status=(question.dims, evaluation.status.reshape(shape), ABOUT_STATUS)
+    )
+
+
+def _evaluate_all(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:
+    """Evaluate all points; results are in their order, wherever they are computed."""
+    if compute is in_this_process:
+        return batch.evaluate(question.machine, question.grid, question.names, progress)
+    work = in_chunks(question.machine, question.grid, question.names)
+    parts, done = {}, 0
+    for number, part in compute(work, range(work.count)):
+        parts[number] = part
+        done += len(part.status)
+        progress(done, question.grid.size)
+    ordered = [parts[number] for number in range(work.count)]
+    values = {name: np.concatenate([part.values[name] for part in ordered]) for name in question.names}
+    return Evaluation(values, np.concatenate([part.status for part in ordered]))
+
+
+def field_of(coordinate: xr.DataArray) -> str:
+    """Return the path of the field that varies along a coordinate, e.g. "pose.x" of `x`."""
+    return str(coordinate.attrs.get("field", coordinate.name))
+
+
+def failures(dataset: xr.Dataset) -> dict[Status, int]:
+    """Count the points of each status other than OK."""
+    codes, counts = np.unique(dataset["status"].values, return_counts=True)
+    return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
+
+
+MOST_RANGES_OF_MAPS = 2
+"""Greatest number of ranges of the maps of a report: a map has two axes."""
+PROBE_STEPS = 48
+"""Number of poses to each side that are tried along a coordinate."""
+LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}
+"""Largest distance from the pose, by kind of coordinate: in units of the characteristic length, and in rad."""
+LARGEST_REACH_IN_LIMITS = {"length": 1.0, "angle": math.radians(90.0)}
+"""The same for a machine whose file has limits, which then end its ranges."""
+LEAST_MARGIN_SHARE = 0.1
+"""Least singularity margin in a range, as a share of that of the pose: near a singularity a map shows nothing else."""
+ROUND_SLACK = 1e-6
+"""Share of a step within which an end counts as round already."""
+ROUND_UNIT = {"length": 1.0, "angle": math.radians(1.0)}
+"""Unit in which coordinates of a kind are round numbers."""
+
+
+def usual_ranges(machine: Machine, count: int) -> list[str]:
+    """Two ranges "pose.x=from:to:count" about the pose, translations first; fewer where fewer coordinates can change.
+
+    Each coordinate goes as far as the machine can follow while the others stay: within its limits if the file has some,
+    else not far from the pose, and never near a singularity.
+
+    Args:
+        machine: a machine whose pose has an answer.
+        count: number of points of each range.
+    """
+    reaches = LARGEST_REACH_IN_LIMITS if limits_set(machine.tables["limits"]) else LARGEST_REACH
+    coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
+    ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
+    length, ranges = float(state_of(machine).configuration.length), []
+    for parameter in ordered:
+        reach = reaches[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
+        low, high = _extent(machine, parameter, reach)
+        if high > low:
+            ranges.append(f"{parameter.path}={low:.9g}:{high:.9g}:{count}")
+        if len(ranges) == MOST_RANGES_OF_MAPS:
+            break
+    return ranges
+
+
+def coarser_ranges(ranges: Sequence[str], most: int) -> list[str]:
+    """The same ranges "FIELD=from:to:count[:log]" with at most `most` points each.
+
+    Raises:
+        InputError: a text that is not of that form.
+    """
+    spans = [parse_range(text) for text in ranges]
+    return [
+        f"{span.field}={span.start}:{span.end}:{min(span.count, most)}{':log' if span.logarithmic else ''}"
+        for span in spans
+    ]
+
+
+def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float, float]:
+    """Both ends of the range of a coordinate, SI: the farthest poses without a bad one before them."""
+    (path,), here = parameter.leaves, float(values(machine)[parameter.path])
+    steps = np.linspace(-reach, reach, 2 * PROBE_STEPS + 1)
+    answer = batch.evaluate(machine, PointTable({path: here + steps}), ["singularity_margin"])
+    singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
+    good = (answer.status == Status.OK) & (singularity_margin >= LEAST_MARGIN_SHARE * singularity_margin[PROBE_STEPS])
+    bad = np.flatnonzero(~good)
+    first = bad[bad < PROBE_STEPS].max(initial=-1) + 1
+    last = bad[bad > PROBE_STEPS].min(initial=len(steps)) - 1
+    return _rounded_inwards(here + steps[[first, last]], ROUND_UNIT[parameter.quantity.kind])
+
+
+def _rounded_inwards(ends: Array, unit: float) -> tuple[float, float]:
+    """Move both ends inwards to round numbers, by a tenth of the range at most."""
+    low, high = (float(end) for end in ends)
+    if high == low:
+        return low, high
+    step = 10.0 ** math.floor(math.log10((high - low) / unit / 10.0)) * unit
+    return math.ceil(low / step - ROUND_SLACK) * step, math.floor(high / step + ROUND_SLACK) * step

@@ -1,22 +1,45 @@
-"""Quantities of a machine at poses that a user gives, as arrays. `datasets` makes labelled arrays of them."""
+"""Quantities of a machine at poses, as arrays: evaluated once, or as a function that programs call again and again.
 
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+Both are the function that maps and searches evaluate, without tables, units and labels around it; `datasets` makes
+labelled arrays. A call of a `CompiledFunction` on arrays takes ten times as long as one pose itself, because shapes are
+compared and memory is found for the results. `Buffers` do all that once.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.batch import Function, Progress, evaluate, function_of, silent
 from kinetostat.engine.kernel import Identical
+from kinetostat.engine.machine_code import Program
 from kinetostat.engine.points import PointTable
+from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.errors import several
+from kinetostat.machine.parameters import Parameter, find, values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.studies.poses import PoseColumns
-from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities, uncounted_loads
+from kinetostat.studies.quantities import (
+    cable_count,
+    refuse_absent,
+    refuse_without_derivatives,
+    resolve_quantities,
+    uncounted_loads,
+)
+
+if TYPE_CHECKING:
+    from kinetostat.engine import derivatives
+else:
+    derivatives = LateModule("kinetostat.engine.derivatives")
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Beginning of the names of entries, by the name of the matrix."""
@@ -98,3 +121,248 @@ def answers_at(
 def _state_and_cables(machine: Identical) -> tuple[MachineState, int]:
     """The state of a machine at its pose, kept with everything that it has computed, and the number of cables."""
     return state_of(machine.value), cable_count(machine.value)
+
+
+class Buffers:
+    """Inputs of a function at a number of points, its results there, and the call that fills the one from the others.
+
+    Each thread needs buffers of its own.
+
+    Attributes:
+        inputs: values of the inputs, SI [inputs x points]; write them in place.
+        results: numbers of the function [rows x points], as of the last call.
+        status: `Status` codes [points], as of the last call.
+    """
+
+    def __init__(self, function: Function, places: Sequence[int], start: Sequence[float], count: int) -> None:
+        """Prepare memory.
+
+        Args:
+            function: the function.
+            places: for each parameter of the function, the row of `inputs` that has its values.
+            start: values of the inputs to begin with.
+            count: number of points.
+        """
+        direct, self._function, self._count = function.direct, function, count
+        program = direct.program if direct and isinstance(direct.program, Program) else None
+        room = max(count, program.lanes) if program else count
+        whole, every = np.repeat(np.asarray(start, dtype=float)[:, None], room, axis=1), np.empty((function.rows, room))
+        self._codes = bytearray(room)
+        codes = np.frombuffer(self._codes, dtype=np.int8)
+        self.inputs, self.results, self.status = whole[:, :count], every[:, :count], codes[:count]
+        rows = dict(zip(function.paths, places, strict=True))
+        self._columns = {path: self.inputs[row] for path, row in rows.items()}
+        self._angles: list[Array] = []
+        self._run = None
+        if direct and program:
+            turning = sorted({rows[path] for path in direct.form.turning})
+            self._angles = [whole[first:end].reshape(-1) for first, end in _in_a_row(turning)]
+            self._run = program.call_on(direct.fixed, [whole[rows[path]] for path in direct.form.varying], every, codes)
+
+    def __call__(self) -> Array:
+        """Evaluate the function at `inputs`; gives `results`, the same array at every call."""
+        if self._run is None:
+            self._evaluate()
+            return self.results
+        for row in self._angles:
+            if not row.dot(row) <= LARGEST_ANGLE**2:  # some may be beyond what traced cosines take
+                self._evaluate()
+                return self.results
+        self._run()
+        if self._codes.find(NOT_CONVERGED, 0, self._count) >= 0:
+            self._evaluate()
+        return self.results
+
+    def _evaluate(self) -> None:
+        """Evaluate by the function's own fill, which knows other ways where the program ends without joints."""
+        self._function.fill(self._columns, self.results, self.status)
+
+
+def _in_a_row(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """Begin and end of each run of consecutive numbers."""
+    first = [k for k in numbers if k - 1 not in numbers]
+    return list(zip(first, [k + 1 for k in numbers if k + 1 not in numbers], strict=True))
+
+
+NOT_CONVERGED = int(Status.NOT_CONVERGED)
+
+
+@checked
+def compile(  # noqa: A001 - `kinetostat.compile` is what users write
+    machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str], judged: bool = True
+) -> "CompiledFunction":
+    """Compile quantities of a machine as a function of some of its fields.
+
+    Args:
+        machine: gives all fields that are not inputs.
+        inputs: names of the fields that vary, in the order in which the function takes them. A field with several
+            entries gives all of them the same value.
+        quantities: a name of a quantity; a list of names and groups; or "K" or "C" for a whole matrix.
+        judged: whether the function knows the status of a pose. If False, values alone are computed, without reach,
+            singularity margin and limits; they mean nothing where the machine has no answer. Values at rest under
+            loads and of vibrations are judged in any case.
+
+    Returns:
+        The function.
+
+    Raises:
+        InputError: an unknown field, or the same one twice; an unknown quantity, or one that the machine cannot have.
+    """
+    return CompiledFunction(machine, tuple(several(inputs)), quantities, judged)
+
+
+class CompiledFunction:
+    """Quantities of a machine as a function of some of its fields, in machine code.
+
+    Called with an array for each input, in SI and of any shapes that broadcast, it returns an array of the shape that
+    they have together: for a list of quantities with an axis in front that counts them, for K and C with two. Values
+    are NaN where the machine has no answer; `status` says why. Inputs are not compared with what a machine file allows.
+
+    Threads may share a function, and it can be pickled: the other process compiles it, or takes it from the cache.
+
+    Attributes:
+        machine: gives all fields that are not inputs.
+        inputs: paths of the inputs.
+        quantities: names of the quantities; of a matrix its entries, row by row.
+        distinct: the same names, each once.
+        shape: lengths of the axes in front: () of one quantity, (n,) of a list, (6, 6) or (3, 3) of a matrix.
+        judged: whether the function knows the status of a pose.
+    """
+
+    def __init__(
+        self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str], judged: bool = True
+    ) -> None:
+        """Compile. Arguments and errors are those of `compile`."""
+        self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities), judged
+        self.judged = judged
+        self._fields = _without_repetition([find(machine.family, name) for name in inputs])
+        self.machine, self.inputs = machine, tuple(field.path for field in self._fields)
+        self.quantities, self.shape = _named_quantities(machine, quantities)
+        refuse_absent(state_of(machine), self.quantities, self._fields)
+        self.distinct = tuple(dict.fromkeys(self.quantities))  # a symmetric matrix has most of its entries twice
+        self._rows = [self.distinct.index(name) for name in self.quantities]
+        self._leaves = {leaf: row for row, field in enumerate(self._fields) for leaf in field.leaves}
+        self._numbers = values(machine)
+        self._function: Function = function_of(machine, tuple(self._leaves), self.distinct, judged=judged)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledFunction, self._given
+
+    def __repr__(self) -> str:
+        return f"<{', '.join(self.quantities)} of {self.machine.name!r} by {', '.join(self.inputs)}>"
+
+    def __call__(self, *given: Scalar) -> Array:
+        """Evaluate the quantities.
+
+        Args:
+            given: a number or an array for each input, SI, of shapes that broadcast.
+
+        Returns:
+            [shape of the quantities x shape of the inputs].
+        """
+        points, shape = self._points(given)
+        results, _ = self._function.at(points)
+        return self._arrange(results[self._rows], shape)
+
+    def status(self, *given: Scalar) -> Codes:
+        """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values.
+
+        Raises:
+            InputError: the function gives values alone.
+        """
+        if not self.judged:
+            raise InputError("judged is False, so that this function knows no status; compile it with judged=True.")
+        points, shape = self._points(given)
+        return self._function.at(points)[1].reshape(shape)[()]
+
+    def jacobian(self, *given: Scalar) -> Array:
+        """Return the derivatives of the quantities by each input, exact to round-off; the first call compiles them.
+
+        Args:
+            given: as for a call of the function.
+
+        Returns:
+            [shape of the quantities x inputs x shape of the inputs]; of a single quantity this is its gradient.
+
+        Raises:
+            InputError: a quantity has no derivatives that are known.
+        """
+        return self.value_and_jacobian(*given)[1]
+
+    def value_and_jacobian(self, *given: Scalar) -> tuple[Array, Array]:
+        """Return what a call returns and what `jacobian` returns, for little more than one of them.
+
+        Args:
+            given: as for a call of the function.
+
+        Raises:
+            InputError: a quantity has no derivatives that are known.
+        """
+        points, shape = self._points(given)
+        sloped = self._slopes(points)
+        slopes = np.zeros((len(self.distinct), len(self._fields), points.size))
+        for k, row in enumerate(self._leaves.values()):
+            slopes[:, row] += sloped.gradients[:, k]
+        jacobian = self._arrange(slopes[self._rows], (len(self._fields), *shape))
+        return self._arrange(sloped.values[self._rows], shape), jacobian
+
+    def buffers(self, count: int = 1) -> Buffers:
+        """Prepare arrays for so many poses; see `Buffers`. It begins at the numbers of the machine.
+
+        The rows of its results are `distinct`: the quantities, of a matrix each different entry once.
+
+        Raises:
+            InputError: the number is not one from 1 on.
+        """
+        if type(count) is not int or count < 1:
+            raise InputError(f"count is {shorten(count)}; give a whole number from 1.")
+        start = [float(self._numbers[field.leaves[0]]) for field in self._fields]
+        return Buffers(self._function, list(self._leaves.values()), start, count)
+
+    @cached_property
+    def _slopes(self) -> "Callable[[PointTable], derivatives.Gradients]":
+        """The function with its derivatives by each leaf; refused where they are not known."""
+        names, leaves = list(self.distinct), tuple(self._leaves)
+        refuse_without_derivatives(self.machine, names, leaves)
+        return lambda points: derivatives.evaluate_gradient(self.machine, points, names, leaves, repeated=True)
+
+    def _points(self, given: Sequence[Scalar]) -> tuple[PointTable, tuple[int, ...]]:
+        """The points of some inputs in a row, and their shape."""
+        if len(given) != len(self._fields):
+            raise InputError(
+                f"the function has been given {len(given)} arrays; give {len(self._fields)}, one for each of "
+                f"{', '.join(self.inputs)}."
+            )
+        try:
+            arrays = np.broadcast_arrays(*(np.asarray(array, dtype=float) for array in given))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the inputs of the function are not arrays of numbers that fit: {error}.") from None
+        rows = [array.reshape(-1) for array in arrays]
+        return PointTable({leaf: rows[row] for leaf, row in self._leaves.items()}), arrays[0].shape
+
+    def _arrange(self, rows: Array, shape: tuple[int, ...]) -> Array:
+        """Results [rows x ...] as they are returned."""
+        return rows.reshape((*self.shape, *shape))[()]
+
+
+def _without_repetition(fields: list[Parameter]) -> list[Parameter]:
+    """The fields, none of which another contains."""
+    if not fields:
+        raise InputError("inputs names no field; name those that vary, e.g. x.")
+    taken = [leaf for field in fields for leaf in field.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is an input twice; name it once.")
+    return fields
+
+
+def _named_quantities(machine: Machine, given: str | Sequence[str]) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """The names of what is asked for, and the shape of the axes that count them."""
+    parts = machine.family.component_names
+    if isinstance(given, str) and given in MATRICES:
+        return tuple(entry_name(given, row, column) for row in parts for column in parts), (len(parts), len(parts))
+    names = [given] if isinstance(given, str) else several(given)
+    if any(name in MATRICES for name in names):
+        raise InputError('quantities has a matrix among others; compile it alone, e.g. quantities="K".')
+    resolved = tuple(resolve_quantities(names, parts, cable_count(machine)))
+    return resolved, () if isinstance(given, str) and len(resolved) == 1 else (len(resolved),)

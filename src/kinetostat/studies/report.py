@@ -27,9 +27,9 @@ from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.budget import budget
 from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.capability import capability, limits_of_drives
+from kinetostat.studies.datasets import MOST_RANGES_OF_MAPS, coarser_ranges, evaluate_grid, usual_ranges
 from kinetostat.studies.drives import drives
 from kinetostat.studies.elevation import elevation
-from kinetostat.studies.grid import MOST_RANGES_OF_MAPS, coarser_ranges, evaluate_grid, usual_ranges
 from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.lobes import lobes

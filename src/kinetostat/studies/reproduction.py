@@ -26,7 +26,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies import printed_numbers
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import optimize

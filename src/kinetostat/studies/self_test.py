@@ -19,8 +19,8 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loading import load
 from kinetostat.studies import printed_numbers
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.diagnosis import InstallationCheck, UnsoundError, check_of, reinstall
-from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import best_feasible
 from kinetostat.studies.optimisation.problem import load_problem

@@ -22,8 +22,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.datasets import ABOUT_STATUS, about_quantity
-from kinetostat.studies.grid import GridQuestion
+from kinetostat.studies.datasets import ABOUT_STATUS, GridQuestion, about_quantity
 from kinetostat.studies.result_file import (
     STATUS,
     UNKNOWN,

@@ -1,20 +1,26 @@
-"""Tensions of the cables of a machine at its pose, how they hang, and how far its load is from what they can hold.
+"""Legs that only pull or only push: tensions of cables at a pose, and over a grid the legs that are not slack.
 
-Source: theory section 18. The formulas are in `equilibrium.cables`.
+The formulas are in `equilibrium.cables` and `equilibrium.numbers`.
+
+Source: theory section 12 for slack legs, section 18 for cables.
 """
 
 import math
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Codes, Mask
+from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.cables import Cables, cable_signs, cables_of
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.machine import Machine
+from kinetostat.late import LateModule
+from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import POSE, with_values
 from kinetostat.numerics.polytopes import wrench_closure
 from kinetostat.spec.arguments import checked
@@ -22,6 +28,17 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.poses import given_poses
 from kinetostat.studies.under_load import why_no_tensions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from kinetostat.engine import loaded
+    from kinetostat.equilibrium import numbers
+    from kinetostat.studies import datasets
+else:  # only a grid needs them, and labelled datasets take longer to import than the tensions of a pose to compute
+    loaded = LateModule("kinetostat.engine.loaded")
+    numbers = LateModule("kinetostat.equilibrium.numbers")
+    datasets = LateModule("kinetostat.studies.datasets")
 
 SAG_MATTERS = 0.95
 """Share of the stiffness of a straight cable below which a cable's sag is said to matter."""
@@ -170,3 +187,87 @@ def _states(machine: Machine, cables: Cables) -> tuple[CableState, ...]:
             )
         )
     return tuple(states)
+
+
+@dataclass(frozen=True, eq=False)
+class Carrying(ImmutableAnswer):
+    """The sets of legs that carry at the points of a grid.
+
+    Attributes:
+        machine: the machine with its loads; gives all parameters that do not vary.
+        dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
+        legs: names of all legs.
+        sets: names of the legs that carry together, the most frequent set first.
+        points: how many points of the grid have each set.
+    """
+
+    machine: Machine
+    dataset: "xr.Dataset"
+    legs: tuple[str, ...]
+    sets: tuple[tuple[str, ...], ...]
+    points: tuple[int, ...]
+
+    def __repr__(self) -> str:
+        return f"<Carrying of {self.machine.name!r}: {len(self.sets)} sets of legs>"
+
+    @property
+    def is_map(self) -> bool:
+        """Whether the grid has two dimensions, so that a map shows it."""
+        return len(self.dataset["status"].dims) == 2
+
+
+@checked
+def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progress: Progress = silent) -> Carrying:
+    """Find which legs carry the machine at rest under its loads, over all combinations of some ranges.
+
+    A leg is slack where one of its springs could only carry loads of the other sign; all other legs carry.
+
+    Args:
+        machine: the machine with its loads, or its state (`state_of`); gives all parameters that do not vary.
+        ranges: one axis each, "FIELD=from:to:count[:log]".
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: no leg of the machine can go slack, a range that `evaluate_grid` refuses, or loads that
+            `under_load` refuses.
+    """
+    state = state_of(machine)
+    machine, question = state.machine, datasets.grid_question(state, ranges, ["slack_springs"])
+    if not any(spring.acts for spring in springs(state.configuration)):
+        raise InputError(
+            f'all legs of {machine.name} pull and push, so that all of them carry; write acts = "pulls" at an '
+            'actuator, or a leg of type = "cable".'
+        )
+    names, size, slab = [leg.name for leg in state.configuration.legs], question.grid.size, loaded.Way.ANY_MACHINE.slab
+    carries, status = np.zeros((size, len(names)), dtype=bool), np.zeros(size, dtype=np.int8)
+    for start in range(0, size, slab):
+        part = slice(start, min(start + slab, size))
+        columns = question.grid.columns(part.start, part.stop)
+        carries[part], status[part] = _carrying_in_slab(machine, columns, part.stop - start, len(names))
+        progress(part.stop, size)
+    at_rest = status == Status.OK
+    sets_at_rest = [tuple(row) for row in carries[at_rest].tolist()]
+    ranked = Counter(sets_at_rest).most_common()
+    places = {row: place for place, (row, _) in enumerate(ranked)}
+    codes = np.full(size, -1, dtype=np.int16)
+    codes[at_rest] = [places[row] for row in sets_at_rest]
+    sets = tuple(tuple(name for name, carried in zip(names, row, strict=True) if carried) for row, _ in ranked)
+    meanings = " ".join("+".join("_".join(name.split()) for name in names) or "none" for names in sets)
+    about = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": meanings}
+    shape = question.grid.shape
+    dataset = question.labels.assign(
+        carrying=(question.dims, codes.reshape(shape), about),
+        status=(question.dims, status.reshape(shape), datasets.ABOUT_STATUS),
+    )
+    return Carrying(machine, dataset, tuple(names), sets, tuple(count for _, count in ranked))
+
+
+def _carrying_in_slab(machine: Machine, columns: dict[str, Array], count: int, legs: int) -> tuple[Mask, Codes]:
+    """Whether each leg carries at some points [points x legs], and `Status` codes [points]."""
+    carries = np.zeros((count, legs), dtype=bool)
+    states = numbers.states_of_rest(states_at(machine, columns, count))
+    if states.equations is not None and states.stability is not None:
+        pairs = zip(states.equations.mechanism.legs, states.equations.legs, strict=True)
+        slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1) for leg, terms in pairs]
+        carries[states.rows] = ~np.stack(slack, axis=1)[states.stability.stable]
+    return carries, states.status.astype(np.int8)

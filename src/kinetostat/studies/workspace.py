@@ -26,8 +26,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.datasets import LOADS_LEFT_OUT
-from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, grid_question
+from kinetostat.studies.datasets import IN_MEMORY, LOADS_LEFT_OUT, GridQuestion, answer, grid_question
 from kinetostat.studies.poses import MOST_DIMENSIONS
 from kinetostat.studies.workspace_verdicts import (
     INSIDE,

@@ -29,7 +29,7 @@ from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
-from kinetostat.studies.grid import GridQuestion
+from kinetostat.studies.datasets import GridQuestion
 from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.units import KINDS, UnitError, as_read, parse
 

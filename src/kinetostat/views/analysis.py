@@ -19,7 +19,7 @@ from kinetostat.machine.machine import Machine, pose_of
 from kinetostat.machine.parameters import POSE, shown, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import AXES, Analysis, analyze
-from kinetostat.studies.indices import indices_json
+from kinetostat.studies.analysis_parts import indices_json
 from kinetostat.views import analysis_tables as free
 from kinetostat.views.analysis_tables import first_lines
 from kinetostat.views.forward import actuator_coordinates

@@ -18,9 +18,8 @@ from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.analysis_parts import Along, LoadCase
 from kinetostat.studies.attribution import Softest, by_part, largest_contributors
-from kinetostat.studies.indices import Along
-from kinetostat.studies.loads import LoadCase
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import FittedTable, numeric_table
 

@@ -7,7 +7,7 @@ from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studies.assembly import Forward, ForwardPose, forward
+from kinetostat.studies.assembly_modes import Forward, ForwardPose, forward
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 

@@ -18,7 +18,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import named_entry, shown
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.datasets import LOADS_LEFT_OUT as LEFT_OUT_ATTRIBUTE
-from kinetostat.studies.grid import GridQuestion, answer, failures, field_of, grid_question
+from kinetostat.studies.datasets import GridQuestion, answer, failures, field_of, grid_question
 from kinetostat.studies.quantities import usual_quantities
 from kinetostat.studies.stored_grid import Extremes, StoredGrid
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
@@ -36,9 +36,9 @@ from kinetostat.views.question import (
 from kinetostat.views.tables import FittedTable, numeric_table
 
 if TYPE_CHECKING:
-    from kinetostat.studies import carrying as carrying_study
+    from kinetostat.studies import tensions
 else:  # it needs states of rest, which most maps do not
-    carrying_study = LateModule("kinetostat.studies.carrying")
+    tensions = LateModule("kinetostat.studies.tensions")
 
 MOST_ROWS_OF_A_SWEEP = 60
 """Rows of a sweep that are printed one by one, on two screens; of longer ones and of maps, the extremes."""
@@ -237,7 +237,7 @@ def _stored_tables(stored: StoredGrid, _full: bool) -> Iterator[FittedTable]:
     yield _extremes_table(size, stored.tally.extremes, question.machine.display)
 
 
-def frequent_sets(carrying: "carrying_study.Carrying") -> Iterator[tuple[str, int]]:
+def frequent_sets(carrying: "tensions.Carrying") -> Iterator[tuple[str, int]]:
     """Name each frequent set of legs that carry, and how many points it has; all others together."""
     for legs, count in list(zip(carrying.sets, carrying.points, strict=True))[:MOST_NAMED_SETS]:
         yield "all" if legs == carrying.legs else ", ".join(legs) or "none", count
@@ -245,14 +245,14 @@ def frequent_sets(carrying: "carrying_study.Carrying") -> Iterator[tuple[str, in
         yield f"{len(rare):,} other sets", sum(rare)
 
 
-def _set_tables(carrying: "carrying_study.Carrying", _full: bool) -> Iterator[FittedTable]:
+def _set_tables(carrying: "tensions.Carrying", _full: bool) -> Iterator[FittedTable]:
     table = numeric_table(size_of(carrying.dataset), "legs that carry", ["points", "share"])
     for name, count in frequent_sets(carrying):
         table.add_row(name, f"{count:,}", f"{100.0 * count / carrying.dataset['status'].size:.3g} %")
     yield table
 
 
-def _sets(carrying: "carrying_study.Carrying") -> list[dict[str, Any]]:
+def _sets(carrying: "tensions.Carrying") -> list[dict[str, Any]]:
     return [{"legs": legs, "points": count} for legs, count in zip(carrying.sets, carrying.points, strict=True)]
 
 
@@ -322,7 +322,7 @@ def map_or_carrying_legs(
     progress: Progress,
     quantities: Sequence[str] = (),
     carrying: bool = False,
-) -> "xr.Dataset | carrying_study.Carrying":
+) -> "xr.Dataset | tensions.Carrying":
     """Evaluate quantities over two parameters or more, or find which legs carry there.
 
     Raises:
@@ -334,7 +334,7 @@ def map_or_carrying_legs(
         raise InputError(TWO_OF_A_MAP)
     if quantities:
         raise InputError(CARRYING_ALONE)
-    return carrying_study.carrying_legs(machine, ranges, progress)
+    return tensions.carrying_legs(machine, ranges, progress)
 
 
 SWEEP_QUESTION = Question(

@@ -22,9 +22,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import named_entry
-from kinetostat.studies.datasets import LOADS_LEFT_OUT
+from kinetostat.studies.datasets import LOADS_LEFT_OUT, failures
 from kinetostat.studies.evaluation import PoseAnswers
-from kinetostat.studies.grid import failures
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import STYLE, fill_regions, look_of, missing_line, new_figure, region_colours, slim_bar
@@ -33,7 +32,7 @@ from kinetostat.views.map_scales import levels_of, set_axis_scales, thin_numbers
 from kinetostat.views.question import Drawing
 
 if TYPE_CHECKING:
-    from kinetostat.studies.carrying import Carrying
+    from kinetostat.studies.tensions import Carrying
 
 MOST_TICK_INTERVALS = 5
 """Intervals between the numbers along an axis of a map: as many across as up, whatever shape the panel has."""
@@ -88,7 +87,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     """Draw a panel for each quantity over the two dimensions of a dataset, its contours labelled with their values.
 
     Args:
-        dataset: two-dimensional, from `studies.grid.evaluate_grid`.
+        dataset: two-dimensional, from `studies.datasets.evaluate_grid`.
         names: the quantities.
         title: title of the whole figure.
     """
@@ -121,7 +120,7 @@ def grid_curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure
     """Draw quantities over the one dimension of a dataset, a panel for each unit; logarithmic where the range is.
 
     Args:
-        dataset: one-dimensional, from `studies.grid.evaluate_grid`.
+        dataset: one-dimensional, from `studies.datasets.evaluate_grid`.
         names: the quantities.
         title: title of the whole figure.
     """

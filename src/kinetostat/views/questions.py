@@ -81,7 +81,7 @@ QUESTIONS = {word: place for group in QUESTION_GROUPS.values() for word, place i
 
 ANSWERS: Mapping[str, str] = {
     "studies.analysis.Analysis": "views.analysis.ANALYSIS",
-    "studies.assembly.Forward": "views.forward.FORWARD",
+    "studies.assembly_modes.Forward": "views.forward.FORWARD",
     "studies.under_load.LoadedState": "views.analysis.LOADED",
     "studies.tensions.Tensions": "views.tensions.TENSIONS",
     "studies.drives.DriveLoads": "views.drives.DRIVES",
@@ -89,7 +89,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.evaluation.PoseAnswers": "views.path.PATH",
     "xarray.Dataset": "views.grid.GRID",
     "studies.stored_grid.StoredGrid": "views.grid.STORED_GRID",
-    "studies.carrying.Carrying": "views.grid.CARRYING",
+    "studies.tensions.Carrying": "views.grid.CARRYING",
     "studies.workspace.Workspace": "views.workspace.WORKSPACE",
     "studies.sensitivity.Sensitivity": "views.sensitivity.SENSITIVITY",
     "studies.identification.identification.Identification": "views.identification.IDENTIFICATION",
@@ -98,7 +98,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.corrections.CorrectionTable": "views.command.CORRECTIONS",
     "studies.elevation.Elevation": "views.elevation.ELEVATION",
     "studies.motors.MotorChoice": "views.motors.MOTORS",
-    "studies.servo.Servo": "views.servo.SERVO",
+    "studies.control.Servo": "views.servo.SERVO",
     "studies.lobes.Lobes": "views.lobes.LOBES",
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.Budget": "views.budget.BUDGET",

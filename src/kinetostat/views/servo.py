@@ -12,7 +12,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import DASH, number
 from kinetostat.machine.machine import pose_of, setting_of
-from kinetostat.studies.servo import Servo, servo
+from kinetostat.studies.control import Servo, servo
 from kinetostat.vibration.receptance import along, receptance
 from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records

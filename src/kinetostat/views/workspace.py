@@ -7,7 +7,7 @@ from typing import Any
 
 from kinetostat.machine.limits import Limits, no_limits_sentence
 from kinetostat.machine.parameters import dimension, shown
-from kinetostat.studies.grid import field_of
+from kinetostat.studies.datasets import field_of
 from kinetostat.studies.workspace import FEWEST_CELLS, METHOD, Workspace, workspace
 from kinetostat.studies.workspace_verdicts import INSIDE, phrase
 from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question, ranges_option

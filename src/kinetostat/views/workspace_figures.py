@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from kinetostat.arrays import Array
 from kinetostat.kinetostatics.quantities import plain_name
-from kinetostat.studies.grid import field_of
+from kinetostat.studies.datasets import field_of
 from kinetostat.studies.workspace import BORDER_VARIABLES, COLOURING_QUANTITY, Workspace
 from kinetostat.studies.workspace_verdicts import (
     BEYOND,

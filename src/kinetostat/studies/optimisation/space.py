@@ -25,9 +25,9 @@ from kinetostat.spec.study import PosesTable, VariableTable
 from kinetostat.units import KINDS, RIGID, UnitError, parse
 
 if TYPE_CHECKING:
-    from kinetostat.studies import grid, workspace
+    from kinetostat.studies import datasets, workspace
 else:  # they label their answers, by a library that takes long to import; most studies have no grid of poses
-    grid = LateModule("kinetostat.studies.grid")
+    datasets = LateModule("kinetostat.studies.datasets")
     workspace = LateModule("kinetostat.studies.workspace")
 
 VALUE_DIGITS = 6
@@ -326,7 +326,7 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
-    question = grid.grid_question(machine, table.over or [], ["singularity_margin"])
+    question = datasets.grid_question(machine, table.over or [], ["singularity_margin"])
     if question.grid.size > MOST_NODES:
         raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_NODES:,} are allowed.")
     columns = question.grid.columns(0, question.grid.size)
@@ -341,7 +341,7 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     return PoseSet(kept, table.required, None, description)
 
 
-def _box(question: "grid.GridQuestion") -> tuple[float, str] | None:
+def _box(question: "datasets.GridQuestion") -> tuple[float, str] | None:
     if not all(field.startswith("pose.") for field in question.fields):
         return None
     spans = [abs(float(axis.values[-1] - axis.values[0])) for axis in question.grid.axes]

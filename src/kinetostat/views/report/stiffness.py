@@ -8,7 +8,7 @@ import xarray as xr
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.grid import failures
+from kinetostat.studies.datasets import failures
 from kinetostat.studies.report import NOTHING_TO_MAP, Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,

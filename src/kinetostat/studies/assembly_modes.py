@@ -11,8 +11,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints
-from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, stand, system_of, undriven
+from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, system_of, undriven
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import Actuator
@@ -156,12 +155,18 @@ def _names(system: System) -> dict[str, Actuator]:
 
 def _judged_pose(machine: Machine, mode: AssemblyMode) -> ForwardPose:
     """An assembly mode with the status that the machine has there."""
-    there = with_values(machine, {f"{POSE}{name}": value for name, value in mode.pose.items()})
-    status = Status(int(respond(there, mode.joints).status))
+    machine_there = with_values(machine, {f"{POSE}{name}": value for name, value in mode.pose.items()})
+    status = Status(int(respond(machine_there, mode.joints).status))
     turn = mode.placement.rotation
-    rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
-    position = np.array(mode.placement.translation.components(), dtype=float)
-    return ForwardPose(mode.pose, status, mode.residual, mode.present, mode.by_pose, position, np.array([*rows]))
+    return ForwardPose(
+        pose=mode.pose,
+        status=status,
+        residual=mode.residual,
+        present=mode.present,
+        by_pose=mode.by_pose,
+        position=np.array(mode.placement.translation.components(), dtype=float),
+        rotation=np.array([axis.components() for axis in (turn.x, turn.y, turn.z)], dtype=float).T,
+    )
 
 
 def _count_of_modes(count: int) -> str:
@@ -184,8 +189,3 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
             "singularity or where a leg no longer reaches."
         )
     return first if len(modes) == 1 else f"{first} The first is the one that the machine is in."
-
-
-def actuators_at(machine: Machine, joints: Joints | None = None) -> tuple[Actuator, ...]:
-    """The actuators of a machine with their coordinates at its pose; see `kinematics.forward.stand`."""
-    return tuple(replace(actuator, coordinate=float(actuator.coordinate)) for actuator in stand(machine, joints))
