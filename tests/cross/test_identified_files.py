@@ -50,6 +50,7 @@ def test_a_printer_keeps_its_file_but_for_what_was_identified(tmp_path, capsys):
     # A carriage commanded to c stands at c + zero; where it stands is the business of the machine as built.
     stands = command(built, {"z": [0.01, 0.02]}).coordinates
     assert commands.coordinates + zeros == pytest.approx(stands, abs=1e-15)
+    assert commands.message.endswith("Zeros and gains of the fit are counted in.")
     with pytest.raises(InputError, match="is the machine as drawn"):
         command(load(tmp_path / "printer.toml"), fit=folder)
 
