@@ -28,7 +28,7 @@ from kinetostat.equilibrium.state import actuator_loads_at_rest, state_of
 from kinetostat.kinetostatics.feasible import BLOCKS, greatest_ball, greatest_speed
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.motion.operators import loads_by_acceleration
+from kinetostat.motion.machine_at_pose import loads_by_acceleration
 from kinetostat.studies.dynamics import dynamics
 
 

@@ -15,7 +15,7 @@ from kinetostat.machine.actuators import actuators_of, joint_actuators
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.loads import gravity_of, located_members
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
-from kinetostat.motion.operators import forces_along
+from kinetostat.motion.machine_at_pose import forces_along
 from kinetostat.motion.rates import PoseRates
 from kinetostat.studies.dynamics import dynamics
 

@@ -30,8 +30,14 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
-from kinetostat.motion.numbers import NUMBERS_OF_DRIVE, drive_numbers, joints_of, motion_details
-from kinetostat.motion.operators import MachineAtPose, at_pose
+from kinetostat.motion.machine_at_pose import (
+    NUMBERS_OF_DRIVE,
+    MachineAtPose,
+    at_pose,
+    drive_numbers,
+    joints_of,
+    motion_details,
+)
 from kinetostat.motion.rates import PoseRates
 from kinetostat.motion.rigid import MotionPlan, masses_of_links, plan_of
 
@@ -79,8 +85,8 @@ class PathForces:
     """Drives and joints along a motion; NaN where the machine has no place.
 
     Attributes:
-        drives: numbers of each drive, see `motion.numbers.NUMBERS_OF_DRIVE` [drives x numbers x n], SI.
-        wrench: at the tool point, see `motion.numbers.tool_wrench` [6 x n], N·m and N; none if nobody asked.
+        drives: numbers of each drive, see `machine_at_pose.NUMBERS_OF_DRIVE` [drives x numbers x n], SI.
+        wrench: at the tool point, see `machine_at_pose.tool_wrench` [6 x n], N·m and N; none if nobody asked.
         joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
         inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
         status: `Status` codes [n].

@@ -398,7 +398,7 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
 
 
 def needs_masses(names: Iterable[str]) -> bool:
-    """Whether quantities need what drives carry by accelerations (`motion.operators.loads_by_acceleration`)."""
+    """Whether quantities need what drives carry by accelerations (`motion.machine_at_pose.loads_by_acceleration`)."""
     return any(QUANTITIES[name].driven == "acceleration" for name in names)
 
 

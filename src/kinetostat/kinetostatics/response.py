@@ -66,8 +66,8 @@ class Response:
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
         cables: numbers of cables (`equilibrium.cables`), where they have been computed.
         drives: what each drive may do, in the order of the actuators that hold something.
-        acceleration_loads: load of each drive per unit of acceleration at the tool point (`motion.operators`), where it
-            has been computed.
+        acceleration_loads: load of each drive per unit of acceleration at the tool point (`motion.machine_at_pose`),
+            where it has been computed.
         lost_motion_of_joints: motion of the tool that friction of passive joints holds back, by component, m or rad
             (`motion.response`), where it has been computed.
     """

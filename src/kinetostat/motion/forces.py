@@ -14,15 +14,16 @@ from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.solve import Row, complement, right_inverse
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
-from kinetostat.motion.rates import LegMotion, MachineMotion, Moving
+from kinetostat.motion.rates import BodyMotion, LegMotion, MachineMotion
 from kinetostat.motion.rigid import MassPoint, RigidLeg, RigidMachine
 
 PARTS = ("weight", "inertia", "process", "friction", "springs")
 """Parts of what drives must do: against the weight of all parts, to accelerate masses and rotors, against the loads on
 the platform, against friction of joints and drives, and against flexure hinges."""
 NOTHING = Wrench(ZERO, ZERO)
-STANDING = 1e-12
-"""Rate of a joint, rad/s or in lengths of the machine per second, up to which it stands: round-off, not a motion."""
+STANDSTILL_RATE = 1e-12
+"""Rate of a joint, rad/s or in lengths of the machine per second, up to which it stands still: Coulomb friction is as
+large at any speed, that of round-off included."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class ForceDemand:
     Attributes:
         platform: the wrench along the platform's twist, at the origin.
         legs: generalised forces of each leg's coordinates.
-        carried: for each leg, the wrench that what lies beyond each number of its motions asks for.
+        carried: for each leg and each k, the wrench that all asks for that lies beyond its first k motions.
     """
 
     platform: Wrench
@@ -42,57 +43,74 @@ class ForceDemand:
     def __add__(self, other: "ForceDemand") -> "ForceDemand":
         rows = [[a + b for a, b in zip(*pair, strict=True)] for pair in zip(self.legs, other.legs, strict=True)]
         wrenches = zip(self.carried, other.carried, strict=True)
-        beyond = tuple(tuple(a + b for a, b in zip(*pair, strict=True)) for pair in wrenches)
-        return ForceDemand(self.platform + other.platform, tuple(rows), beyond)
+        carried = tuple(tuple(a + b for a, b in zip(*pair, strict=True)) for pair in wrenches)
+        return ForceDemand(self.platform + other.platform, tuple(rows), carried)
 
 
 def force_on(mass: Scalar, at: Vector, acceleration: Vector) -> Wrench:
-    """The wrench at the origin that accelerates a mass at a point."""
+    """Return the wrench at the origin that accelerates a mass at a point."""
     force = acceleration * mass
     return Wrench(at.cross(force), force)
 
 
-def _acceleration(at: Vector, body: Moving, moving: Twist) -> Vector:
-    """Acceleration of a point of a body, theory (88); `moving` is how the body really moves."""
-    speed = moving.translational + moving.rotational.cross(at)
+def _acceleration(at: Vector, body: BodyMotion, real_twist: Twist) -> Vector:
+    """Return the acceleration of a point of a body, theory (88)."""
+    speed = real_twist.translational + real_twist.rotational.cross(at)
     return body.change.translational + body.change.rotational.cross(at) + body.twist.rotational.cross(speed)
 
 
 def _inertial(
     masses: Sequence[MassPoint],
     pairs: Sequence[tuple[int, int]],
-    bodies: Sequence[Moving],
-    moving: Sequence[Twist],
+    bodies: Sequence[BodyMotion],
+    real_twists: Sequence[Twist],
     length: Scalar,
 ) -> list[Wrench]:
-    """The wrench that accelerates each mass, theory (90); bodies are those that carry the masses."""
-    gained = [_acceleration(m.point, body, way) for m, body, way in zip(masses, bodies, moving, strict=True)]
-    momenta = [acceleration * (mass.uncoupled * length) for mass, acceleration in zip(masses, gained, strict=True)]
+    """Return the wrench that accelerates each mass, theory (90).
+
+    Args:
+        masses: masses of a leg or of the platform.
+        pairs: pairs of masses that are the halves of a bar.
+        bodies: for each mass, the motion of the body that carries it.
+        real_twists: for each mass, the twist with which this body really moves.
+        length: length of the machine, m.
+    """
+    carriers = list(zip(masses, bodies, real_twists, strict=True))
+    accelerations = [_acceleration(mass.point, body, twist) for mass, body, twist in carriers]
+    forces = [gain * (mass.uncoupled * length) for mass, gain in zip(masses, accelerations, strict=True)]
     for first, second in pairs:
         coupled = (masses[first].mass - masses[first].uncoupled) * length
-        momenta[first] = momenta[first] + gained[second] * coupled
-        momenta[second] = momenta[second] + gained[first] * coupled
+        forces[first] = forces[first] + accelerations[second] * coupled
+        forces[second] = forces[second] + accelerations[first] * coupled
     wrenches = []
-    for mass, force, body, way in zip(masses, momenta, bodies, moving, strict=True):
-        torque = mass.point.cross(force)
+    for (mass, body, twist), force in zip(carriers, forces, strict=True):
+        moment = mass.point.cross(force)
         if mass.tensor:
-            spun = mass.spin(body.change.rotational) + way.rotational.cross(mass.spin(body.twist.rotational))
-            torque = torque + spun
-        wrenches.append(Wrench(torque, force))
+            spin_rate = mass.spin(body.change.rotational) + twist.rotational.cross(mass.spin(body.twist.rotational))
+            moment = moment + spin_rate
+        wrenches.append(Wrench(moment, force))
     return wrenches
 
 
 def _demand(
     machine: RigidMachine,
-    platform: Sequence[Wrench],
-    of_legs: Sequence[Sequence[Wrench]],
-    further: Sequence[Row] | None = None,
+    platform: Sequence[Wrench] = (),
+    of_legs: Sequence[Sequence[Wrench]] | None = None,
+    of_coordinates: Sequence[Row] | None = None,
 ) -> ForceDemand:
-    """Add up the wrenches that masses ask for, from the platform back to the base; `further` acts on coordinates."""
+    """Add up what masses and coordinates ask for, from the platform back to the base.
+
+    Args:
+        machine: the machine.
+        platform: wrenches that the platform asks for.
+        of_legs: for each leg, the wrench that each of its masses asks for; none if None.
+        of_coordinates: for each leg, the forces that its coordinates ask for; none if None.
+    """
     rows, carried = [], []
-    for number, (leg, wrenches) in enumerate(zip(machine.legs, of_legs, strict=True)):
+    for number, leg in enumerate(machine.legs):
+        wrenches = of_legs[number] if of_legs else ()
         beyond = [NOTHING]
-        row = [0.0] * len(leg.rates_by_twist) if further is None else list(further[number])
+        row = list(of_coordinates[number]) if of_coordinates else [0.0] * len(leg.rates_by_twist)
         for motion in reversed(range(len(leg.screws))):
             load = beyond[0]
             for mass, wrench in zip(leg.masses, wrenches, strict=False):
@@ -110,58 +128,54 @@ def _demand(
     return ForceDemand(whole, tuple(rows), tuple(carried))
 
 
-def inertia(machine: RigidMachine, motion: MachineMotion, along: MachineMotion | None = None) -> ForceDemand:
-    """The demand of masses and rotors along a motion, theory (90); `along` as in `rates.leg_motion`."""
-    along = along or motion
-    platform = _inertial(
-        machine.platform,
-        (),
-        [motion.platform] * len(machine.platform),
-        [along.platform.twist] * len(machine.platform),
-        machine.length,
-    )
-    of_legs, rotors = [], []
-    for leg, there, moving in zip(machine.legs, motion.legs, along.legs, strict=True):
-        bodies = [there.bodies[mass.carried] for mass in leg.masses]
-        ways = [moving.bodies[mass.carried].twist for mass in leg.masses]
-        of_legs.append(_inertial(leg.masses, leg.pairs, bodies, ways, machine.length))
-        spun = [machine.drives[n].inertia * there.change[place] for place, n in enumerate(leg.drives, leg.passive)]
-        rotors.append([0.0] * leg.passive + spun)
-    return _demand(machine, platform, of_legs, rotors)
+def inertia(machine: RigidMachine, motion: MachineMotion, real_motion: MachineMotion | None = None) -> ForceDemand:
+    """Return the demand of masses and rotors along a motion, theory (90); arguments as of `rates.leg_motion`."""
+    real_motion = real_motion or motion
+    count, real_twist = len(machine.platform), real_motion.platform.twist
+    platform = _inertial(machine.platform, (), [motion.platform] * count, [real_twist] * count, machine.length)
+    of_legs, of_rotors = [], []
+    for leg, leg_motion, real_leg_motion in zip(machine.legs, motion.legs, real_motion.legs, strict=True):
+        bodies = [leg_motion.bodies[mass.carried] for mass in leg.masses]
+        real_twists = [real_leg_motion.bodies[mass.carried].twist for mass in leg.masses]
+        of_legs.append(_inertial(leg.masses, leg.pairs, bodies, real_twists, machine.length))
+        rotors = [machine.drives[n].inertia * leg_motion.change[k] for k, n in enumerate(leg.drives, leg.passive)]
+        of_rotors.append([0.0] * leg.passive + rotors)
+    return _demand(machine, platform, of_legs, of_rotors)
 
 
 def weight(machine: RigidMachine) -> ForceDemand:
-    """The demand of the weight of all parts."""
+    """Return the demand of the weight of all parts."""
     up = ZERO - machine.gravity
-    platform = [force_on(mass.mass, mass.point, up) for mass in machine.platform]
-    return _demand(machine, platform, [[force_on(m.mass, m.point, up) for m in leg.masses] for leg in machine.legs])
+    platform, *of_legs = (
+        [force_on(mass.mass, mass.point, up) for mass in masses]
+        for masses in (machine.platform, *(leg.masses for leg in machine.legs))
+    )
+    return _demand(machine, platform, of_legs)
 
 
 def process(machine: RigidMachine) -> ForceDemand:
-    """The demand of the loads of the file on the platform."""
-    return _demand(machine, [NOTHING - machine.process], [() for _ in machine.legs])
+    """Return the demand of the loads of the file on the platform."""
+    return _demand(machine, [NOTHING - machine.process])
 
 
 def hinges(machine: RigidMachine) -> ForceDemand:
-    """The demand of flexure hinges, which bend."""
-    rows = [[*leg.springs, *(0.0 for _ in leg.drives)] for leg in machine.legs]
-    return _demand(machine, [], [() for _ in machine.legs], rows)
+    """Return the demand of flexure hinges, which bend."""
+    return _demand(machine, of_coordinates=[[*leg.springs, *(0.0 for _ in leg.drives)] for leg in machine.legs])
 
 
 def friction(machine: RigidMachine, motion: MachineMotion) -> ForceDemand:
-    """The demand of friction of joints and drives, theory (91): none of Coulomb's where nothing moves."""
+    """Return the demand of friction of joints and drives, theory (91); where nothing moves, Coulomb's is zero."""
     rows = [_leg_friction(machine, leg, moving) for leg, moving in zip(machine.legs, motion.legs, strict=True)]
-    return _demand(machine, [], [() for _ in machine.legs], rows)
+    return _demand(machine, of_coordinates=rows)
 
 
 def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Row:
-    row: Row = []
-    for part, rate in zip(leg.friction, motion.rates, strict=False):
-        row.append(part.viscous * rate)
+    """Return the forces of friction of a leg along its coordinates: of joints, of ball joints as a whole, of drives."""
+    row: Row = [part.viscous * rate for part, rate in zip(leg.friction, motion.rates, strict=False)]
     in_balls = {place for ball in leg.balls for place in ball}
     for place, part in enumerate(leg.friction):
         if place not in in_balls and not is_zero(part.coulomb):
-            row[place] = row[place] + part.coulomb * sense(motion.rates[place])
+            row[place] = row[place] + part.coulomb * direction_of_motion(motion.rates[place])
     for ball in leg.balls:
         coulomb = leg.friction[ball[0]].coulomb
         if is_zero(coulomb):
@@ -176,19 +190,19 @@ def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Ro
             row[place] = row[place] + coulomb * (axis.dot(turning) * share)
     for place, number in enumerate(leg.drives, leg.passive):
         drive, rate = machine.drives[number], motion.rates[place]
-        row.append(drive.viscous * rate + (drive.coulomb + drive.guide_friction) * sense(rate))
+        row.append(drive.viscous * rate + (drive.coulomb + drive.guide_friction) * direction_of_motion(rate))
     return row
 
 
-def sense(rate: Scalar) -> Scalar:
-    """1 of a joint that moves forward, -1 of one that moves back, 0 of one that stands: round-off has no friction."""
+def direction_of_motion(rate: Scalar) -> Scalar:
+    """Return 1 for a joint that moves forward, -1 for one that moves back, 0 for one that stands still."""
     if is_zero(rate):
         return 0.0
-    return where(rate > STANDING, 1.0, where(rate < -STANDING, -1.0, 0.0))
+    return where(rate > STANDSTILL_RATE, 1.0, where(rate < -STANDSTILL_RATE, -1.0, 0.0))
 
 
 def demands(machine: RigidMachine, motion: MachineMotion) -> dict[str, ForceDemand]:
-    """The demands of a motion, by part, see `PARTS`."""
+    """Return the demands of a motion, by part, see `PARTS`."""
     return {
         "weight": weight(machine),
         "inertia": inertia(machine, motion),
@@ -205,7 +219,7 @@ class DriveStatics:
     Attributes:
         ways: twists that the legs allow; those of the axes where they allow all.
         inverse: forces of the drives by generalised forces along the ways [drives][ways].
-        rates: of the drives by the ways [drives][ways].
+        rates: rates of the drives by the ways [drives][ways].
     """
 
     ways: tuple[Row, ...]
@@ -214,9 +228,8 @@ class DriveStatics:
 
 
 def drive_statics(machine: RigidMachine) -> DriveStatics:
-    """Solve the statics of the drives; of more drives than ways, those of least energy in their springs."""
-    identity = [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
-    ways = machine.ways or tuple(identity)
+    """Solve the statics of the drives; of more drives than ways, with the least energy in their springs."""
+    ways = machine.ways or tuple(_identity())
     by_twist: list[Row] = [[] for _ in machine.drives]
     for leg in machine.legs:
         for place, number in enumerate(leg.drives, leg.passive):
@@ -226,24 +239,23 @@ def drive_statics(machine: RigidMachine) -> DriveStatics:
         for row in by_twist
     ]
     weights = _weights(machine)
-    scaled = [[rate * share for rate in row] for row, share in zip(rates, weights, strict=True)]
-    solution, _, _ = right_inverse([list(row) for row in zip(*scaled, strict=True)])
+    weighted_rates = [[rate * share for rate in row] for row, share in zip(rates, weights, strict=True)]
+    solution, _, _ = right_inverse([list(row) for row in zip(*weighted_rates, strict=True)])
     inverse = [[entry * share for entry in row] for row, share in zip(solution, weights, strict=True)]
     return DriveStatics(ways, tuple(inverse), tuple(rates))
 
 
 def _weights(machine: RigidMachine) -> list[Scalar]:
-    """Roots of the drives' stiffness, by which more drives than ways share a load; alike where a drive is rigid."""
-    springs = [drive.spring for drive in machine.drives]
-    stiff = [s.stiffness for s in springs]
-    if not machine.plan.overactuated or any(map(is_infinite, stiff)):
-        return [1.0] * len(springs)
+    """Return roots of the drives' stiffness, by which more drives than ways share a load; alike if a drive is rigid."""
+    stiffnesses = [drive.spring.stiffness for drive in machine.drives]
+    if not machine.plan.overactuated or any(map(is_infinite, stiffnesses)):
+        return [1.0] * len(stiffnesses)
     shrink = 1.0 / machine.length
-    return [sqrt(k) if d.slides else sqrt(k) * shrink for k, d in zip(stiff, machine.drives, strict=True)]
+    return [sqrt(k) if d.slides else sqrt(k) * shrink for k, d in zip(stiffnesses, machine.drives, strict=True)]
 
 
 def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) -> Row:
-    """Generalised forces along some twists of the platform, with the legs following, theory (92)."""
+    """Return generalised forces along some twists of the platform, with the legs following, theory (92)."""
     whole = list(demand.platform.components())
     for leg, row in zip(machine.legs, demand.legs, strict=True):
         for solved, force in zip(leg.rates_by_twist, row, strict=True):
@@ -253,44 +265,51 @@ def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) 
 
 
 def drive_forces(machine: RigidMachine, statics: DriveStatics, demand: ForceDemand) -> Row:
-    """Forces of the drives, positive along their motion: N of slides, N times the length of turns."""
+    """Return the forces of the drives, positive along their motion: N of slides, N times the length of turns."""
     forces = along_ways(machine, statics.ways, demand)
     return [total([a * b for a, b in zip(row, forces, strict=True)]) for row in statics.inverse]
 
 
 def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Scalar]) -> list[Wrench]:
-    """The wrench that the platform exerts on each leg, at the origin, theory (93).
+    """Return the wrench that the platform exerts on each leg, at the origin, theory (93).
 
     What legs carry among themselves, where they keep the platform from the same motion, is the least that balances it.
 
     Args:
         machine: the machine.
-        demand: all that is asked for.
-        forces: of the drives.
+        demand: the sum of all demands.
+        forces: forces of the drives.
     """
-    inner, left = [], NOTHING - demand.platform
+    leg_demands, imbalance = [], NOTHING - demand.platform
     for leg, row in zip(machine.legs, demand.legs, strict=True):
-        driving = [0.0] * leg.passive + [forces[number] for number in leg.drives]
-        parts = [force - given for force, given in zip(row, driving, strict=True)]
-        balance = [
-            total([solved[i] * part for solved, part in zip(leg.rates_by_twist, parts, strict=True)]) for i in range(6)
+        of_drives = [0.0] * leg.passive + [forces[number] for number in leg.drives]
+        differences = [force - driving for force, driving in zip(row, of_drives, strict=True)]
+        wrench = [
+            total([rates[i] * force for rates, force in zip(leg.rates_by_twist, differences, strict=True)])
+            for i in range(6)
         ]
-        inner.append(Wrench(Vector(*balance[:3]), Vector(*balance[3:])))
-        left = left - inner[-1]
+        leg_demands.append(Wrench(Vector(*wrench[:3]), Vector(*wrench[3:])))
+        imbalance = imbalance - leg_demands[-1]
     constraints = [row for leg in machine.legs for row in leg.constraints]
     if not constraints:
-        return inner
-    basis = [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
-    if machine.ways:
-        basis = complement(machine.ways)[0]
+        return leg_demands
+    amounts = iter(_constraint_amounts(machine, constraints, imbalance))
+    result = []
+    for leg, leg_wrench in zip(machine.legs, leg_demands, strict=True):
+        for row in leg.constraints:
+            leg_wrench = leg_wrench + Wrench(Vector(*row[:3]), Vector(*row[3:])) * next(amounts)
+        result.append(leg_wrench)
+    return result
+
+
+def _constraint_amounts(machine: RigidMachine, constraints: Sequence[Row], imbalance: Wrench) -> Row:
+    """Return the least amounts of the legs' constraint wrenches that balance the platform across its ways."""
+    basis = complement(machine.ways)[0] if machine.ways else _identity()
     powers = [[total([a * b for a, b in zip(way, row, strict=True)]) for row in constraints] for way in basis]
     solution, _, _ = right_inverse(powers)
-    missing = [total([a * b for a, b in zip(way, left.components(), strict=True)]) for way in basis]
-    amounts = iter([total([a * b for a, b in zip(row, missing, strict=True)]) for row in solution])
-    result = []
-    for leg, wrench in zip(machine.legs, inner, strict=True):
-        for row in leg.constraints:
-            amount = next(amounts)
-            wrench = wrench + Wrench(Vector(*row[:3]), Vector(*row[3:])) * amount
-        result.append(wrench)
-    return result
+    missing = [total([a * b for a, b in zip(way, imbalance.components(), strict=True)]) for way in basis]
+    return [total([a * b for a, b in zip(row, missing, strict=True)]) for row in solution]
+
+
+def _identity() -> list[Row]:
+    return [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]

@@ -1,8 +1,9 @@
 """The motion of a rigid machine: twists of platform and bodies, rates of joints and drives, and how they change.
 
-A *motion* is a direction of the pose's coordinates, with its change while the machine moves: with the rates themselves
-and their accelerations, what comes out are velocities and accelerations. With one coordinate's unit rate it is a column
-of a Jacobian and how this changes along the machine's motion. Over scalars; nothing here has a mass.
+A *motion* is a direction of the pose's coordinates, with its change while the machine really moves. If the direction is
+the rates themselves, and its change their accelerations, twists are velocities and their changes are accelerations. If
+it is the unit rate of one coordinate, a motion is a column of a Jacobian, with the change of this column along the real
+motion. Over scalars; nothing here has a mass.
 
 Source: theory (85)-(89). Units are those of `rigid`.
 """
@@ -28,8 +29,8 @@ class PoseRates:
     """A direction of the coordinates of the pose, and how it changes.
 
     Attributes:
-        rates: by name of the coordinate, 1/s times rad or m.
-        change: the rates of these, 1/s² times rad or m.
+        rates: rates of the coordinates by their names, 1/s times rad or m.
+        change: rates of these rates, 1/s² times rad or m.
     """
 
     rates: Mapping[str, Scalar]
@@ -37,11 +38,11 @@ class PoseRates:
 
 
 @dataclass(frozen=True)
-class Moving:
-    """The motion of something along a direction.
+class BodyMotion:
+    """The motion of a body along a direction.
 
     Attributes:
-        twist: at the origin.
+        twist: its twist at the origin.
         change: the rate of that twist while the machine moves, at the same place in space.
     """
 
@@ -54,15 +55,15 @@ class LegMotion:
     """The motion of a leg along a direction.
 
     Attributes:
-        rates: of its coordinates.
-        change: of these.
-        bodies: the motion of what each number of its motions carries.
-        drift: how the twist of its end changes because its screws move.
+        rates: rates of its coordinates.
+        change: change of these rates.
+        bodies: for each k, the motion of the body that its first k motions carry.
+        drift: the change of the twist of its end that comes from its screws, which move.
     """
 
     rates: Row
     change: Row
-    bodies: tuple[Moving, ...]
+    bodies: tuple[BodyMotion, ...]
     drift: Twist
 
 
@@ -71,34 +72,34 @@ class MachineMotion:
     """The motion of a machine along a direction.
 
     Attributes:
-        platform: of the platform.
-        legs: of each leg.
+        platform: motion of the platform.
+        legs: motion of each leg.
     """
 
-    platform: Moving
+    platform: BodyMotion
     legs: tuple[LegMotion, ...]
 
 
 def bracket(carrying: Twist, screw: Twist) -> Twist:
-    """The rate of a screw that a twist carries along, theory (86)."""
+    """Return the rate of a screw that a twist carries along, theory (86)."""
     return Twist(
         carrying.rotational.cross(screw.rotational),
         carrying.rotational.cross(screw.translational) + carrying.translational.cross(screw.rotational),
     )
 
 
-def placed_platform(machine: Machine, direction: PoseRates, moving: PoseRates) -> Displacement:
-    """The placement of the platform with its rates: of a pose that says it wholly.
+def placed_platform(machine: Machine, direction: PoseRates, real_rates: PoseRates) -> Displacement:
+    """Return the placement of the platform with its rates, where the pose says it wholly.
 
     Args:
-        machine: at its pose.
-        direction: the first rates, and how these change.
-        moving: how the machine moves.
+        machine: the machine at its pose.
+        direction: the first rates, and their change.
+        real_rates: the second rates, with which the machine really moves.
     """
-    given = values(machine)
-    jets = {path: Jet(number) for path, number in given.items() if type(number) is not float}
+    numbers = values(machine)
+    jets = {path: Jet(number) for path, number in numbers.items() if type(number) is not float}
     pose = {
-        name: Jet(given[POSE + name], direction.rates[name], moving.rates[name], direction.change[name])
+        name: Jet(numbers[POSE + name], direction.rates[name], real_rates.rates[name], direction.change[name])
         for name in direction.rates
     }
     if machine.family.chains is not None:
@@ -106,64 +107,70 @@ def placed_platform(machine: Machine, direction: PoseRates, moving: PoseRates) -
     return with_values(machine, jets | {POSE + name: jet for name, jet in pose.items()}).configure().platform
 
 
-def platform_motion(machine: RigidMachine, placement: Displacement) -> Moving:
-    """The twist of the platform from its placement with rates, theory (85), and how it changes.
+def platform_motion(machine: RigidMachine, placement: Displacement) -> BodyMotion:
+    """Return the twist of the platform from its placement with rates, theory (85), and its change.
 
     With the columns c of the rotation, the angular velocity is half the sum of c x c'.
     """
-    turning, change = ZERO, ZERO
+    angular_velocity, angular_change = ZERO, ZERO
     for column in (placement.rotation.x, placement.rotation.y, placement.rotation.z):
         value, first, second, mixed = _parts(column)
-        turning = turning + value.cross(first)
-        change = change + second.cross(first) + value.cross(mixed)
-    turning, change = turning * 0.5, change * 0.5
+        angular_velocity = angular_velocity + value.cross(first)
+        angular_change = angular_change + second.cross(first) + value.cross(mixed)
+    angular_velocity, angular_change = angular_velocity * 0.5, angular_change * 0.5
     shrink = 1.0 / machine.length
-    at, first, second, mixed = _parts(placement.translation)
-    arm = (machine.origin - at) * shrink
-    moving = first * shrink + turning.cross(arm)
-    moved = mixed * shrink + change.cross(arm) - turning.cross(second * shrink)
-    return Moving(Twist(turning, moving), Twist(change, moved))
+    point, first, second, mixed = _parts(placement.translation)
+    arm = (machine.origin - point) * shrink
+    velocity = first * shrink + angular_velocity.cross(arm)
+    change = mixed * shrink + angular_change.cross(arm) - angular_velocity.cross(second * shrink)
+    return BodyMotion(Twist(angular_velocity, velocity), Twist(angular_change, change))
 
 
 def _parts(vector: Vector) -> list[Vector]:
-    """Value, first, second and mixed rate of a vector of jets."""
+    """Return value, first, second and mixed rate of a vector of jets."""
     parts = [c.parts if isinstance(c, Jet) else (c, 0.0, 0.0, 0.0) for c in vector.components()]
     return [Vector(*row) for row in zip(*parts, strict=True)]
 
 
-def leg_motion(leg: RigidLeg, platform: Moving, along: "LegMotion | None" = None) -> LegMotion:
-    """The motion of a leg that ends at the platform, theory (87) and (88).
+def leg_motion(leg: RigidLeg, platform: BodyMotion, real_motion: LegMotion | None = None) -> LegMotion:
+    """Return the motion of a leg that ends at the platform, theory (87) and (88).
 
     Args:
         leg: the leg.
         platform: the motion of the platform.
-        along: how the leg moves, if that is not this motion itself.
+        real_motion: how the leg really moves, if that is not this motion itself.
     """
     rates = [_product(row, platform.twist) for row in leg.rates_by_twist]
-    carried, bent = [STILL], [STILL]
-    for screw, place in zip(leg.screws, leg.coordinates, strict=True):
-        carried.append(carried[-1] + screw * rates[place] if place >= 0 else carried[-1])
-    moving = carried if along is None else [body.twist for body in along.bodies]
-    for number, (screw, place) in enumerate(zip(leg.screws, leg.coordinates, strict=True)):
-        bent.append(bent[-1] + bracket(moving[number], screw) * rates[place] if place >= 0 else bent[-1])
-    left = platform.change - bent[-1]
-    change = [_product(row, left) for row in leg.rates_by_twist]
-    changes, grown = [STILL], STILL
-    for number, (screw, place) in enumerate(zip(leg.screws, leg.coordinates, strict=True), 1):
-        grown = grown + screw * change[place] if place >= 0 else grown
-        changes.append(grown + bent[number])
-    bodies = tuple(Moving(twist, changed) for twist, changed in zip(carried, changes, strict=True))
-    return LegMotion(rates, change, bodies, bent[-1])
+    twists = _sums_along(leg, leg.screws, rates)
+    real_twists = twists if real_motion is None else [body.twist for body in real_motion.bodies]
+    carried_screws = zip(real_twists, leg.screws, leg.coordinates, strict=False)  # one twist more, that of the end
+    screw_rates = [bracket(twist, screw) if place >= 0 else STILL for twist, screw, place in carried_screws]
+    drifts = _sums_along(leg, screw_rates, rates)
+    to_follow = platform.change - drifts[-1]
+    change = [_product(row, to_follow) for row in leg.rates_by_twist]
+    changes = [part + drift for part, drift in zip(_sums_along(leg, leg.screws, change), drifts, strict=True)]
+    bodies = tuple(BodyMotion(*both) for both in zip(twists, changes, strict=True))
+    return LegMotion(rates, change, bodies, drifts[-1])
+
+
+def _sums_along(leg: RigidLeg, screws: Sequence[Twist], rates: Row) -> list[Twist]:
+    """Return for each k the sum of the first k screws, each times the rate of its coordinate, if it has one."""
+    sums = [STILL]
+    for screw, place in zip(screws, leg.coordinates, strict=True):
+        sums.append(sums[-1] + screw * rates[place] if place >= 0 else sums[-1])
+    return sums
 
 
 def _product(row: Sequence[Scalar], twist: Twist) -> Scalar:
     return total([a * b for a, b in zip(row, twist.components(), strict=True)])
 
 
-def machine_motion(machine: RigidMachine, platform: Moving, along: MachineMotion | None = None) -> MachineMotion:
-    """The motion of all legs with the platform; `along` as in `leg_motion`."""
-    moving = [None] * len(machine.legs) if along is None else along.legs
-    legs = [leg_motion(leg, platform, there) for leg, there in zip(machine.legs, moving, strict=True)]
+def machine_motion(
+    machine: RigidMachine, platform: BodyMotion, real_motion: MachineMotion | None = None
+) -> MachineMotion:
+    """Return the motion of all legs with the platform; arguments as of `leg_motion`."""
+    real_motions = [None] * len(machine.legs) if real_motion is None else real_motion.legs
+    legs = [leg_motion(leg, platform, real) for leg, real in zip(machine.legs, real_motions, strict=True)]
     return MachineMotion(platform, tuple(legs))
 
 
@@ -172,9 +179,9 @@ class Coordinates:
     """The coordinates of a pose that does not say where the platform is wholly; legs say the rest.
 
     Attributes:
-        names: x, y, z and angles that are given.
-        arm: from the tool point to P, in units of the machine's length.
-        axes: about which roll, pitch and yaw turn, theory (89).
+        names: those of x, y, z and the angles that the pose has.
+        arm: vector from the tool point to P, in units of the machine's length.
+        axes: axes about which roll, pitch and yaw turn, theory (89).
         rates_of_turns: rows that take an angular velocity to the rates of roll, pitch and yaw.
         unit_twists: the twist of the platform at a unit rate of each coordinate alone [coordinates][6].
     """
@@ -189,33 +196,28 @@ class Coordinates:
 def coordinates_of(
     machine: RigidMachine, names: Sequence[str], placement: Displacement, angles: "Angles"
 ) -> Coordinates:
-    """The coordinates of a pose of less than six, theory (89).
+    """Return the coordinates of a pose that has less than six, theory (89).
 
     Args:
-        machine: whose legs leave it as many ways.
-        names: of the coordinates.
-        placement: of the platform.
-        angles: its yaw and pitch.
+        machine: the machine, to which its legs leave as many ways.
+        names: names of the coordinates.
+        placement: placement of the platform.
+        angles: yaw and pitch of the platform.
     """
     (yaw_cos, yaw_sin), (pitch_cos, pitch_sin) = angles
     shrink = 1.0 / pitch_cos
-    axes = (
-        Vector(yaw_cos * pitch_cos, yaw_sin * pitch_cos, -pitch_sin),
-        Vector(-yaw_sin, yaw_cos, 0.0),
-        Z_AXIS,
-    )
+    axes = (Vector(yaw_cos * pitch_cos, yaw_sin * pitch_cos, -pitch_sin), Vector(-yaw_sin, yaw_cos, 0.0), Z_AXIS)
     rows = (
         Vector(yaw_cos * shrink, yaw_sin * shrink, 0.0),
         axes[1],
         Vector(yaw_cos * pitch_sin * shrink, yaw_sin * pitch_sin * shrink, 1.0),
     )
     arm = (placement.translation - machine.origin) * (1.0 / machine.length)
-    # A row of the rates by the platform's twist, over the ways that the legs leave.
-    felt = [
+    rates_by_ways = [
         [_coordinate_rate(name, arm, rows, Twist(Vector(*w[:3]), Vector(*w[3:]))) for w in machine.ways]
         for name in names
     ]
-    dual, _ = dual_basis(felt)
+    dual, _ = dual_basis(rates_by_ways)
     unit_twists = [
         [total([share * way[i] for share, way in zip(shares, machine.ways, strict=True)]) for i in range(6)]
         for shares in dual
@@ -228,60 +230,70 @@ Angles = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
 
 
 def angles_of(placement: Displacement) -> Angles:
-    """Cosine and sine of yaw and pitch of Q = Rz(yaw) Ry(pitch) Rx(roll)."""
-    turn = placement.rotation
-    flat = sqrt(turn.x.x * turn.x.x + turn.x.y * turn.x.y)
-    return (turn.x.x / flat, turn.x.y / flat), (flat, -turn.x.z)
+    """Return cosine and sine of yaw and pitch of Q = Rz(yaw) Ry(pitch) Rx(roll)."""
+    x_axis = placement.rotation.x
+    pitch_cos = sqrt(x_axis.x * x_axis.x + x_axis.y * x_axis.y)
+    return (x_axis.x / pitch_cos, x_axis.y / pitch_cos), (pitch_cos, -x_axis.z)
 
 
 def _coordinate_rate(name: str, arm: Vector, rows: Sequence[Vector], twist: Twist) -> Scalar:
-    """The rate of a coordinate by a twist at the origin, lengths in units of the machine's."""
+    """Return the rate of a coordinate by a twist at the origin, lengths in units of the machine's."""
     if name in POINT:
         return getattr(twist.translational + twist.rotational.cross(arm), name)
     return rows[ANGLES.index(name)].dot(twist.rotational)
 
 
 def motion_along(
-    machine: RigidMachine, coordinates: Coordinates, direction: PoseRates, along: MachineMotion | None = None
+    machine: RigidMachine, coordinates: Coordinates, direction: PoseRates, real_motion: MachineMotion | None = None
 ) -> MachineMotion:
-    """The motion of a machine of less than six coordinates along a direction; `along` as in `leg_motion`."""
+    """Return the motion of a machine of less than six coordinates along a direction; arguments as of `leg_motion`.
+
+    The platform's twist changes by what the legs force on it, and along the ways that they leave it by what remains of
+    the change of the coordinates.
+    """
     units = {name: (1.0 / machine.length if name in POINT else 1.0) for name in coordinates.names}
     twist = _sum(coordinates.unit_twists, [direction.rates[name] * units[name] for name in coordinates.names])
-    # What the legs ask for does not depend on how the platform's twist changes.
-    still = machine_motion(machine, Moving(twist, STILL), along)
-    needed = [
-        total([a * b for a, b in zip(row, motion.drift.components(), strict=True)])
-        for leg, motion in zip(machine.legs, still.legs, strict=True)
+    forced = _forced_change(machine, machine_motion(machine, BodyMotion(twist, STILL), real_motion))
+    real_twist = twist if real_motion is None else real_motion.platform.twist
+    speed = real_twist.translational + real_twist.rotational.cross(coordinates.arm)
+    axis_turning = _axis_turning(coordinates, twist, real_twist)
+    remaining = []
+    for name in coordinates.names:
+        change = direction.change[name] * units[name]
+        if name in POINT:
+            change = change - getattr(twist.rotational.cross(speed), name)
+        else:
+            change = change + coordinates.rates_of_turns[ANGLES.index(name)].dot(axis_turning)
+        remaining.append(change - _coordinate_rate(name, coordinates.arm, coordinates.rates_of_turns, forced))
+    return machine_motion(machine, BodyMotion(twist, forced + _sum(coordinates.unit_twists, remaining)), real_motion)
+
+
+def _forced_change(machine: RigidMachine, motion: MachineMotion) -> Twist:
+    """Return the change of the platform's twist that the drift of the legs' screws forces on it.
+
+    It does not depend on how the platform's twist changes in this motion.
+    """
+    drifts = [
+        total([a * b for a, b in zip(row, leg_motion.drift.components(), strict=True)])
+        for leg, leg_motion in zip(machine.legs, motion.legs, strict=True)
         for row in leg.constraints
     ]
-    chosen = [needed[number] for number in machine.plan.independent]
-    forced = Twist(ZERO, ZERO)
-    if chosen:
-        forced = _sum([list(row) for row in zip(*machine.constraint_twists, strict=True)], chosen)
-    moving = twist if along is None else along.platform.twist
-    speed = moving.translational + moving.rotational.cross(coordinates.arm)
-    lags = []
-    for name in coordinates.names:
-        wanted = direction.change[name] * units[name]
-        if name in POINT:
-            wanted = wanted - getattr(twist.rotational.cross(speed), name)
-        else:
-            turned = _turning_axes(coordinates, twist, moving)
-            wanted = wanted + coordinates.rates_of_turns[ANGLES.index(name)].dot(turned)
-        lags.append(wanted - _coordinate_rate(name, coordinates.arm, coordinates.rates_of_turns, forced))
-    return machine_motion(machine, Moving(twist, forced + _sum(coordinates.unit_twists, lags)), along)
+    independent = [drifts[number] for number in machine.plan.independent]
+    if not independent:
+        return STILL
+    return _sum([list(row) for row in zip(*machine.constraint_twists, strict=True)], independent)
 
 
-def _turning_axes(coordinates: Coordinates, twist: Twist, moving: Twist) -> Vector:
-    """The part of an angular acceleration by which the axes of roll and pitch turn, theory (89)."""
+def _axis_turning(coordinates: Coordinates, twist: Twist, real_twist: Twist) -> Vector:
+    """Return the part of an angular acceleration by which the axes of roll and pitch turn, theory (89)."""
     roll, pitch, _ = (row.dot(twist.rotational) for row in coordinates.rates_of_turns)
-    _, pitching, yawing = (row.dot(moving.rotational) for row in coordinates.rates_of_turns)
-    first, second, third = coordinates.axes
-    turning = third * yawing + second * pitching
-    return turning.cross(first) * roll + (third * yawing).cross(second) * pitch
+    _, real_pitch, real_yaw = (row.dot(real_twist.rotational) for row in coordinates.rates_of_turns)
+    roll_axis, pitch_axis, yaw_axis = coordinates.axes
+    turning = yaw_axis * real_yaw + pitch_axis * real_pitch
+    return turning.cross(roll_axis) * roll + (yaw_axis * real_yaw).cross(pitch_axis) * pitch
 
 
 def _sum(rows: Sequence[Sequence[Scalar]], factors: Sequence[Scalar]) -> Twist:
-    """The sum of rows of six, each times its factor, as a twist."""
+    """Return the sum of rows of six, each times its factor, as a twist."""
     parts = [total([row[i] * factor for row, factor in zip(rows, factors, strict=True)]) for i in range(6)]
     return Twist(Vector(*parts[:3]), Vector(*parts[3:]))

@@ -27,7 +27,7 @@ from kinetostat.machine.drives import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS
-from kinetostat.motion.numbers import joints_of
+from kinetostat.motion.machine_at_pose import joints_of
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity

@@ -21,7 +21,7 @@ from kinetostat.machine.actuators import joint_actuators, name_of, senses_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import PARTS, drive_forces
-from kinetostat.motion.operators import MachineAtPose, Operators, forces_along, operators
+from kinetostat.motion.machine_at_pose import MachineAtPose, Operators, forces_along, operators
 from kinetostat.motion.rates import PoseRates
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError

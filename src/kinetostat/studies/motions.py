@@ -24,7 +24,7 @@ from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
 from kinetostat.machine.parameters import POSE, find, named_entry, values
-from kinetostat.motion.numbers import NUMBERS_OF_DRIVE
+from kinetostat.motion.machine_at_pose import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
