@@ -42,13 +42,13 @@ def compile_for_valgrind() -> None:
     """Let all programs of this process be compiled for `PROCESSOR`."""
     import llvmlite.binding as llvm
 
-    from kinetostat.engine import native
+    from kinetostat.engine import machine_code
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_default_triple()
-    native.host_lanes = lambda: LANES
-    native._target_maker = lambda: (
+    machine_code.host_lanes = lambda: LANES
+    machine_code._target_maker = lambda: (
         lambda: target.create_target_machine(cpu=PROCESSOR, features="", opt=3, reloc="pic", codemodel="small")
     )
 

@@ -14,10 +14,9 @@ from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import by_free_springs, evaluate
 from kinetostat.engine.form import plan_for
 from kinetostat.engine.kernel import program_of, slab_fill
-from kinetostat.engine.machine_code import Program, machine_code_of
-from kinetostat.engine.native import Body, host_lanes
+from kinetostat.engine.machine_code import Program, host_lanes, machine_code_of
 from kinetostat.engine.points import Axis, Grid, PointTable
-from kinetostat.engine.trace import Graph, Traced, needed_nodes
+from kinetostat.engine.trace import Body, Graph, Traced, needed_nodes
 from kinetostat.engine.trigonometry import cos_and_sin
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.kinematics.status import Status

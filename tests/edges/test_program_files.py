@@ -19,8 +19,15 @@ from kinetostat.engine import kernel, program_files
 from kinetostat.engine.batch import function_of
 from kinetostat.engine.form import Specimen, form_of, objectives_of
 from kinetostat.engine.kernel import Recipe, program_of, recipe_of
-from kinetostat.engine.machine_code import SELF_LINKED, MachineCode, Program, machine_code_of
-from kinetostat.engine.native import host_lanes, object_file_of, source
+from kinetostat.engine.llvm_source import source
+from kinetostat.engine.machine_code import (
+    SELF_LINKED,
+    MachineCode,
+    Program,
+    host_lanes,
+    machine_code_of,
+    object_file_of,
+)
 from kinetostat.engine.program_files import HASH_SIZE, SECRET, read_program, write_program
 from kinetostat.machine.catalogue import family_text, register
 
@@ -382,7 +389,7 @@ def test_linked_code_is_what_llvm_loads():
 def test_without_llvm_all_runs_in_numpy(monkeypatch):
     machine = load("hexapod")
     monkeypatch.setenv(program_files.VARIABLE, program_files.OFF)
-    monkeypatch.setitem(sys.modules, "kinetostat.engine.native", None)
+    monkeypatch.setitem(sys.modules, "llvmlite.binding", None)
     program_of.cache_clear()
     try:
         fill = function_of(machine, ["pose.z"], ["stiffness_x"]).fill

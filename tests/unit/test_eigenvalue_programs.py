@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kinetostat.engine.eigenvalues import Pencil, eigenvalue_program
+from kinetostat.engine.eigenvalues import Pencil
+from kinetostat.engine.modes import eigenvalue_program
 from kinetostat.vibration.springwise import SpringSizes
 
 
@@ -18,7 +19,7 @@ def eigenvalues(pencil, *parts):
         flat += [leg[:, *np.triu_indices(leg.shape[1])] for leg in legs] or [part.reshape(len(part), -1)]
     columns = np.ascontiguousarray(np.concatenate(flat, axis=1).T)
     program, points = eigenvalue_program(pencil), columns.shape[1]
-    memory = np.zeros(pencil.workspace * program.lanes + 8)
+    memory = np.zeros(pencil.layout.size * program.lanes + 8)
     first = -memory.ctypes.data // 8 % 8
     results, codes = np.empty((pencil.count, points)), np.empty(points, dtype=np.int8)
     program.run(memory[first:], [columns], results, codes)

@@ -7,7 +7,7 @@ import pytest
 from kinetostat.algebra.scalar import finite, is_bounded, ordinary, where
 from kinetostat.engine.form import Specimen, form_of, objectives_of
 from kinetostat.engine.kernel import closes_inside
-from kinetostat.engine.native import freeing_first
+from kinetostat.engine.llvm_source import freeing_first
 from kinetostat.engine.trace import Graph, Node, needed_nodes
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load

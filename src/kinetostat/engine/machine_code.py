@@ -1,8 +1,10 @@
-"""Machine code as bytes: linked so that it runs wherever it lies, mapped into memory, and called. No compiler is known.
+"""Machine code: compiled by LLVM, linked so that it runs wherever it lies, mapped into memory, and called.
 
-LLVM leaves an object file. On Linux with an x86-64 processor its few sections are put behind one another here, and the
-distances between them filled in, after which the bytes need neither LLVM nor a linker: mapped into memory they run.
-Elsewhere the object file itself is kept, and LLVM loads it.
+LLVM compiles in memory. No optimisation passes are run: a traced graph has no repetitions, and on the 4-dof machine
+(1300 operations) passes gained nothing over the code generator alone, which takes 50 ms. It leaves an object file. On
+Linux with an x86-64 processor the few sections of this file are put behind one another here, and the distances between
+them filled in, after which the bytes need neither LLVM nor a linker: mapped into memory they run. Elsewhere the object
+file itself is kept, and LLVM loads it.
 
 A page of memory is written first and made executable then; it is never both. Bytes are not checked here, only run.
 
@@ -16,19 +18,28 @@ import struct
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Codes
 from kinetostat.engine.trace import Body, rows_of
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
+
+if TYPE_CHECKING:
+    import llvmlite.binding as llvm  # type: ignore[import-untyped]
+
+    from kinetostat.engine import llvm_source
+else:  # LLVM takes 0.1 s to load, and is not needed for a program that is on disk
+    llvm, llvm_source = LateModule("llvmlite.binding"), LateModule("kinetostat.engine.llvm_source")
 
 SELF_LINKED = sys.platform == "linux" and platform.machine() == "x86_64"
 """Whether objects are linked here; elsewhere LLVM loads them."""
 
 
 HEAD = struct.Struct("<qqq")
+"""The numbers of a packed `MachineCode`, which stand before its bytes."""
 
 
 @dataclass(frozen=True)
@@ -59,23 +70,68 @@ def unpack(data: bytes) -> MachineCode:
 
 def machine_code_of(body: Body) -> MachineCode:
     """Compile a body for this processor."""
-    from kinetostat.engine.native import host_lanes, source  # LLVM takes 0.1 s to load: only where it pays
-
-    return compile_source(source(body, host_lanes()), len(body.results))
+    return compile_source(llvm_source.source(body, host_lanes()), len(body.results))
 
 
 def compile_source(assembly: str, rows: int) -> MachineCode:
     """Compile LLVM assembly for this processor, and link it where that is done here.
 
     Args:
-        assembly: of a function for `host_lanes` points at a time.
+        assembly: text of a function for `host_lanes` points at a time.
         rows: number of its results.
     """
-    from kinetostat.engine.native import host_lanes, object_file_of  # as above
-
     file = object_file_of(assembly)
     image, entry = _image(file) if SELF_LINKED else (file, -1)
     return MachineCode(image, entry, host_lanes(), rows)
+
+
+def object_file_of(assembly: str) -> bytes:
+    """Compile LLVM assembly for this processor; that of a body takes 0.05 to 0.5 s."""
+    module = llvm.parse_assembly(assembly)
+    module.verify()
+    return _target_maker()().emit_object(module)
+
+
+def _load_object(object_file: bytes) -> tuple[int, Any]:
+    """Let LLVM load an object file; gives the address of its function, and what keeps it in memory."""
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_maker()())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(object_file))
+    engine.finalize_object()
+    return engine.get_function_address(llvm_source.NAME), engine
+
+
+@cache
+def _target_maker() -> Callable[[], Any]:
+    """Return a function that makes target machines for this processor."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_default_triple()
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    return lambda: target.create_target_machine(cpu=cpu, features=features, opt=3, reloc="pic", codemodel="small")
+
+
+@cache
+def host_lanes() -> int:
+    """Return how many float64 fit into one register of this processor."""
+    features = llvm.get_host_cpu_features()
+    if features.get("avx512f"):
+        return 8
+    return 4 if features.get("avx") else 2
+
+
+def host_description() -> str:
+    """Return what this processor is called and can do, as LLVM says it."""
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+VECTOR_SETS = ("sse2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
+"""Instruction sets that decide how fast the code is, as LLVM calls them."""
+
+
+def host_features() -> tuple[str, ...]:
+    """Return which of `VECTOR_SETS` this processor has."""
+    features = llvm.get_host_cpu_features()
+    return tuple(name for name in VECTOR_SETS if features.get(name))
 
 
 SECTION, SYMBOL, RELOCATION = struct.Struct("<IIQQQQIIQQ"), struct.Struct("<IBBHQQ"), struct.Struct("<QQq")
@@ -121,9 +177,7 @@ class Program:
         if code.entry >= 0:
             address, self._memory = _map(code)
         else:
-            from kinetostat.engine.native import load_object  # as above
-
-            address, self._memory = load_object(code.image)
+            address, self._memory = _load_object(code.image)
         self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, ctypes.c_int64)(address)
 
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:

@@ -5,12 +5,13 @@ traced and run.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from kinetostat.algebra.scalar import where
 from kinetostat.arrays import Array, Mask
-from kinetostat.engine.eigenvalues import Pencil, eigenvalue_program
+from kinetostat.engine.eigenvalues import Pencil, pencil_source
 from kinetostat.engine.form import (
     Form,
     Specimen,
@@ -23,6 +24,8 @@ from kinetostat.engine.form import (
     traced_machine,
 )
 from kinetostat.engine.kernel import machine_program_of, program_of, recipe_of
+from kinetostat.engine.machine_code import Program, compile_source, host_lanes, unpack
+from kinetostat.engine.program_files import read_program, write_program
 from kinetostat.engine.trace import Traced, rows_of
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.status import Status
@@ -114,6 +117,21 @@ def rows_of_modes(names: Sequence[str]) -> dict[Modal, dict[str, int]]:
     return result
 
 
+@lru_cache
+def eigenvalue_program(pencil: Pencil) -> Program:
+    """Return the program of a pencil, as an earlier process has left it on disk, or compiled.
+
+    In the place of fixed inputs it takes a workspace, which is filled with zeros and begins where a vector may.
+    """
+    text = repr(pencil)
+    kept = read_program(text)
+    if kept:
+        return Program(unpack(kept))
+    code = compile_source(pencil_source(pencil, host_lanes()), pencil.count)
+    write_program(text, code.pack())
+    return Program(code)
+
+
 class ModalNumbers:
     """Natural frequencies or load factors of machines of a kind and form whose legs close loops, by machine code.
 
@@ -156,7 +174,10 @@ class ModalNumbers:
         here, matrices, roots = (
             _memory_of_vectors(rows, max(size, lanes)) for rows in (len(columns), self._matrices.rows, len(squares))
         )
-        statuses, workspace = np.empty(here.shape[1], dtype=np.int8), _memory_of_vectors(self._pencil.workspace, lanes)
+        statuses, workspace = (
+            np.empty(here.shape[1], dtype=np.int8),
+            _memory_of_vectors(self._pencil.layout.size, lanes),
+        )
         workspace[:] = 0.0
         calls = (
             self._matrices.call_on(fixed, [here], matrices, statuses),

@@ -25,6 +25,14 @@ from functools import cache
 from importlib.util import find_spec
 from itertools import takewhile
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.late import LateModule
+
+if TYPE_CHECKING:
+    from kinetostat.engine import machine_code
+else:  # it needs NumPy, which `doctor` must not
+    machine_code = LateModule("kinetostat.engine.machine_code")
 
 VARIABLE = "KINETOSTAT_CACHE"
 """Variable of the environment with another folder for them, or "off"."""
@@ -287,9 +295,7 @@ FEATURES = (
 def _processor() -> str:
     """Return the processor that code is made for, on Linux as the system says it, because LLVM takes long to load."""
     if sys.platform != "linux":
-        from kinetostat.engine.native import host_description  # LLVM has to load the code there in any case
-
-        return host_description()
+        return machine_code.host_description()  # LLVM has to load the code there in any case
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         first = [line.partition(":") for line in takewhile(str.strip, file)]  # until an empty line
     known = [(name.strip(), text.strip()) for name, _, text in first if name.strip() in FEATURES]

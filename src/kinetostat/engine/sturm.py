@@ -9,114 +9,159 @@ Source: Golub and Van Loan, Matrix Computations, section 8.4.
 import math
 from collections.abc import Sequence
 
-from kinetostat.engine.loops import LoopCode, Value
+from kinetostat.engine.llvm_source import LoopCode, Value
+from kinetostat.frozen import dataclass
 
 HALVINGS = 50
-"""Halvings of the interval from zero to a bound of the largest eigenvalue: it is then as long as round-off."""
-TOGETHER = 6
-"""Sturm sequences that are computed together, because each of their sums waits for the one before."""
-APART = 1.0 + math.sqrt(2.0) / 100.0
-"""Factor of the bound, so that no middle is an eigenvalue that is simply related to the largest: a sequence that is
-exactly zero has no signs."""
-RESCALED_AFTER, SMALL = 12, 1e-100
-"""Rows after which a Sturm sequence that has become this small is scaled up, before it underflows."""
+"""Halvings of the interval from zero to the bound of the largest eigenvalue: 2^-50 of it is four units of round-off."""
+SEQUENCES_TOGETHER = 6
+"""Sturm sequences that are computed together: each step waits for the one before, and steps of others fill the time.
+Three take as long; of twelve the values do not stay in registers, so that the whole program takes up to half longer."""
+BOUND_FACTOR = 1.0 + math.sqrt(2.0) / 100.0
+"""Factor of the bound, so that no number at which eigenvalues are counted is one that is simply related to the largest:
+a sequence that is exactly zero has no signs."""
+ROWS_BETWEEN_SCALINGS = 12
+"""Rows after which a small Sturm sequence is scaled up. Numbers at which eigenvalues are counted come hardly nearer to
+an entry than 1e-16 of the bound, so that twelve rows shrink a sequence from `SMALL_SEQUENCE` to 1e-292 at most: it does
+not underflow."""
+SMALL_SEQUENCE = 1e-100
+"""Size of a sequence below which it is scaled up, by its reciprocal. In a row it grows by |d - x| + 1/4 at most: one of
+a hundred rows overflows only where the diagonal goes a thousand times as far below zero as the bound above it."""
 
 
-def enclose(code: LoopCode, diagonal: int, squares: int, size: int, count: int) -> None:
-    """Write the largest eigenvalues of a tridiagonal matrix as results; those that are negative or not there are zero.
+@dataclass(frozen=True)
+class Tridiagonal:
+    """A symmetric tridiagonal matrix in the workspace.
+
+    Attributes:
+        diagonal: where its diagonal begins.
+        squares: where the squares of the entries beside the diagonal begin, in rows from the second; the first is zero.
+        size: number of rows.
+    """
+
+    diagonal: int
+    squares: int
+    size: int
+
+
+def enclose(code: LoopCode, matrix: Tridiagonal, count: int) -> None:
+    """Write the largest eigenvalues of a matrix as results; those that are negative or not there are zero.
 
     Args:
         code: to which lines are appended.
-        diagonal, squares: where the diagonal of the matrix begins in the workspace, and where the squares of what is
-            beside it, in rows from the second. Both are scaled.
-        size: number of rows.
+        matrix: the matrix, which is scaled in its place.
         count: number of eigenvalues.
     """
-    zero, unit = code.number(0.0), code.number(1.0)
-    with code.loop(0, size, [zero, zero]) as loop:
-        largest, widest = loop.values
-        entry, square = code.load(diagonal, loop.index), code.load(squares, loop.index)
-        loop.after = [
-            code.where(code.is_less(largest, entry), entry, largest),
-            code.where(code.is_less(widest, square), square, widest),
-        ]
-    double = code.mul(code.number(2.0), code.call("sqrt", loop.values[1]))
-    bound = code.mul(code.number(APART), code.add(loop.values[0], double))
-    sound = code.is_less(zero, bound)
-    share = code.where(sound, code.div(unit, code.where(sound, bound, unit)), zero)
-    with code.loop(0, size) as loop:
-        code.store(code.mul(share, code.load(diagonal, loop.index)), diagonal, loop.index)
-        squared = code.mul(share, code.mul(share, code.load(squares, loop.index)))
-        code.store(squared, squares, loop.index)
-    shown = min(count, size)
-    inner = max(1, TOGETHER // shown)
-    turns = math.ceil(HALVINGS * math.log(2.0) / math.log(inner + 1.0))
-    with code.loop(0, turns, [zero] * shown + [unit] * shown) as turn:
-        low, high = turn.values[:shown], turn.values[shown:]
-        width = [code.mul(code.number(1.0 / (inner + 1)), code.sub(b, a)) for a, b in zip(low, high, strict=True)]
-        inside = [
-            code.add(low[k], code.mul(code.number(part), width[k]))
-            for k in range(shown)
-            for part in range(1, inner + 1)
-        ]
-        above = _counts_above(code, inside, (diagonal, squares), size)
-        for k in range(shown):
-            points = inside[k * inner : (k + 1) * inner]
-            counts = above[k * inner : (k + 1) * inner]
-            beyond = [code.is_less(code.number(k + 0.5), count) for count in counts]
-            for more, point in zip(beyond, points, strict=True):
-                low[k] = code.where(more, point, low[k])
-            for more, point in reversed([*zip(beyond, points, strict=True)]):
-                high[k] = code.where(more, high[k], point)
-        turn.after = [*low, *high]
-    # Numbers that are not finite compare as false everywhere; their sum brings them back.
-    lost = code.mul(zero, code.load(diagonal, 0))
+    bound = _bound(code, matrix)
+    _divide(code, matrix, bound)
+    shares = _enclosed_shares(code, matrix, min(count, matrix.size))
+    zero = code.number(0.0)
+    # Numbers that are not finite compare as false everywhere. This is NaN for them, and brings them back, else zero.
+    not_finite = code.mul(zero, code.load(matrix.diagonal, 0))
     for k in range(count):
-        value = code.mul(bound, turn.values[k]) if k < shown else zero
-        code.give(code.add(value, lost), k)
+        eigenvalue = code.mul(bound, shares[k]) if k < len(shares) else zero
+        code.store_result(code.add(eigenvalue, not_finite), k)
 
 
-def _counts_above(code: LoopCode, middles: Sequence[Value], matrix: tuple[int, int], size: int) -> list[Value]:
-    """Count the eigenvalues of a matrix above some numbers, by the signs in Sturm sequences."""
+def _bound(code: LoopCode, matrix: Tridiagonal) -> Value:
+    """A bound of the largest eigenvalue, by Gershgorin's circles.
+
+    None exceeds the largest entry of the diagonal by more than twice the largest entry beside it.
+    """
+    zero = code.number(0.0)
+    with code.loop(0, matrix.size, [zero, zero]) as loop:
+        entries = [code.load(start, loop.index) for start in (matrix.diagonal, matrix.squares)]
+        loop.after = [
+            code.where(code.is_less(largest, entry), entry, largest)
+            for largest, entry in zip(loop.values, entries, strict=True)
+        ]
+    largest, largest_square = loop.values
+    twice_beside = code.mul(code.number(2.0), code.call("sqrt", largest_square))
+    return code.mul(code.number(BOUND_FACTOR), code.add(largest, twice_beside))
+
+
+def _divide(code: LoopCode, matrix: Tridiagonal, bound: Value) -> None:
+    """Divide a matrix by a number, so that its eigenvalues are at most 1; 0 where this is not positive."""
     zero, unit = code.number(0.0), code.number(1.0)
-    whole, rest = divmod(size, RESCALED_AFTER)
-    start = [value for _ in middles for value in (unit, zero, zero)]
-    with code.loop(0, whole * RESCALED_AFTER, start, RESCALED_AFTER) as loop:
-        loop.after = _sequences(code, middles, loop.values, matrix, loop.index, RESCALED_AFTER)
-    return _sequences(code, middles, loop.values, matrix, str(whole * RESCALED_AFTER), rest)[2::3]
+    positive = code.is_less(zero, bound)
+    inverse = code.where(positive, code.div(unit, code.where(positive, bound, unit)), zero)
+    with code.loop(0, matrix.size) as loop:
+        code.store(code.mul(inverse, code.load(matrix.diagonal, loop.index)), matrix.diagonal, loop.index)
+        square = code.mul(inverse, code.mul(inverse, code.load(matrix.squares, loop.index)))
+        code.store(square, matrix.squares, loop.index)
+
+
+def _enclosed_shares(code: LoopCode, matrix: Tridiagonal, count: int) -> list[Value]:
+    """The largest eigenvalues of a matrix whose eigenvalues are at most 1: the lower ends of their last intervals.
+
+    Each turn divides the interval of each eigenvalue by points at equal distances, and counts the eigenvalues above
+    each point.
+    """
+    points_each = max(1, SEQUENCES_TOGETHER // count)
+    turns = math.ceil(HALVINGS * math.log(2.0) / math.log(points_each + 1.0))
+    with code.loop(0, turns, [code.number(0.0)] * count + [code.number(1.0)] * count) as turn:
+        low, high = turn.values[:count], turn.values[count:]
+        share = code.number(1.0 / (points_each + 1))
+        steps = [code.mul(share, code.sub(b, a)) for a, b in zip(low, high, strict=True)]
+        points = [
+            [code.add(low[k], code.mul(code.number(number), steps[k])) for number in range(1, points_each + 1)]
+            for k in range(count)
+        ]
+        counts = iter(_counts_above(code, [point for of_eigenvalue in points for point in of_eigenvalue], matrix))
+        for k in range(count):
+            is_above = [code.is_less(code.number(k + 0.5), next(counts)) for _ in range(points_each)]
+            pairs = list(zip(is_above, points[k], strict=True))
+            for above, point in pairs:
+                low[k] = code.where(above, point, low[k])
+            for above, point in reversed(pairs):
+                high[k] = code.where(above, high[k], point)
+        turn.after = [*low, *high]
+    return turn.values[:count]
+
+
+def _counts_above(code: LoopCode, numbers: Sequence[Value], matrix: Tridiagonal) -> list[Value]:
+    """Count the eigenvalues of a matrix above each of some numbers, by the signs in Sturm sequences."""
+    zero, unit = code.number(0.0), code.number(1.0)
+    parts, remaining_rows = divmod(matrix.size, ROWS_BETWEEN_SCALINGS)
+    end = parts * ROWS_BETWEEN_SCALINGS
+    first_values = [value for _ in numbers for value in (unit, zero, zero)]
+    with code.loop(0, end, first_values, ROWS_BETWEEN_SCALINGS) as loop:
+        loop.after = _sequences(code, numbers, loop.values, matrix, loop.index, ROWS_BETWEEN_SCALINGS)
+    return _sequences(code, numbers, loop.values, matrix, str(end), remaining_rows)[2::3]
 
 
 def _sequences(
-    code: LoopCode, middles: Sequence[Value], values: Sequence[Value], matrix: tuple[int, int], first: Value, rows: int
+    code: LoopCode, numbers: Sequence[Value], values: Sequence[Value], matrix: Tridiagonal, first: Value, rows: int
 ) -> list[Value]:
-    """Continue Sturm sequences p' = (d - x) p - e^2 p'' by some rows.
+    """Continue Sturm sequences p_i = (d_i - x) p_(i-1) - e_i^2 p_(i-2) by some rows, and scale them.
 
     Args:
         code: to which lines are appended.
-        middles: the number x of each sequence.
-        values: p, p'' and the number of neighbours of equal sign, of each sequence.
-        matrix: where its diagonal d and the squares e^2 begin.
+        numbers: the number x of each sequence.
+        values: the last two terms of each sequence, the last one first, and its number of neighbours of equal sign.
+        matrix: the matrix with diagonal d and entries e beside it.
         first: the first row.
-        rows: how many.
+        rows: number of rows.
 
     Returns:
-        The same behind these rows.
+        The values after these rows.
     """
     result = list(values)
-    signs = [code.sign_after(code.bits(0), values[3 * k]) for k in range(len(middles))]
+    signs = [code.append_sign(code.integer(0), values[3 * k]) for k in range(len(numbers))]
     for row in range(rows):
         place = code.index("add", first, row)
-        entry, square = (code.load(start, place) for start in matrix)
-        for k, middle in enumerate(middles):
-            now, before = result[3 * k : 3 * k + 2]
-            across = code.mul(square, before)
-            following = code.sub(code.mul(code.sub(entry, middle), now), across)
-            signs[k] = code.sign_after(signs[k], following)
-            result[3 * k : 3 * k + 2] = following, now
-    for k, sign in enumerate(signs):
-        now, before, count = result[3 * k : 3 * k + 3]
-        equal = code.sub(code.number(float(rows)), code.changes(sign, rows))
-        size = code.add(code.call("fabs", now), code.call("fabs", before))
-        scale = code.where(code.is_less(size, code.number(SMALL)), code.number(1.0 / SMALL), code.number(1.0))
-        result[3 * k : 3 * k + 3] = code.mul(now, scale), code.mul(before, scale), code.add(count, equal)
+        entry, square = (code.load(start, place) for start in (matrix.diagonal, matrix.squares))
+        for k, number in enumerate(numbers):
+            last, before_last = result[3 * k : 3 * k + 2]
+            subtracted = code.mul(square, before_last)
+            term = code.sub(code.mul(code.sub(entry, number), last), subtracted)
+            signs[k] = code.append_sign(signs[k], term)
+            result[3 * k : 3 * k + 2] = term, last
+    small, scale_up, unit = (code.number(value) for value in (SMALL_SEQUENCE, 1.0 / SMALL_SEQUENCE, 1.0))
+    for k in range(len(numbers)):
+        last, before_last, count = result[3 * k : 3 * k + 3]
+        equal_signs = code.sub(code.number(float(rows)), code.count_sign_changes(signs[k], rows))
+        size = code.add(code.call("abs", last), code.call("abs", before_last))
+        scale = code.where(code.is_less(size, small), scale_up, unit)
+        result[3 * k : 3 * k + 3] = code.mul(last, scale), code.mul(before_last, scale), code.add(count, equal_signs)
     return result

@@ -230,7 +230,7 @@ def _cores() -> str:
 
 def _vectors() -> str:
     """Number of floats that one instruction of the machine code processes, and the features that allow it."""
-    from kinetostat.engine.native import host_features, host_lanes
+    from kinetostat.engine.machine_code import host_features, host_lanes
 
     return f"{host_lanes()} numbers of 64 bits at once ({', '.join(host_features()) or 'the plainest'})"
 
