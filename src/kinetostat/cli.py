@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.asking import add_other_questions
+from kinetostat.commands.asking import add_grid_commands, add_other_questions
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
@@ -26,13 +26,10 @@ from kinetostat.commands.common import (
     say_stopped,
     takes_machine,
 )
-from kinetostat.commands.compare import add_compare_commands
+from kinetostat.commands.design import add_design_commands
 from kinetostat.commands.doctor import add_doctor_command
-from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.optimize import add_optimize_commands
-from kinetostat.commands.report import add_report_commands
+from kinetostat.commands.documents import add_document_commands
 from kinetostat.commands.silence import SilenceWatch, spoken_silence
-from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import as_typed
 from kinetostat.views.questions import QUESTION_GROUPS
@@ -168,10 +165,8 @@ def _parser() -> Parser:
     _add_file_commands(commands)
     add_grid_commands(commands)
     add_other_questions(commands)
-    add_compare_commands(commands)
-    add_optimize_commands(commands)
-    add_report_commands(commands)
-    add_studio_command(commands)
+    add_design_commands(commands)
+    add_document_commands(commands)
     add_doctor_command(commands)
     return parser
 

@@ -12,7 +12,7 @@ from cad import needs_cad
 from kinetostat import load, under_load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
-from kinetostat.commands.report import EXPORT_FORMATS
+from kinetostat.commands.documents import EXPORT_FORMATS
 from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled

@@ -10,7 +10,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
-from kinetostat.commands.report import REPORT_PARTS
+from kinetostat.commands.documents import REPORT_PARTS
 from kinetostat.exchange.formats import KNOWN, export
 from kinetostat.machine.loading import load
 from kinetostat.studies import storage

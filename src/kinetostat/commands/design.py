@@ -1,7 +1,4 @@
-"""The commands `compare` and `validate`: designs side by side, and a machine beside an engine or a measurement.
-
-No formula lives here.
-"""
+"""The commands of comparison and design: `validate`, `compare`, `optimize` and `pareto`. No formula lives here."""
 
 import argparse
 from pathlib import Path
@@ -11,29 +8,44 @@ from kinetostat.commands.asking import show_answer
 from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
+    drawings_of,
     give,
+    judge_requirements,
     load_machine,
     no_answer,
+    note_damage,
     progress_bar,
+    search_bar,
     takes_figures,
     takes_json,
     takes_machine,
     takes_ranges,
     takes_settings,
     takes_units,
+    write_figures,
 )
+from kinetostat.spec.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
     from kinetostat.commands.common import Commands
     from kinetostat.machine.machine import Machine
+    from kinetostat.studies.optimisation.problem import Problem
+    from kinetostat.studies.optimisation.result import Result
+
+STUDY_HELP = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to continue"
+EXPLAINING = "is done, the best design is being explained"
+"""Words behind the bar of a search once all designs have been computed."""
 
 
-def add_compare_commands(commands: "Commands") -> None:
-    """Add `compare` and `validate`."""
+def add_design_commands(commands: "Commands") -> None:
+    """Add the four commands."""
     _add_compare(commands)
     _add_validate(commands)
+    _add_searches(commands)
 
 
 def _add_compare(commands: "Commands") -> None:
@@ -99,6 +111,29 @@ def _add_validate(commands: "Commands") -> None:
     takes_json(validate)
 
 
+def _add_searches(commands: "Commands") -> None:
+    optimize = add_command(
+        commands, "optimize", _optimize, "search for the best design that a study file describes",
+        "kinetostat optimize zhang-gosselin-2002 --set optimizer.seed=3 -o better",
+    )  # fmt: skip
+    pareto = add_command(
+        commands, "pareto", _pareto, "compute the Pareto front of a study with several objectives",
+        "kinetostat pareto zhang-gosselin-front -o front",
+    )  # fmt: skip
+    for command in (optimize, pareto):
+        command.add_argument("study", metavar="STUDY", help=STUDY_HELP)
+        takes_settings(
+            command,
+            'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
+        )
+        takes_units(command)
+        takes_figures(command, "the result, its figures and all designs; a stopped search continues there")
+        command.add_argument(
+            "--resume", action="store_true", help="continue the search in the folder, and refuse if there is none"
+        )
+        takes_json(command)
+
+
 def _compare(options: argparse.Namespace) -> int:
     from kinetostat.studies.comparison import compare, read_design
 
@@ -140,8 +175,6 @@ def _validate(options: argparse.Namespace) -> int:
 
 def _refuse_other_options(options: argparse.Namespace) -> None:
     """Refuse options that belong to the other kind of validation."""
-    from kinetostat.spec.errors import InputError
-
     options_of_measured = {
         "--fit": options.fit, "--tolerance": options.tolerances, "--sigma": options.sigma,
         "--sigma-angle": options.sigma_angle, "-o": options.output,
@@ -164,3 +197,88 @@ def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
     )
     exit_code = show_answer(options, answer)
     return exit_code if answer.agrees else NO_ANSWER
+
+
+def _optimize(options: argparse.Namespace) -> int:
+    return _show(options, *_search(options))
+
+
+def _pareto(options: argparse.Namespace) -> int:
+    result, changed = _search(options, least_objectives=2)
+    return _show(options, result, changed, ("name", "status", "message", "evaluations", "front"))
+
+
+def _search(options: argparse.Namespace, least_objectives: int = 1) -> "tuple[Result, list[str]]":
+    """Search for the best design, in the folder of a study that is continued or of `-o`, which it becomes, if any.
+
+    Returns:
+        The result, and the names of files in the folder that were not as they had been written.
+    """
+    from kinetostat.spec.document import exists
+    from kinetostat.studies.optimisation.problem import load_problem
+    from kinetostat.studies.optimisation.search import stored_problem
+    from kinetostat.studies.storage import differing
+    from kinetostat.studies.study_folder import holds_study
+
+    folder = Path(options.study)
+    if exists(folder) and holds_study(folder):
+        if options.settings or options.output:
+            raise InputError(f'"{folder}" holds a study together with its settings; leave out --set and -o.')
+        problem, options.output = stored_problem(folder), folder
+    else:
+        problem = load_problem(options.study, options.settings)
+    if options.resume and options.output is None:
+        raise InputError("--resume continues the search in a folder; name the folder with -o.")
+    if len(problem.objectives) < least_objectives:
+        raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
+    changed = differing(options.output) if options.output else []
+    return search_with_bar(problem, options.output, options.resume), changed
+
+
+def search_with_bar(problem: "Problem", folder: Path | None, resume: bool = False) -> "Result":
+    """Search for the best design of a study, with a bar that says how good the best one is so far.
+
+    Args:
+        problem: the study.
+        folder: keeps the search, and continues one that it holds; None to keep nothing.
+        resume: whether a folder that holds no search is refused.
+    """
+    from kinetostat.studies.optimisation.search import optimize
+
+    with search_bar("searching") as update:
+
+        def progress(done: int, total: int, best: float | None) -> None:
+            words = "" if best is None else f"(best {best:.8g})"
+            update(done, total, words if done < total else EXPLAINING)
+
+        return optimize(problem, folder, progress, resume)
+
+
+def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]", keys: "Sequence[str]" = ()) -> int:
+    """Write the files of a result, print it, and judge the requirements of its machine; return the exit code.
+
+    Args:
+        options: of the command.
+        result: of the search.
+        changed: names of files in its folder that were damaged.
+        keys: the only keys of its JSON that are printed; all if empty.
+    """
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.optimisation import RESULT, write_result
+    from kinetostat.views.tables import tell
+
+    result = result.in_units(options.units) if options.units else result
+    written = []
+    if options.output:
+        log = result.log
+        repaired = "nothing but its history" if log.cleaned else ""
+        repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
+        note_damage(options.output, repaired, log.unchecked, changed)
+        written = write_result(result, options.output) + write_figures(options, drawings_of(RESULT, result))
+
+    def as_data() -> object:
+        data = json_of(RESULT, result)
+        return {key: data.get(key) for key in keys} if keys else data
+
+    code = give(options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message)
+    return judge_requirements(result.machine, printing=not options.json) if result.solved else code

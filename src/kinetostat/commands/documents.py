@@ -1,13 +1,19 @@
-"""The commands `report`, `export` and `reproduce`: documents and files for others. No formula lives here."""
+"""The commands `report`, `export` and `reproduce`, which write documents and files for others, and `studio`, a page.
+
+No formula lives here.
+"""
 
 import argparse
 import re
+import sys
 from dataclasses import fields
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     DONE,
+    MACHINE,
     NO_ANSWER,
     add_command,
     as_wanted,
@@ -25,11 +31,10 @@ from kinetostat.commands.common import (
     takes_settings,
     takes_units,
 )
+from kinetostat.commands.design import search_with_bar
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.optimisation.problem import Problem
-    from kinetostat.studies.optimisation.result import Result
 
 EXPORT_FORMATS = (
     "mjcf", "mjcf-vibration", "urdf", "c", "mex", "linuxcnc", "fmu", "page", "link", "glb", "step", "csv", "netcdf",
@@ -38,9 +43,18 @@ EXPORT_FORMATS = (
 """Formats of `export`, which help names without loading what writes them."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 
+SHOWN_MACHINE = "zhang-gosselin-4dof"
+"""The machine that is shown where none is named."""
+PORT = 8000
+"""Port of the page where none is asked for: the usual one of web servers under development."""
+LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
+"""Addresses that only this computer can reach."""
+STUDIO_PACKAGE = "nicegui"
+"""Package without which the studio is not installed."""
 
-def add_report_commands(commands: "Commands") -> None:
-    """Add `report`, `export` and `reproduce`."""
+
+def add_document_commands(commands: "Commands") -> None:
+    """Add `report`, `export`, `reproduce` and `studio`."""
     _add_report_command(commands)
     _add_export_command(commands)
     reproduce = add_command(
@@ -51,6 +65,7 @@ def add_report_commands(commands: "Commands") -> None:
     reproduce.set_defaults(output=Path("reproduce"))
     reproduce.add_argument("--full", action="store_true", help="print every number, equation and statement")
     takes_json(reproduce)
+    _add_studio_command(commands)
 
 
 NEEDS = """\
@@ -135,6 +150,29 @@ def _add_report_command(commands: "Commands") -> None:
     )
 
 
+def _add_studio_command(commands: "Commands") -> None:
+    studio = add_command(
+        commands, "studio", _studio, "open a page in the browser to see a machine, move it, and see where it is stiff",
+        "kinetostat studio tripteron --port 8010",
+    )  # fmt: skip
+    studio.set_defaults(doing="opening the studio", serves=True)
+    studio.add_argument(
+        "machine", metavar="MACHINE", nargs="?", default=SHOWN_MACHINE, help=f"{MACHINE}; default: {SHOWN_MACHINE}"
+    )
+    takes_settings(studio, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
+    takes_units(studio)
+    studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen on (default: {PORT})")
+    studio.add_argument(
+        "--host", default=LOCAL_HOSTS[0],
+        help="address to listen on (default: 127.0.0.1, which only this computer can reach)",
+    )  # fmt: skip
+    studio.add_argument(
+        "--state", metavar="FOLDER", type=Path,
+        help="folder for the searches and favourites of the Design tab (default: in your user data)",
+    )  # fmt: skip
+    studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
+
+
 def _report(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.report import gather, subject_of
@@ -144,7 +182,7 @@ def _report(options: argparse.Namespace) -> int:
     path = report_path(options.output)
     wanted = ReportOptions(**{field.name: getattr(options, field.name) for field in fields(ReportOptions)})
     subject = subject_of(options.subject, options.settings)
-    result = _search(subject.problem, subject.folder) if subject.problem else None
+    result = search_with_bar(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
         return no_answer(result.message)
     result = result.in_units(options.units) if result and options.units else result
@@ -160,18 +198,6 @@ def _report(options: argparse.Namespace) -> int:
     list_written(None, [path])
     print_written(terminal(), [path])
     return DONE if all(verdict.met for verdict in answers.of("requirements") or ()) else NO_ANSWER
-
-
-def _search(problem: "Problem", folder: Path | None) -> "Result":
-    """Search the best design of a study; continue in its folder if it has one."""
-    from kinetostat.studies.optimisation.search import optimize
-
-    with search_bar("searching") as update:
-        return optimize(
-            problem,
-            folder,
-            lambda done, total, best: update(done, total, "" if best is None else f"(best {best:.8g})"),
-        )
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -210,3 +236,33 @@ def _reproduce(options: argparse.Namespace) -> int:
         lambda: json_of(REPRODUCTION, reproduction),
         lambda console: print_summary(console, reproduction, written, options.full),
     )
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text[:6]) < 65536:
+        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 1 to 65535")
+    return int(text)
+
+
+def _studio(options: argparse.Namespace) -> int:
+    from kinetostat.machine.loading import bundled
+    from kinetostat.spec.errors import InputError
+    from kinetostat.spec.installation import extra_command
+
+    machine = load_machine(options)
+    if find_spec(STUDIO_PACKAGE) is None:
+        raise InputError(f"the studio is not installed; install it with `{extra_command('studio')}`.")
+    from kinetostat.studio.design.state_folder import check_state, usual_state
+    from kinetostat.studio.serving import serve
+
+    state = options.state or usual_state()
+    check_state(state)
+    if options.host not in LOCAL_HOSTS:
+        print(
+            f"kinetostat: --host {options.host} lets everyone who can reach this computer open the studio, without "
+            "password or encryption: use it in a network that you trust.",
+            file=sys.stderr,
+        )
+    name = options.machine if options.machine in bundled() and not (options.settings or options.units) else ""
+    serve(machine, name, options.host, options.port, not options.no_browser, state)
+    return DONE
