@@ -13,7 +13,6 @@ import numpy as np
 from kinetostat.machine.cross_section import MATERIALS, SHAPES
 from kinetostat.machine.series import is_series, parts
 from kinetostat.machine.written.checking import check_chain
-from kinetostat.machine.written.copies import COPY_KEYS, copies_in, legs_of
 from kinetostat.machine.written.joints import (
     JOINT_TYPES,
     ONE_FREEDOM,
@@ -25,7 +24,9 @@ from kinetostat.machine.written.joints import (
 from kinetostat.machine.written.plan import (
     BASE,
     CABLE,
+    COPY_KEYS,
     LINK_MODELS,
+    MOST_LEGS,
     ONE_SIDED,
     PLANAR_POSE,
     PLATFORM,
@@ -35,6 +36,8 @@ from kinetostat.machine.written.plan import (
     LinkPlan,
     Matrix,
     Plan,
+    copies_in,
+    legs_of,
 )
 from kinetostat.machine.written.struts import AXIAL, check_strut
 from kinetostat.machine.written.tables import WEIGHT
@@ -42,8 +45,8 @@ from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import LARGEST_OTHER, LEAST_STIFFNESS
 
-MOST_LEGS, MOST_JOINTS = 24, 24
-"""Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
+MOST_JOINTS = 24
+"""Joints that a leg may have: more is a mistake, and the equations would take minutes."""
 
 CABLE_KEYS = ("from", "to", "stiffness", "preload")
 """Fields of a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""

@@ -19,9 +19,20 @@ from kinetostat.machine.machine import Chains, Configuration, Family, Machine, M
 from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.ball_leg import BallLeg
-from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
-from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
+from kinetostat.machine.written.plan import (
+    NAME,
+    SUMMARY,
+    JointPlan,
+    LegPlan,
+    LinkPlan,
+    Plan,
+    direction_in,
+    inertia_in,
+    joint_numbers,
+    literals,
+    matrix_in,
+)
 from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
 from kinetostat.tolerances import LEAST_LENGTH, ONE_PLACE

@@ -1,11 +1,26 @@
-"""The plan of a machine written leg by leg, which is all but its numbers: legs, joints, links and their models."""
+"""The plan of a machine written leg by leg, which is all but its numbers: legs, their copies, joints, links, models.
 
-from collections.abc import Mapping
+A leg that is written once may have copies, turned about the z axis of the base and mirrored in its x-z plane. Numbers
+belong to the leg that is written, so that a change of one changes it in every copy. Points, axes and 6x6 matrices are
+in the base frame at the home pose.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
+from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Inverse
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
+from kinetostat.units import UnitError, parse
 
 NAME = "legs"
 """The name of this family in machine files."""
@@ -32,6 +47,14 @@ ONE_SIDED = ("pulls", "pushes")
 SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 PLANAR_POSE = ("x", "y", "yaw")
 """Coordinates of the platform: P in the base frame, and Q = Rz(yaw) Ry(pitch) Rx(roll) against the home pose."""
+
+COPY_KEYS = ("copies", "angles", "mirrored")
+"""Fields of a leg about its copies."""
+SNAP = 1e-15
+"""Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
+
+MOST_LEGS = 24
+"""Legs that a machine may have, with all copies: the work of sharing loads grows with the cube of their number."""
 
 Matrix = tuple[tuple[float, ...], ...]
 
@@ -108,6 +131,34 @@ class Copies(Immutable):
     mirrored: bool
 
 
+@dataclass(frozen=True)
+class CopyPlacement:
+    """The way a copy lies: first the mirror image in the x-z plane of the base, if `mirrored`, then the turn about z.
+
+    Attributes:
+        cosine, sine: the cosine and sine of the angle of the turn.
+        mirrored: whether it is a mirror image.
+    """
+
+    cosine: float
+    sine: float
+    mirrored: bool
+
+    def vector(self, vector: Vector) -> Vector:
+        """A point or direction of the written leg in the copy."""
+        y = -vector.y if self.mirrored else vector.y
+        return Vector(vector.x * self.cosine - y * self.sine, vector.x * self.sine + y * self.cosine, vector.z)
+
+    def matrix(self, matrix: Matrix) -> Matrix:
+        """A compliance of the written leg in the copy: rows rx ry rz x y z. A mirror turns rotations the other way."""
+        if not matrix:
+            return matrix
+        columns = [self.vector(Vector(*axis)).components() for axis in np.eye(3).tolist()]
+        turn = np.array(columns, dtype=float).T
+        screw_turn = np.kron(np.diag([-1.0 if self.mirrored else 1.0, 1.0]), turn)
+        return tuple(tuple(row) for row in (screw_turn @ np.array(matrix) @ screw_turn.T).tolist())
+
+
 @dataclass(frozen=True, eq=False)
 class LegPlan(Immutable):
     """A leg: its joints from base to platform, and those of its links that are flexible, by name.
@@ -119,7 +170,7 @@ class LegPlan(Immutable):
         inverse: closed form of its joint coordinates, if it has one.
         copy_of: name of the leg of the file that it is a copy of; empty if it is not a copy.
         copies: what the file says about that leg's copies.
-        placement: the way the copy lies: a `copies.CopyPlacement`, whose file imports this one; None if not a copy.
+        placement: the way the copy lies; None if it is not a copy.
     """
 
     name: str
@@ -130,7 +181,7 @@ class LegPlan(Immutable):
     inverse: Inverse | None = None
     copy_of: str = ""
     copies: Copies | None = None
-    placement: Any = None
+    placement: CopyPlacement | None = None
 
     def table(self, part: str) -> str:
         """Name of the table with the numbers of one of its joints or links."""
@@ -208,3 +259,100 @@ def _link_literals(link: LinkPlan) -> dict[str, object]:
     if link.compliance:
         written["compliance"] = [list(row) for row in link.compliance]
     return written
+
+
+def placements(copies: Copies, where: str) -> list[CopyPlacement]:
+    """The placement of each of the copies, the first one first; mirror images follow the copies that they mirror.
+
+    Raises:
+        InputError: an entry of angles is not an angle; names the leg.
+    """
+    turns = copies.count // 2 if copies.mirrored else copies.count
+    angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / turns for i in range(turns)]
+    images = (False, True) if copies.mirrored else (False,)
+    return [
+        CopyPlacement(_without_round_off(math.cos(a)), _without_round_off(math.sin(a)), image)
+        for a in angles
+        for image in images
+    ]
+
+
+def _angle(angle: object, where: str) -> float:
+    try:
+        return parse(angle, "angle")
+    except UnitError as error:
+        raise InputError(f"{where}: an entry of angles is {shorten(angle)}: {error}.") from None
+
+
+def _without_round_off(number: float) -> float:
+    simple = round(2.0 * number) / 2.0
+    return simple if abs(number - simple) < SNAP else number
+
+
+def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
+    """Take out of a leg its fields about copies; None if it has none.
+
+    Raises:
+        InputError: no number of copies, or one that does not go with the angles; names the leg.
+    """
+    count, angles, mirrored = leg.pop("copies", None), leg.pop("angles", []), leg.pop("mirrored", False)
+    if count is None and angles == [] and mirrored is False:
+        return None
+    if not isinstance(mirrored, bool):
+        raise InputError(f"{where}: mirrored is {shorten(mirrored)}; it must be true or false.")
+    if not isinstance(angles, list):
+        raise InputError(f'{where}: angles is {shorten(angles)}; give a list, e.g. ["0 deg", "120 deg", "240 deg"].')
+    per_angle = 2 if mirrored else 1
+    count = count if count is not None else per_angle * max(1, len(angles))
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LEGS or count % per_angle:
+        even = ", and even, as mirrored legs come in pairs" if mirrored else ""
+        raise InputError(
+            f"{where}: copies is {shorten(count)}; it must be the number of legs, {per_angle} to {MOST_LEGS}{even}."
+        )
+    if angles and len(angles) * per_angle != count:
+        raise InputError(
+            f"{where}: angles has {len(angles)} entries for {count} copies; give {count // per_angle}, or leave it out "
+            "for equal steps around the z axis."
+        )
+    return Copies(count, tuple(angles), mirrored)
+
+
+def legs_of(leg: LegPlan, copies: Copies | None, where: str) -> tuple[LegPlan, ...]:
+    """The legs that a written leg stands for: itself, or its copies, numbered from 1.
+
+    Raises:
+        InputError: as `placements` does.
+    """
+    if copies is None:
+        return (leg,)
+    return tuple(
+        replace(leg, name=f"{leg.name} {i}", copy_of=leg.name, copies=copies, placement=placement)
+        for i, placement in enumerate(placements(copies, where), 1)
+    )
+
+
+def joint_numbers(leg: LegPlan, joint: JointPlan, tables: Mapping[str, Any]) -> Any:
+    """The numbers of a joint, with points and axes where they are in this leg."""
+    data = tables[leg.table(joint.name)]
+    if leg.placement is None:
+        return data
+    return SimpleNamespace(**{name: _number_in_copy(value, leg.placement) for name, value in vars(data).items()})
+
+
+def matrix_in(leg: LegPlan, matrix: Matrix) -> Matrix:
+    """A compliance that is written for a leg, where it is in this leg."""
+    return matrix if leg.placement is None else leg.placement.matrix(matrix)
+
+
+def direction_in(leg: LegPlan, direction: Sequence[float]) -> Vector:
+    """A direction that is written for a leg, where it points in this leg."""
+    return Vector(*direction) if leg.placement is None else leg.placement.vector(Vector(*direction))
+
+
+def inertia_in(leg: LegPlan, tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """An inertia tensor that is written for a leg, in the axes of this leg; a mirror image is turned likewise."""
+    return tuple(tensor) if leg.placement is None else turned_tensor(leg.placement.vector, tensor)
+
+
+def _number_in_copy(value: Any, placement: CopyPlacement) -> Any:
+    return placement.vector(Vector(*value)).components() if isinstance(value, tuple) else value
