@@ -11,8 +11,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.exchange.formats import ascii_line
-from kinetostat.exchange.results import reference_point
+from kinetostat.exchange.formats import ascii_line, reference_point
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis

@@ -1,12 +1,14 @@
 """The export formats: their names, their suffixes, and which function writes each; `export` chooses one and calls it.
 
 A format is added here as one row of `KNOWN`. Its writer is imported only when it is used, so that the list is cheap.
+What several writers need, the reference point and names in one line, is below.
 """
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
+from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
@@ -50,14 +52,15 @@ class Format:
         chosen = {kind: names for kind, names in options.items() if names is not None}
         for kind in chosen:
             if kind not in self.options:
-                able = ", ".join(form.name for form in KNOWN if kind in form.options)
-                raise InputError(f"The format {self.name} has no {kind} to choose; {able} have: use --to.")
+                others = ", ".join(form.name for form in KNOWN if kind in form.options)
+                raise InputError(f"The format {self.name} has no {kind} to choose; {others} have: use --to.")
         module, _, function = self.writer.rpartition(".")
         write: Callable[..., list[Path]] = getattr(import_module(f"kinetostat.{module}"), function)
         return write(analysis, path, **chosen)
 
 
 CHANNELS = ("inputs", "outputs")
+"""Options of formats that are functions of chosen inputs."""
 KNOWN = (
     Format("mjcf", ".xml", "exchange.mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format(
@@ -127,14 +130,14 @@ KNOWN = (
     Format(
         "modes",
         ".csv",
-        "exchange.vibration_files.write_modes",
+        "exchange.results.write_modes",
         "natural frequencies, motions of the tool and modal masses, as modes -o writes them",
         (".nc",),
     ),
     Format(
         "state-space",
         ".mat",
-        "exchange.vibration_files.write_state_space",
+        "exchange.results.write_state_space",
         "A, B, C, D of the vibrating machine, from chosen forces to chosen motions",
         (".nc",),
         options=CHANNELS,
@@ -210,6 +213,20 @@ def export(
     if analysis.status is not Status.OK:
         raise InputError(analysis.message)
     return form.write(analysis, Path(path), inputs=inputs, outputs=outputs, over=over)
+
+
+def reference_point(analysis: Analysis) -> list[float]:
+    """Return the point of K and C in the base frame, m [3]: the tool point T, in the plane of a planar machine."""
+    platform_of(analysis)
+    point = analysis.machine.reference_point(analysis.state.configuration)
+    return [float(c) for c in point.components()]
+
+
+def platform_of(analysis: Analysis) -> tuple[Array, Array]:
+    """Return the position and rotation of the platform, without which nothing can be exported."""
+    if analysis.platform is None:
+        raise ValueError("an analysis without a result cannot be exported")
+    return analysis.platform
 
 
 def one_line(text: str) -> str:

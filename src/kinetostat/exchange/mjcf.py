@@ -11,10 +11,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from kinetostat.arrays import Array
-from kinetostat.exchange.formats import one_line
+from kinetostat.exchange.formats import one_line, reference_point
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of, vibrating_pace
-from kinetostat.exchange.results import reference_point
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.validation.pieces import Heavy

@@ -17,8 +17,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from kinetostat.arrays import Array
+from kinetostat.exchange.formats import reference_point
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
-from kinetostat.exchange.results import reference_point
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Joint, Spring

@@ -22,9 +22,8 @@ import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.exchange.formats import one_line
+from kinetostat.exchange.formats import one_line, reference_point
 from kinetostat.exchange.leg_by_leg import compliance_at
-from kinetostat.exchange.results import reference_point
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.response import Response

@@ -2,7 +2,7 @@
 
 The stiffness of an actuator is here that of its transmission between motor and joint, and the table [servo] gives the
 loop that holds the motor. A state space has forces and motions that are chosen by name. Formulas are in
-`vibration.servo` and `vibration.receptance`; `exchange.vibration_files` writes files of the matrices.
+`vibration.servo` and `vibration.receptance`; `exchange.results` writes files of the matrices.
 
 Source: theory (101)-(104). At the tool point, base axes.
 """
