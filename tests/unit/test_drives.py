@@ -19,8 +19,7 @@ from kinetostat.studies.motion_deflection import swings_under
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.report import REPORT_PARTS, gather
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.drive_figures import over_time_figure, speed_torque_figure
-from kinetostat.views.drives import DRIVES
+from kinetostat.views.drives import DRIVES, over_time_figure, speed_torque_figure
 from kinetostat.views.report.writing import ReportOptions
 
 UP = "field, amplitude, frequency [Hz]\nz, 3 mm, 8\n"

@@ -1,9 +1,9 @@
-"""Drives along a motion: the question, and the description of its answer. Nothing is computed here."""
+"""Drives along a motion: the question, the description of its answer, and its figures. Nothing is computed here."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.kinematics.closing import POINT
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find_field
 from kinetostat.motion.forces import PARTS
@@ -18,11 +19,19 @@ from kinetostat.studies.drives import DriveLoad, DriveLoads, drives
 from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
-from kinetostat.units import motion_unit
+from kinetostat.units import load_unit, motion_unit
 from kinetostat.views.data_forms import columns_csv
-from kinetostat.views.drive_figures import PER_MINUTE, over_time_figure, parts_figure, speed_torque_figure
+from kinetostat.views.motors import PER_MINUTE, curves_of, name_drives, note_motion, speed_torque_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
 
 MOST_MODES = 6
 """Excited modes that are named: the lowest ones move the tool most."""
@@ -149,6 +158,59 @@ def _show(answer: DriveLoads, value: float, unit: str) -> str:
 
 def _motor_speed(drive: DriveLoad) -> str:
     return f"{number(drive.motor_speed * PER_MINUTE)} 1/min" if drive.rotary else f"{number(drive.motor_speed)} m/s"
+
+
+def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the motion") -> "Figure":
+    """Draw speed, force and power of all drives over time."""
+    curves, display = curves_of(answer), answer.machine.display
+    rows: list[tuple[Array, str, list[bool]]] = []
+    for turning, kind in ((False, "force"), (True, "torque")):
+        chosen = [drive.slides is not turning for drive in answer.drives]
+        if any(chosen):
+            scale, force = display.scale(motion_unit(turning)), display.scale(load_unit(turning))
+            rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
+            rows.append((curves.force * force.factor, force.label(kind), chosen))
+    rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
+    with figures.new_figure((6.6, 0.9 + 1.7 * len(rows)), title.format(answer.machine.name)) as figure:
+        panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
+        for panel, (values, label, chosen) in zip(panels, rows, strict=True):
+            _lines_over_time(panel, answer, values, chosen)
+            panel.set_ylabel(label)
+        panels[-1].set_xlabel("time (s)")
+        name_drives(figure, answer)
+        note_motion(figure, answer)
+    return figure
+
+
+def _lines_over_time(panel: "Axes", answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
+    """Draw values [drives x n] of the chosen drives over time; colours that come again are dashed."""
+    panel.axhline(0.0, color="#b0b0b0", linewidth=0.8)
+    for k, drive in enumerate(answer.drives):
+        if chosen[k]:
+            dash = "--" if k >= len(figures.COLOURS) else "-"
+            look = {"color": figures.colour_of(k), "linewidth": 1.1, "label": drive.name}
+            panel.plot(answer.motion.times, values[k], dash, **look)
+
+
+def parts_figure(answer: DriveLoads, name: str, title: str = "{}: parts of the force of {}") -> "Figure":
+    """Draw the parts of the force of the drive of that name, and the whole force, over time."""
+    curves, display = curves_of(answer), answer.machine.display
+    k = [drive.name for drive in answer.drives].index(name)
+    scale = display.scale(answer.drives[k].unit)
+    with figures.new_figure((6.6, 3.2), title.format(answer.machine.name, name)) as figure:
+        panel = figure.add_subplot()
+        times = answer.motion.times
+        for i, part in enumerate(PARTS):
+            if np.any(curves.parts[k, i]):
+                panel.plot(
+                    times, curves.parts[k, i] * scale.factor, color=figures.COLOURS[i], linewidth=1.1, label=part
+                )
+        panel.plot(times, curves.force[k] * scale.factor, color="black", linewidth=1.4, label="whole")
+        panel.set_xlabel("time (s)")
+        panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
+        panel.legend(frameon=False, fontsize="small", ncols=3)
+        note_motion(figure, answer)
+    return figure
 
 
 def _figures(answer: DriveLoads) -> dict[str, Drawing]:
@@ -317,7 +379,7 @@ DRIVES_QUESTION = Question(
             "acceleration", "quantity", 'without a motion: acceleration in the worst direction, e.g. "5 m/s**2"',
             "ACCELERATION",
         ),
-        Option("points", "count", "number of points of the motion, about (default: 400)", default=400),
+        Option("points", "count", "approximate number of points of the motion (default: 400)", default=400),
     ),
     output="drives.json, drives.csv, drives.nc, curves.csv and the figures",
     full="show the loads of all joints as well",

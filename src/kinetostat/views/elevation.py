@@ -6,22 +6,20 @@ Nothing is computed here.
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from kinetostat.arrays import Array
 from kinetostat.display import DASH, number
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.data_forms import columns_csv
-from kinetostat.views.figures import COLOURS, look_of, new_figure
 from kinetostat.views.loaded import KINDS_OF_LOADS
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -36,6 +34,14 @@ from kinetostat.views.question import (
     Records,
 )
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
 
 ROOM_ABOVE_CURVE = 1.15
 """Height of a panel with a single curve over its greatest value; it begins at zero, so that heights can be compared."""
@@ -194,7 +200,7 @@ def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
     return {"elevation": Drawing(caption, partial(elevation_figure, answer))}
 
 
-def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Figure:
+def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> "Figure":
     """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each.
 
     Args:
@@ -205,7 +211,7 @@ def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> Fi
     rows = -(-len(panels) // 2)
     heights = answer.machine.display.scale("rad")
     notes = setting_of(answer.machine), "dotted lines: loads reverse" if answer.reversals else ""
-    with new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), *notes) as figure:
+    with figures.new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), *notes) as figure:
         axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
         for panel, content in zip(axes, panels, strict=False):
             _draw_panel(panel, answer, content, heights.factor)
@@ -257,20 +263,20 @@ def _panels(answer: Elevation) -> list[PanelContent]:
     return [panel for panel in panels if any(np.isfinite(values).any() for values in panel.curves.values())]
 
 
-def _draw_panel(panel: Axes, answer: Elevation, content: PanelContent, angle_factor: float) -> None:
+def _draw_panel(panel: "Axes", answer: Elevation, content: PanelContent, angle_factor: float) -> None:
     """Draw the curves of a panel; elevations are multiplied by a factor that brings them from rad to what is shown."""
     display, curves = answer.machine.display, content.curves
     scale = display.scale(content.unit)
     if content.small:
         scale = display.fitting(content.unit, np.concatenate(list(curves.values())))
     for place, (name, values) in enumerate(curves.items()):
-        panel.plot(answer.elevations * angle_factor, values * scale.factor, label=name, **look_of(place))
+        panel.plot(answer.elevations * angle_factor, values * scale.factor, label=name, **figures.look_of(place))
     panel.set_ylabel(scale.label(content.meaning))
     panel.margins(x=0.0)
     if content.unit in ("N", "N·m"):
         panel.axhline(0.0, color="#444444", linewidth=0.8)
         for reversal in answer.reversals:
-            panel.axvline(reversal.elevation * angle_factor, color=COLOURS[1], linewidth=0.8, linestyle=":")
+            panel.axvline(reversal.elevation * angle_factor, color=figures.COLOURS[1], linewidth=0.8, linestyle=":")
     if "" in curves:
         panel.set_ylim(0.0, ROOM_ABOVE_CURVE * float(np.nanmax(curves[""])) * scale.factor)
     else:

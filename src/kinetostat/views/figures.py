@@ -163,6 +163,11 @@ def as_svg(figure: Figure) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
+def colour_of(place: int) -> str:
+    """Choose the colour of a thing by its place among others; every seventh has that of the first."""
+    return COLOURS[place % len(COLOURS)]
+
+
 def look_of(place: int) -> dict[str, Any]:
     """Choose colour and dash of a curve by its place among others; no two of the first 36 look alike."""
     turn, colour = divmod(place, len(COLOURS))

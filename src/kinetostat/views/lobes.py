@@ -3,21 +3,28 @@
 import math
 from collections.abc import Iterator
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from kinetostat.display import number
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
-from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import tool_of
 
-SHOWN = 12
-"""Speeds with a row of the table, at equal distances: enough to see the pockets; all are in the files."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
+
+LISTED_SPEEDS = 12
+"""Speeds with a row of the table, about, at equal distances: enough to see the pockets; all are in the files."""
 HEADROOM = 8.0
 """Height of the picture in multiples of the least width: pockets between lobes have no end."""
 
@@ -58,7 +65,7 @@ def _tables(answer: Lobes, full: bool) -> Iterator[FittedTable]:
     if not answer.poses:
         return
     table = numeric_table("Width of cut that stays stable", "speed", ["width"])
-    step = 1 if full else max(1, (len(answer.speeds) - 1) // (SHOWN - 1))
+    step = 1 if full else max(1, (len(answer.speeds) - 1) // (LISTED_SPEEDS - 1))
     for speed, width in zip(answer.speeds[::step], answer.widths[::step], strict=True):
         shown = "any width" if math.isinf(width) else answer.machine.display.show(float(width), "m")
         table.add_row(_speed_text(float(speed)), shown)
@@ -73,7 +80,7 @@ def lobes_figures(answer: Lobes) -> dict[str, Drawing]:
     return {"lobes": Drawing(caption, partial(lobes_figure, answer))}
 
 
-def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
+def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> "Figure":
     """Draw the width of cut that stays stable over the speed of the spindle.
 
     Args:
@@ -81,28 +88,27 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> Figure:
         title: the title over the figure, with braces for the name of the machine.
     """
     scale = answer.machine.display.scale("m")
-    top = HEADROOM * answer.least * scale.factor
-    widths = np.minimum(np.where(np.isfinite(answer.widths), answer.widths, np.inf) * scale.factor, 2.0 * top)
+    least = answer.least * scale.factor
+    top, out_of_view = HEADROOM * least, 2.0 * HEADROOM * least
+    widths = np.minimum(np.where(np.isfinite(answer.widths), answer.widths, np.inf) * scale.factor, out_of_view)
+    least_colour, lobe_colour = figures.COLOURS[:2]
     poses = f"least of {answer.poses} poses" if answer.poses > 1 else f"chatter at {answer.frequency:.4g} Hz"
-    with new_figure((5.6, 3.6), title.format(answer.machine.name), setting_of(answer.machine), poses) as figure:
+    with figures.new_figure((5.6, 3.6), title.format(answer.machine.name), setting_of(answer.machine), poses) as figure:
         panel = figure.add_subplot()
         speeds = 60.0 * answer.speeds
-        panel.fill_between(speeds, widths, 2.0 * top, color=COLOURS[1], alpha=0.18, linewidth=0.0)
-        panel.plot(speeds, widths, color=COLOURS[1])
-        panel.axhline(answer.least * scale.factor, color=COLOURS[0], linewidth=0.8, linestyle="--")
-        panel.annotate("stable at every speed below", (0.99, answer.least * scale.factor), (0, -3), color=COLOURS[0],
-                       fontsize="small", ha="right", va="top", xycoords=panel.get_yaxis_transform(),
-                       textcoords="offset points")  # fmt: skip
-        panel.text(0.02, 0.95, "chatters", color=COLOURS[1], transform=panel.transAxes, va="top")
+        panel.fill_between(speeds, widths, out_of_view, color=lobe_colour, alpha=0.18, linewidth=0.0)
+        panel.plot(speeds, widths, color=lobe_colour)
+        panel.axhline(least, color=least_colour, linewidth=0.8, linestyle="--")
+        panel.annotate(
+            "stable at every speed below", (0.99, least), (0, -3), color=least_colour, fontsize="small",
+            ha="right", va="top", xycoords=panel.get_yaxis_transform(), textcoords="offset points",
+        )  # fmt: skip
+        panel.text(0.02, 0.95, "chatters", color=lobe_colour, transform=panel.transAxes, va="top")
         panel.set_xlim(float(speeds[0]), float(speeds[-1]))
         panel.set_ylim(0.0, top)
         panel.set_xlabel("speed of the spindle (1/min)")
         panel.set_ylabel(scale.label("width of cut"))
     return figure
-
-
-def _worst(answer: Lobes) -> dict[str, float]:
-    return dict(answer.worst)
 
 
 def _widths(answer: Lobes) -> list[float | None]:
@@ -118,7 +124,7 @@ LOBES = Description(
         Field("least_width", lambda answer: None if math.isinf(answer.least) else answer.least, "m"),
         Field("chatter_frequency", lambda answer: None if math.isnan(answer.frequency) else answer.frequency, "Hz"),
         Field("poses"),
-        Field("worst_pose", _worst, forms=("json",)),
+        Field("worst_pose", lambda answer: dict(answer.worst), forms=("json",)),
         Field("damping_assumed", "assumed"),
         Field("speed", lambda answer: answer.speeds.tolist(), "1/s", forms=("json",)),
         Field("width", _widths, "m", "width of cut that stays stable; none where every width is", forms=("json",)),

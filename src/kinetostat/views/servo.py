@@ -3,25 +3,32 @@
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import DASH, number
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.control import Servo, servo
 from kinetostat.vibration.receptance import along, receptance
-from kinetostat.views.figures import COLOURS, DASHES, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import RESPONSE, drawn_directions
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
+
 RIGID = "rigid"
+"""Word for a stiffness without end."""
 SAME_SHARE = 1e-9
-"""Share by which two stiffnesses may differ by round-off."""
+"""Relative difference of two stiffnesses that is round-off."""
 
 
 def _share_at_rest(drive: dict[str, Any]) -> float:
@@ -131,7 +138,7 @@ def servo_figures(answer: Servo) -> dict[str, Drawing]:
     return {"servo": Drawing(caption, partial(servo_figure, answer))}
 
 
-def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops closed") -> Figure:
+def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops closed") -> "Figure":
     """Draw the dynamic stiffness along directions over frequency, with loops closed and with motors that stand still.
 
     Args:
@@ -149,11 +156,11 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     directions = drawn_directions(answer.direction, compliant)
     closed = answer.receptance(answer.frequencies.tolist())
     standing = receptance(answer.loops.modes, answer.loops.damping, answer.frequencies)
-    with new_figure(
+    with figures.new_figure(
         (5.6, 3.8), title.format(answer.machine.name), setting_of(answer.machine), "thin: motors that stand still"
     ) as figure:
         panel = figure.add_subplot()
-        for colour, dashes, (name, axis) in zip(COLOURS, DASHES, directions.items(), strict=False):
+        for colour, dashes, (name, axis) in zip(figures.COLOURS, figures.DASHES, directions.items(), strict=False):
             thick, thin = (1.0 / np.abs(along(part, np.array(axis))) * scale.factor for part in (closed, standing))
             panel.loglog(answer.frequencies, thick, color=colour, linestyle=dashes, label=f"along {name}")
             panel.loglog(answer.frequencies, thin, color=colour, linewidth=0.7, alpha=0.6)

@@ -3,15 +3,21 @@
 import math
 from collections.abc import Iterator
 from functools import partial
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from kinetostat.display import number
+from kinetostat.late import LateModule
 from kinetostat.machine.machine import setting_of
 from kinetostat.studies.tensions import Tensions, tensions
-from kinetostat.views.figures import COLOURS, new_figure
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
 
 BAR_HEIGHT = 0.28
 """Height of the figure for each cable, inches: its name fits beside its bar."""
@@ -53,17 +59,17 @@ def _tables(answer: Tensions, _full: bool) -> Iterator[FittedTable]:
     yield table
 
 
-def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figure:
+def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> "Figure":
     """Draw the tension of each cable as a bar, and the bounds that are near."""
     scale = answer.machine.display.scale("N")
     sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
     least, most = (bound * scale.factor for bound in answer.bounds)
-    with new_figure(
+    with figures.new_figure(
         (6.0, 1.3 + BAR_HEIGHT * len(sizes)), title.format(answer.machine.name), setting_of(answer.machine)
     ) as figure:
         panel = figure.add_subplot()
         names = [cable.name for cable in answer.cables]
-        bars = panel.barh(names, sizes, height=0.7, color=COLOURS[0])
+        bars = panel.barh(names, sizes, height=0.7, color=figures.COLOURS[0])
         panel.bar_label(bars, [number(size) for size in sizes], padding=3, fontsize="small")
         panel.invert_yaxis()
         panel.margins(x=0.12)
@@ -72,7 +78,7 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> Figu
         panel.set_axisbelow(True)
         near = [bound for bound in (least, most) if 0.0 < bound < FARTHEST_BOUND * max(sizes)]
         for bound in near:
-            panel.axvline(bound, color=COLOURS[1], linewidth=1.2, label="bound" if bound == near[0] else None)
+            panel.axvline(bound, color=figures.COLOURS[1], linewidth=1.2, label="bound" if bound == near[0] else None)
         if near:
             panel.legend(loc="upper right", frameon=False, fontsize="small", bbox_to_anchor=(1.0, 1.12))
     return figure
