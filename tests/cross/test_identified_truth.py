@@ -13,7 +13,7 @@ from kinetostat.studies.identification.identification import identification_of
 from kinetostat.studies.identification.measurements import POSITION, Measurements
 from kinetostat.studies.identification.next_poses import as_csv
 from kinetostat.studies.poses import given_poses
-from kinetostat.views.measurement_figures import residual_figure
+from kinetostat.views.identification_figures import residual_figure
 from machines import load_without_limits
 from synthetic_measurements import SIGMA, found, measured, posed, truth_of, written
 

@@ -23,7 +23,7 @@ from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import save_figure
 from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.guidelines import guideline_figures
-from kinetostat.views.layout import _Surroundings
+from kinetostat.views.layout import _CachedTightBox
 from kinetostat.views.map_scales import levels_of
 from kinetostat.views.sensitivity import sensitivity_figure
 from refusals import refused
@@ -191,7 +191,7 @@ def test_a_panel_is_measured_as_matplotlib_would():
     answer = sensitivity(load("tricept"), ["compliance_x"])
     remembered = [axes.get_position().bounds for axes in sensitivity_figure(answer).axes]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_Surroundings, "box", lambda self, *given, **options: self._measure(*given, **options))
+        patch.setattr(_CachedTightBox, "box", lambda self, *given, **options: self._measure(*given, **options))
         measured = [axes.get_position().bounds for axes in sensitivity_figure(answer).axes]
     np.testing.assert_allclose(remembered, measured, atol=1e-9)
 

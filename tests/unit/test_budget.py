@@ -17,7 +17,7 @@ from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
 from kinetostat.studies.allocation import allocation_for, reach_of
-from kinetostat.views.budget_data import contributions_csv
+from kinetostat.views.budget_forms import contributions_csv
 
 LINES = {
     "hexapod": {"joints": "0.05 mm", "zeros": "0.02 mm normal", "gains": "20 um/m", "clearances": "5 um"},

@@ -11,7 +11,7 @@ from kinetostat.cli import main
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.measured_stiffness import validate_measured
 from kinetostat.views.data_forms import json_of
-from kinetostat.views.measured import MEASURED_STIFFNESS
+from kinetostat.views.validation import MEASURED_STIFFNESS
 from machines import load_without_limits
 
 SOFT = "tolerances.compliances=sigma 10 %"

@@ -25,7 +25,14 @@ from kinetostat.studies.budget import (
 )
 from kinetostat.tolerances import LEAST_DIVISOR
 from kinetostat.units import KINDS
-from kinetostat.views.budget_data import budget_dataset, contributions_csv, poses_csv, varied_fields
+from kinetostat.views.budget_forms import (
+    budget_dataset,
+    budget_figures,
+    contributions_csv,
+    poses_csv,
+    ranked_by,
+    varied_fields,
+)
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
@@ -128,12 +135,6 @@ def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
             cells += [str(int(np.nanargmax(answer.size("usual", name))) + 1), number(everywhere, digits=DRAWN_DIGITS)]
         table.add_row(f"{name} (parasitic)" if name in answer.parasitic else name, scale.unit, *cells)
     return table
-
-
-def ranked_by(answer: Budget) -> list[str]:
-    """Return the measures whose shares are listed, the leading one first."""
-    turned = "rotation" if "rotation" in answer.measures else "rz"
-    return [name for name in ("along", "position", turned) if name in answer.measures]
 
 
 def _shares_table(answer: Budget, what: str, *heads: str) -> FittedTable:
@@ -282,7 +283,7 @@ BUDGET = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.budget_figures.budget_figures",
+    figures=budget_figures,
     makers={"csv": contributions_csv, "nc": budget_dataset},
     state=lambda answer: f"error of the tool by {len(answer.parts)} tolerances",
     files={

@@ -244,7 +244,7 @@ IDENTIFICATION = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.measurement_figures.identification_figures",
+    figures="views.identification_figures.identification_figures",
     state=lambda answer: f"as built, by {answer.observed.data.path}",
     files={
         "machine.toml": "exchange.leg_by_leg.fitted_text",

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from kinetostat.views import drawing, figures, layout, lettering
+    from kinetostat.views import drawing, figures, layout
     from kinetostat.views.scene import anatomy, overlays
 else:
     mpl = LateModule("matplotlib")
@@ -40,7 +40,6 @@ else:
     drawing = LateModule("kinetostat.views.drawing")
     figures = LateModule("kinetostat.views.figures")
     layout = LateModule("kinetostat.views.layout")
-    lettering = LateModule("kinetostat.views.lettering")
     anatomy = LateModule("kinetostat.views.scene.anatomy")
     overlays = LateModule("kinetostat.views.scene.overlays")
 
@@ -347,7 +346,7 @@ def bars_figure(state: LoadedState) -> "Figure":
         turns: [(name, spring) for name, spring in shown if spring.turning is turns] for turns, _ in KINDS_OF_LOADS
     }
     groups = {turns: group for turns, group in by_kind.items() if group}
-    beside = max(LEAST_NAME_WIDTH, lettering.width_of(name for name, _ in shown))
+    beside = max(LEAST_NAME_WIDTH, layout.width_of(name for name, _ in shown))
     with figures.new_figure((beside + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
         heights = [len(group) + 1 for group in groups.values()]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.views.lettering import width_of
+from kinetostat.views.layout import width_of
 
 if TYPE_CHECKING:
     import xarray as xr

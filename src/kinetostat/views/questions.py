@@ -103,7 +103,7 @@ ANSWERS: Mapping[str, str] = {
     "studies.capability.Capability": "views.capability.CAPABILITY",
     "studies.budget.Budget": "views.budget.BUDGET",
     "accuracy.toleranced_parts.PossibleErrors": "views.budget.POSSIBLE_ERRORS",
-    "studies.measured_stiffness.MeasuredComparison": "views.measured.MEASURED_STIFFNESS",
+    "studies.measured_stiffness.MeasuredComparison": "views.validation.MEASURED_STIFFNESS",
     "validation.comparison.Validation": "views.validation.VALIDATION",
     "studies.optimisation.result.Result": "views.optimisation.RESULT",
     "studies.reproduction.Reproduction": "views.paper.REPRODUCTION",

@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from kinetostat.views import figures, lettering, map_scales
+    from kinetostat.views import figures, layout, map_scales
 else:
     colors = LateModule("matplotlib.colors")
     figures = LateModule("kinetostat.views.figures")
-    lettering = LateModule("kinetostat.views.lettering")
+    layout = LateModule("kinetostat.views.layout")
     map_scales = LateModule("kinetostat.views.map_scales")
 
 MOST_INFLUENCES = 40
@@ -135,7 +135,7 @@ def coloured_table(
     shown = list(rows)[:MOST_ROWS]
     cells = np.array([rows[path] for path in shown], dtype=float)
     (width, height), (beside, above) = CELL_SIZE, ROOM_BESIDE_CELLS
-    names = max(LEAST_NAME_WIDTH, lettering.width_of(shown))
+    names = max(LEAST_NAME_WIDTH, layout.width_of(shown))
     with figures.new_figure((names + beside + width * len(heads), above + height * len(shown)), *titles) as figure:
         panel = figure.subplots()
         room = int(LETTERS_PER_INCH * BAR_SHARE * figure.get_figheight())

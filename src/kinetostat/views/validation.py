@@ -1,20 +1,38 @@
-"""A machine beside an independent engine: the description of the answer of `validate`. Nothing is computed here."""
+"""A machine beside an independent engine, or beside what was measured: descriptions of both answers of `validate`.
+
+Nothing is computed here.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.table import Table
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.display import DASH, number
+from kinetostat.arrays import Array
+from kinetostat.display import DASH, Display, Scale, number, number_and_uncertainty
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.late import LateModule
+from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import values
 from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation, frequency_difference
 from kinetostat.views.analysis_tables import matrix_table
-from kinetostat.views.question import NAME, Axis, Description, Field, Lines, Records
-from kinetostat.views.tables import numeric_table
+from kinetostat.views.question import NAME, Axis, Description, Drawing, Field, Lines, Records
+from kinetostat.views.tables import FittedTable, numeric_table, text_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from kinetostat.studies import measured_stiffness
+    from kinetostat.studies.measured_stiffness import MeasuredComparison, MeasuredRow
+    from kinetostat.views import figures
+else:  # of which an answer of an engine needs nothing
+    measured_stiffness = LateModule("kinetostat.studies.measured_stiffness")
+    figures = LateModule("kinetostat.views.figures")
 
 COMPARED_DIGITS = 9
 """Digits in which a machine is compared with an independent engine: differences of 1e-9 show."""
@@ -25,6 +43,14 @@ REBUILT = (
     "The machine was rebuilt in the engine from its geometry, cross-sections and springs alone; no Jacobian of "
     "kinetostat is used there."
 )
+SOURCE_WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
+"""Words for the sources of uncertainty, in the order of `u_num`, `u_input` and `u_data`."""
+EXACT_SHARE = 1e-9
+"""Share of a number below which its uncertainty is round-off, and is not written beside it."""
+LEAST_SHOWN_SHARE = 5e-4
+"""Share of the variance up to which a source is not named: it would read 0.0 %."""
+MOST_BARS_OF_ENTRIES = 60
+"""Greatest number of measured entries that have bars; of more, those with the largest differences."""
 
 
 def verdict(validation: Validation) -> str:
@@ -37,11 +63,11 @@ def verdict(validation: Validation) -> str:
     return f"{engine}, an independent engine, {agree}: {worst}; {AGREED:g} is allowed."
 
 
-def _lines(validation: Validation) -> Lines:
+def _engine_lines(validation: Validation) -> Lines:
     return [("Verdict", verdict(validation)), ("Engine", REBUILT)]
 
 
-def _tables(validation: Validation, full: bool) -> Iterator[Table]:
+def _engine_tables(validation: Validation, full: bool) -> Iterator[FittedTable]:
     """Give the diagonals of C side by side and how far they differ; with `full` both matrices, last."""
     yield _diagonal_table(validation)
     differences = [*validation.differences, "uncertainty of the engine"]
@@ -63,7 +89,7 @@ def _tables(validation: Validation, full: bool) -> Iterator[Table]:
             yield matrix_table(f"Compliance C, {title}", "compliance", family.component_names, rows, display)
 
 
-def _diagonal_table(validation: Validation) -> Table:
+def _diagonal_table(validation: Validation) -> FittedTable:
     columns = ["kinetostat", validation.engine, "difference", "unit"]
     table = numeric_table("Diagonal of the compliance, side by side", "direction", columns)
     family = validation.machine.family
@@ -76,7 +102,7 @@ def _diagonal_table(validation: Validation) -> Table:
     return table
 
 
-def _frequency_table(validation: Validation) -> Table:
+def _frequency_table(validation: Validation) -> FittedTable:
     columns = ["kinetostat", validation.engine, "difference", "unit"]
     table = numeric_table("Natural frequencies without loads, side by side", "mode", columns)
     for order, pair in enumerate(validation.frequencies, 1):
@@ -126,8 +152,181 @@ VALIDATION = Description(
             forms=("json",),
         ),
     ),
-    lines=_lines,
-    tables=_tables,
+    lines=_engine_lines,
+    tables=_engine_tables,
     axes=tuple(Axis(name, _components) for name in ROW_AND_COLUMN),
     state=lambda validation: f"compared with an independent engine, {validation.engine} {validation.version}",
+)
+
+
+def measured_table(answer: "MeasuredComparison") -> FittedTable:
+    """A row for each measured number: it, the computed one, and their difference, with standard uncertainties."""
+    table = text_table(
+        "Measured and computed at the tool point, base axes (± one standard uncertainty)",
+        "line", "entry", "measured", "computed", "difference", "unit", "model",
+    )  # fmt: skip
+    for column in table.columns[2:5]:
+        column.justify = "right"
+    display = answer.machine.display
+    for row in answer.rows:
+        table.add_row(
+            str(row.entry.line),
+            row.entry.name,
+            _with_uncertainty(row, display, row.entry.value, row.u_data),
+            _with_uncertainty(row, display, row.predicted, (row.u_input**2 + row.u_num**2) ** 0.5),
+            _with_uncertainty(row, display, row.error, row.u_val),
+            _scale(row, display).unit,
+            verdict_of(row, display),
+        )
+    return table
+
+
+def _with_uncertainty(row: "MeasuredRow", display: Display, value: float, uncertainty: float) -> str:
+    """Return a value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
+    factor = _scale(row, display).factor
+    if uncertainty <= EXACT_SHARE * abs(value):
+        return number(value * factor)
+    return " ± ".join(number_and_uncertainty(value * factor, uncertainty * factor))
+
+
+def _scale(row: "MeasuredRow", display: Display) -> Scale:
+    """Return the unit in which a row is shown: a small one for deflections."""
+    unit = row.entry.unit
+    return display.deflection(unit) if unit in ("m", "rad") else display.scale(unit)
+
+
+def verdict_of(row: "MeasuredRow", display: Display) -> str:
+    """Return the verdict of a row on the model, theory (70): "explained" by the uncertainties, or how far it is off.
+
+    A measured value that cannot be told from zero has its error in its unit, because a percentage of it means nothing.
+    """
+    if row.explained:
+        return "explained"
+    low, high = row.bounds
+    size = abs(row.entry.value)
+    if size <= measured_stiffness.COVERAGE_FACTOR * row.u_data:
+        scale = _scale(row, display)
+        ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
+        return f"off by {ends}"
+    is_stiffness = row.entry.parts[0] in ("stiffness", "free_stiffness")
+    model_is_stiffer = (abs(row.predicted) > size) == is_stiffness
+    ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)}\N{NO-BREAK SPACE}%"
+    return f"too {'stiff' if model_is_stiffer else 'compliant'} by {ends}"
+
+
+def _measured_lines(answer: "MeasuredComparison") -> Lines:
+    yield "Verdict", answer.message
+    shares = sorted(answer.shares.items(), key=lambda source: -source[1])
+    text = ", ".join(
+        f"{number(100.0 * share, digits=2)} % {SOURCE_WORDS[name]}"
+        for name, share in shares
+        if share > LEAST_SHOWN_SHARE
+    )
+    yield "Variance", f"The variance of the differences is made of: {text}."
+    if answer.source:
+        yield "Numbers", f"The uncertainty of the machine's numbers is from {answer.source}."
+    else:
+        yield (
+            "Numbers",
+            "The machine's numbers count as exact, because nothing says how sure they are: give --tolerance "
+            '"compliances=sigma 10 %", lines under [tolerances], or --fit fit.json.',
+        )
+    if answer.left_out:
+        yield (
+            "Left out",
+            f"{len(answer.left_out)} errors of geometry do not count: they do where the legs of a machine as built "
+            "close without being bent, and its springs are the same at all poses.",
+        )
+
+
+def _measured_tables(answer: "MeasuredComparison", _full: bool) -> Iterator[FittedTable]:
+    yield measured_table(answer)
+
+
+def measured_figure(answer: "MeasuredComparison", title: str = "{}: measured and computed stiffness") -> "Figure":
+    """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
+    differences = np.array([row.error / row.u_val for row in answer.rows])
+    order = np.sort(np.argsort(-np.abs(differences), kind="stable")[:MOST_BARS_OF_ENTRIES])
+    rows = [answer.rows[n] for n in order]
+    with figures.new_figure(
+        (6.4, 1.9 + 0.2 * len(rows)),
+        title.format(answer.machine.name),
+        setting_of(answer.machine),
+        "grey: explained by uncertainties",
+    ) as figure:
+        left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+        _draw_differences(left, rows, differences[order], float(np.abs(differences).max()))
+        _draw_variances(right, rows)
+        for panel in (left, right):
+            panel.grid(visible=False, axis="y")
+            panel.tick_params(axis="y", length=0)
+        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
+    return figure
+
+
+def _draw_differences(panel: "Axes", rows: Sequence["MeasuredRow"], differences: Array, greatest: float) -> None:
+    """Draw a bar for each row with its difference in standard uncertainties, over the band that these explain."""
+    panel.axvspan(-measured_stiffness.COVERAGE_FACTOR, measured_stiffness.COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
+    panel.axvline(0.0, color="black", linewidth=0.6)
+    colours = [figures.COLOURS[0] if row.explained else figures.COLOURS[1] for row in rows]
+    panel.barh(np.arange(len(rows)), differences, 0.6, color=colours)
+    panel.set(xlabel="computed less measured (standard uncertainties)")
+    reach = 1.1 * max(greatest, 1.5 * measured_stiffness.COVERAGE_FACTOR)
+    panel.set_xlim(-reach, reach)
+    panel.set_yticks(np.arange(len(rows)), [f"{row.entry.name} (line {row.entry.line})" for row in rows])
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+
+
+def _draw_variances(panel: "Axes", rows: Sequence["MeasuredRow"]) -> None:
+    """Draw the shares of computation, numbers and measurement in the variance of each row, one behind the other."""
+    start = np.zeros(len(rows))
+    parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
+    shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
+    for share, colour, words in zip(shares.T, figures.COLOURS[2:], SOURCE_WORDS.values(), strict=False):
+        panel.barh(np.arange(len(rows)), share, 0.6, start, color=colour, label=words)
+        start = start + share
+    panel.set(xlabel="share of the variance (%)", xlim=(0, 100))
+
+
+def measured_figures(answer: "MeasuredComparison") -> dict[str, Drawing]:
+    """Return the comparison with a measured stiffness as the one figure that it has."""
+    caption = "Differences of computed and measured numbers over their uncertainty, and what the variance is made of."
+    return {"measured": Drawing(caption, partial(measured_figure, answer))}
+
+
+ENTRY = (
+    Field("name", "entry.name"),
+    Field("line", "entry.line"),
+    Field("unit", "entry.unit"),
+    Field("measured", "entry.value"),
+    Field("predicted"),
+    Field("error"),
+    Field("u_num"),
+    Field("u_input"),
+    Field("u_data"),
+    Field("u_val"),
+    Field("explained"),
+    Field("model_error_between", "bounds"),
+)
+
+MEASURED_STIFFNESS = Description(
+    title="Measured stiffness",
+    fields=(
+        Field("machine", "machine.name"),
+        Field("data", "path"),
+        Field("verdict", "message"),
+        Field("agrees"),
+        Field("chi_square"),
+        Field("probability"),
+        Field("coverage_factor", lambda _answer: measured_stiffness.COVERAGE_FACTOR),
+        Field("uncertainty_from", "source"),
+        Field("left_out"),
+        Field("shares"),
+        Records("entries", "entry", ENTRY, "rows", forms=("json",)),
+    ),
+    lines=_measured_lines,
+    tables=_measured_tables,
+    figures=measured_figures,
+    state=lambda answer: f"beside {answer.path}",
+    files={"measured.json": "json"},
 )

@@ -21,6 +21,7 @@ from kinetostat.views.answers import description_of
 from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
+from kinetostat.views.identification_figures import FIT_CAPTIONS
 from kinetostat.views.loaded import (
     SIGNS,
     bars_figure,
@@ -32,7 +33,6 @@ from kinetostat.views.loaded import (
     strut_table,
     tangent_table,
 )
-from kinetostat.views.measurement_figures import FIT_CAPTIONS
 from kinetostat.views.optimisation import (
     aims,
     bounds_table,

@@ -1,9 +1,8 @@
-"""Figures of what was measured: an identification with its residuals, and a measured beside a computed stiffness.
+"""Figures of an identification: residuals, correlations of what was found, and the places that were measured.
 
 Nothing is computed here.
 """
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -11,14 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.arrays import AnyArray, Array, Mask
-from kinetostat.machine.machine import setting_of
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
-from kinetostat.studies.measured_stiffness import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
 from kinetostat.units import motion_unit
 from kinetostat.views.figures import COLOURS, new_figure, slim_bar
-from kinetostat.views.lettering import width_of
-from kinetostat.views.measured import SOURCE_WORDS
+from kinetostat.views.layout import width_of
 from kinetostat.views.question import Drawing
 
 MOST_PATHS = 60
@@ -128,58 +124,3 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
-
-
-MOST_BARS_OF_ENTRIES = 60
-"""Greatest number of measured entries that have bars; of more, those with the largest differences."""
-
-
-def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and computed stiffness") -> Figure:
-    """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
-    differences = np.array([row.error / row.u_val for row in answer.rows])
-    order = np.sort(np.argsort(-np.abs(differences), kind="stable")[:MOST_BARS_OF_ENTRIES])
-    rows = [answer.rows[n] for n in order]
-    with new_figure(
-        (6.4, 1.9 + 0.2 * len(rows)),
-        title.format(answer.machine.name),
-        setting_of(answer.machine),
-        "grey: explained by uncertainties",
-    ) as figure:
-        left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-        _draw_differences(left, rows, differences[order], float(np.abs(differences).max()))
-        _draw_variances(right, rows)
-        for panel in (left, right):
-            panel.grid(visible=False, axis="y")
-            panel.tick_params(axis="y", length=0)
-        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
-    return figure
-
-
-def _draw_differences(panel: Axes, rows: Sequence[MeasuredRow], differences: Array, greatest: float) -> None:
-    """Draw a bar for each row with its difference in standard uncertainties, over the band that these explain."""
-    panel.axvspan(-COVERAGE_FACTOR, COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
-    panel.axvline(0.0, color="black", linewidth=0.6)
-    colours = [COLOURS[0] if row.explained else COLOURS[1] for row in rows]
-    panel.barh(np.arange(len(rows)), differences, 0.6, color=colours)
-    panel.set(xlabel="computed less measured (standard uncertainties)")
-    reach = 1.1 * max(greatest, 1.5 * COVERAGE_FACTOR)
-    panel.set_xlim(-reach, reach)
-    panel.set_yticks(np.arange(len(rows)), [f"{row.entry.name} (line {row.entry.line})" for row in rows])
-    panel.set_ylim(len(rows) - 0.4, -0.6)
-
-
-def _draw_variances(panel: Axes, rows: Sequence[MeasuredRow]) -> None:
-    """Draw the shares of computation, numbers and measurement in the variance of each row, one behind the other."""
-    start = np.zeros(len(rows))
-    parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
-    shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
-    for share, colour, words in zip(shares.T, COLOURS[2:], SOURCE_WORDS.values(), strict=False):
-        panel.barh(np.arange(len(rows)), share, 0.6, start, color=colour, label=words)
-        start = start + share
-    panel.set(xlabel="share of the variance (%)", xlim=(0, 100))
-
-
-def measured_figures(answer: MeasuredComparison) -> dict[str, Drawing]:
-    """Return the comparison with a measured stiffness as the one figure that it has."""
-    caption = "Differences of computed and measured numbers over their uncertainty, and what the variance is made of."
-    return {"measured": Drawing(caption, partial(measured_figure, answer))}

@@ -1,19 +1,20 @@
-"""Names in figures: characters that no font has are shown by number, and symbols stay mathematics."""
+"""Layout of figures: names and symbols in their texts, and methods of Matplotlib that are replaced for a while."""
 
 import warnings
 
+import pytest
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 
-from kinetostat.views import lettering
+from kinetostat.views import layout
 from kinetostat.views.figures import set_title
-from kinetostat.views.layout import fix_layout
+from kinetostat.views.layout import fix_layout, steady_ticks
 from kinetostat.views.sensitivity import coloured_table
 
 
 def test_a_character_without_a_font_is_shown_by_its_number(monkeypatch):
-    monkeypatch.setattr(lettering, "_known_characters", lambda: frozenset(map(ord, "abc µ")))
-    assert lettering.drawable("ab 機µ") == "ab [U+6A5F]µ"
+    monkeypatch.setattr(layout, "_known_characters", lambda: frozenset(map(ord, "abc µ")))
+    assert layout.drawable("ab 機µ") == "ab [U+6A5F]µ"
 
 
 def test_fonts_that_are_installed_are_used(monkeypatch):
@@ -21,11 +22,11 @@ def test_fonts_that_are_installed_are_used(monkeypatch):
         name = "Noto Sans CJK SC"
 
     monkeypatch.setattr(fontManager, "ttflist", [Entry()])
-    lettering.families.cache_clear()
+    layout.families.cache_clear()
     try:
-        assert lettering.families() == ("DejaVu Sans", "Noto Sans CJK SC")
+        assert layout.families() == ("DejaVu Sans", "Noto Sans CJK SC")
     finally:
-        lettering.families.cache_clear()
+        layout.families.cache_clear()
 
 
 def test_a_name_is_drawn_without_a_warning_and_symbols_stay_mathematics():
@@ -55,10 +56,30 @@ def test_a_name_with_dollar_signs_is_no_mathematics_in_a_legend_either():
 
 
 def test_names_beside_an_axis_are_drawn_as_they_are_and_fit(monkeypatch):
-    monkeypatch.setattr(lettering, "_known_characters", lambda: frozenset(range(128)))
+    monkeypatch.setattr(layout, "_known_characters", lambda: frozenset(range(128)))
     names = ["leg $a$ 1", "脚 of leg " + 40 * "m"]
     figure = coloured_table(("title", "setting"), {name: [1.0] for name in names}, ["x"], "RdBu_r", "percent")
     labels = figure.axes[0].get_yticklabels()
     assert [label.get_text() for label in labels] == [names[0], names[1].replace("脚", "[U+811A]")]
     assert not labels[0].get_parse_math()
     assert all(label.get_window_extent().x0 >= 0.0 for label in labels)
+
+
+def test_numbers_stay_steady_until_the_outermost_context_ends():
+    panel = Figure().subplots()
+    own_methods = [{*vars(axis)} for axis in (panel.xaxis, panel.yaxis)]
+    with steady_ticks([panel]):
+        steady = [{*vars(axis)} for axis in (panel.xaxis, panel.yaxis)]
+        with steady_ticks([panel]):
+            pass
+        assert [{*vars(axis)} for axis in (panel.xaxis, panel.yaxis)] == steady != own_methods
+    assert [{*vars(axis)} for axis in (panel.xaxis, panel.yaxis)] == own_methods
+
+
+def test_a_layout_that_fails_leaves_the_panels_as_they_were(monkeypatch):
+    figure = Figure(layout="constrained")
+    panel = figure.subplots()
+    monkeypatch.setattr(figure.get_layout_engine(), "execute", lambda _figure: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        fix_layout(figure)
+    assert "get_tightbbox" not in vars(panel)
