@@ -111,7 +111,7 @@ def test_poses_to_measure_next_are_a_file_that_other_commands_read(tmp_path):
     machine = load_without_limits("hexapod")
     model, poses = posed(machine, 30)
     answer = identification_of(model, measured(model, poses, 0.0 * truth_of(model)), more=3)
-    (tmp_path / "next.csv").write_text(as_csv(answer.next))
+    (tmp_path / "next.csv").write_text(as_csv(answer.machine, answer.next))
     read = given_poses(machine, tmp_path / "next.csv")
     for field, values in zip(read.fields, read.values, strict=True):
         assert values == pytest.approx(answer.next.poses[f"pose.{field.shown}"], rel=1e-8)

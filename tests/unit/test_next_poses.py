@@ -1,5 +1,7 @@
 """Where the next poses to measure are looked for: within the limits of the machine's file, or where it has been."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,9 @@ from kinetostat import load
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
+from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.studies.identification.identification import identification_of
-from kinetostat.studies.identification.next_poses import FARTHEST, RAY_STEPS, within_limits
+from kinetostat.studies.identification.next_poses import LONGEST_RAY, RAY_STEPS, unit_of, within_limits
 from machines import load_without_limits
 from synthetic_measurements import measured, posed, truth_of
 
@@ -57,10 +60,16 @@ def test_rays_end_at_the_strokes_of_slides():
     for path in paths:
         off = poses[path] - given[path]
         for farthest in (off.max(), -off.min()):
-            assert 0.35 - FARTHEST * length / RAY_STEPS < farthest <= 0.4
+            assert 0.35 - LONGEST_RAY * length / RAY_STEPS < farthest <= 0.4
 
 
 def test_nothing_is_drawn_where_nothing_is_limited_or_no_measured_pose_keeps_the_limits():
     rng, units = np.random.default_rng(0), {"pose.z": 1.0}
     assert within_limits(load_without_limits("hexapod"), {"pose.z": np.array([0.135])}, units, 10, rng) is None
     assert within_limits(load("hexapod"), {"pose.z": np.array([0.5])}, units, 10, rng) is None
+
+
+def test_the_unit_of_a_coordinate_follows_from_its_kind_whatever_its_name():
+    fields = {"lift": Field(Quantity("length", "height")), "swing": Field(Quantity("angle", "turn"))}
+    machine = SimpleNamespace(family=SimpleNamespace(every_table={"pose": made_table("Pose", fields)}))
+    assert [unit_of(machine, path) for path in ("pose.lift", "pose.swing")] == ["m", "rad"]

@@ -75,15 +75,15 @@ def _lines(answer: Identification) -> Lines:
         yield (
             "Next poses",
             f"They make the intervals shorter by a factor of {sharper} on average; as many poses at random by "
-            f"{random}. {answer.next.within} Candidates: {_ranges(answer.next, answer.machine.display)}.",
+            f"{random}. {answer.next.within} Candidates: {_ranges(answer.next, answer.machine)}.",
         )
 
 
-def _ranges(proposed: NextPoses, display: Display) -> str:
+def _ranges(proposed: NextPoses, machine: Machine) -> str:
     """Return the range of each coordinate among the candidates."""
     parts = []
     for path, ends in proposed.ranges.items():
-        scale = display.scale(unit_of(path))
+        scale = machine.display.scale(unit_of(machine, path))
         low, high = (number(end * scale.factor, digits=3) for end in ends)
         parts.append(f"{path.removeprefix('pose.')} {low} to {high} {scale.unit}")
     return ", ".join(parts)
@@ -107,7 +107,7 @@ def _tables(answer: Identification, _full: bool) -> Iterator[FittedTable]:
     if numbers is not None:
         yield _firmware_table(numbers)
     if answer.next is not None:
-        yield _pose_table(answer.next, answer.machine.display)
+        yield _pose_table(answer.next, answer.machine)
 
 
 def _residual_table(record: FitRecord, display: Display) -> FittedTable:
@@ -154,8 +154,8 @@ def _outlier_table(record: FitRecord) -> FittedTable:
     return table
 
 
-def _pose_table(proposed: NextPoses, display: Display) -> FittedTable:
-    scales = [display.scale(unit_of(path)) for path in proposed.poses]
+def _pose_table(proposed: NextPoses, machine: Machine) -> FittedTable:
+    scales = [machine.display.scale(unit_of(machine, path)) for path in proposed.poses]
     names = (path.removeprefix("pose.") for path in proposed.poses)
     heads = [scale.label(name) for scale, name in zip(scales, names, strict=True)]
     table = numeric_table("Poses to measure next", "pose", heads)
@@ -215,7 +215,7 @@ def _fit_file(answer: Identification) -> dict[str, Any]:
 
 
 def _next_file(answer: Identification) -> str | None:
-    return None if answer.next is None else as_csv(answer.next)
+    return None if answer.next is None else as_csv(answer.machine, answer.next)
 
 
 IDENTIFICATION = Description(

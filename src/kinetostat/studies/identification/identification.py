@@ -281,7 +281,7 @@ def _enough(machine: Machine, seen: Observation, sizes: Array, priors: int) -> N
     each = max(data.count / max(len(data), 1), 1.0)
     needed = int(np.ceil(unknowns / each))
     poses = first_poses(machine, seen, sizes, min(needed - len(data), MOST_NAMED_POSES))
-    scales = [machine.display.scale(unit_of(path)) for path in poses]
+    scales = [machine.display.scale(unit_of(machine, path)) for path in poses]
     heads = ", ".join(scale.label(path.removeprefix("pose.")) for scale, path in zip(scales, poses, strict=True))
     rows = np.column_stack([scale.factor * values for scale, values in zip(scales, poses.values(), strict=True)])
     named = "; ".join(", ".join(number(value, digits=3) for value in row) for row in rows.tolist())

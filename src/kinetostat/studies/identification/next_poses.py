@@ -9,7 +9,7 @@ in the range of what was measured.
 Source: theory (67) and (68).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,16 +22,33 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, find_field
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.measurements import Measurements
 from kinetostat.studies.identification.observation import Observation, observation
+from kinetostat.units import KINDS
 
 CANDIDATES = 400
+"""Random poses from which some are chosen: twice as many shorten the intervals of a hexapod by 6 % more, and take
+another half a second."""
 MOST_PROPOSED = 100
-EXCHANGES = 5
-"""Rounds of exchanges at most."""
+"""Greatest number of poses to propose: they take two seconds, and a quarter of the candidates is still a choice."""
+MOST_EXCHANGES = 5
+"""Greatest number of rounds of exchanges; the second one changes nothing as a rule."""
+LEAST_INFORMATION = 1e-9
+"""Information along every combination, as a share of all that is known: a determinant needs some of it in each, and up
+to here it does not change the choice."""
 LEAST_SPAN = 0.1
-"""Least span of first poses on either side of the measured ones: a tenth of the machine's length, or 0.1 rad."""
+"""Least span of first poses on either side of the measured ones: a tenth of the machine's length, or 0.1 rad. All
+poses that were measured may be the same in some coordinate."""
+LONGEST_RAY = 1.5
+"""End of a ray: in lengths of the machine or rad while it is not known how far each coordinate goes, then in multiples
+of what is; the corner of a box lies beyond the middles of its faces."""
+RAY_STEPS = 48
+"""Places of a ray at which limits are compared: half as many would give away 2 % of the gain of a hexapod."""
+SINGULAR_SHARE = 0.1
+"""Share of the singularity margin at the start that must be left all along a ray, so that no step passes over a
+singularity."""
 
 WITHIN_LIMITS = "They were chosen within the [limits] of the machine's file."
 WITHOUT_LIMITS = (
@@ -41,16 +58,9 @@ WITHOUT_LIMITS = (
 BEYOND_LIMITS = (
     "No measured pose keeps the [limits] of the machine's file: they were chosen in the range of the measured poses."
 )
-FARTHEST, RAY_STEPS = 1.5, 48
-"""End of a ray, in lengths of the machine or rad, then in reaches of all coordinates; and how many places of a ray are
-looked at."""
-SINGULAR_SHARE = 0.1
-"""Share of the singularity margin at the start that must be left all along a ray, so that no step passes over a
-singularity."""
 
 Poses = Mapping[str, Array]
-LEAST_INFORMATION = 1e-9
-"""Information along every combination, as a share of all that is known: a determinant needs some of it in each."""
+"""Coordinates of poses by leaf path, SI [poses each]."""
 
 
 @dataclass(frozen=True)
@@ -58,183 +68,200 @@ class NextPoses:
     """Poses that should be measured next.
 
     Attributes:
-        poses: coordinates by leaf path, SI [k].
+        poses: their coordinates by leaf path, SI [k each].
         sharper: by which factor they make the intervals of the unknowns shorter, as a geometric mean.
-        random: the factor of as many poses at random.
+        random: the same factor for as many candidates at random.
         ranges: least and greatest value of each coordinate among the candidates, SI.
-        within: where they were looked for, a sentence.
+        within: a sentence on where candidates were looked for.
     """
 
-    poses: Mapping[str, Array]
+    poses: Poses
     sharper: float
     random: float
     ranges: Mapping[str, tuple[float, float]]
     within: str
 
 
-def next_poses(machine: Machine, seen: Observation, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
+def next_poses(machine: Machine, observed: Observation, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
     """Choose poses among candidates; None where too few of these can be placed.
 
     Args:
-        machine: that is measured.
-        seen: its measurements beside the model.
-        fit: to them.
+        machine: the machine that is measured.
+        observed: its measurements beside the model.
+        fit: the fit to them.
         sizes: plausible size of each unknown, SI [unknowns].
         count: how many poses are wanted.
     """
-    spans = {path: (float(values.min()), float(values.max())) for path, values in seen.data.pose.items()}
     rng = np.random.default_rng(0)
-    there, within = _candidates(machine, seen, spans, rng)
-    rows = len(there.data)
-    if rows < count:
+    candidates, area = _candidates(machine, observed, _ranges(observed.data.pose), rng)
+    if len(candidates.data) < count:
         return None
-    _, rates = there.linearisation(fit.values)
-    basis = fit.combinations[:, : fit.rank]
-    blocks = (rates * sizes @ basis).reshape(rows, -1, fit.rank)
-    start = np.diag(fit.strengths[: fit.rank] ** 2)
-    chosen = chosen_poses(blocks, start, count)
-    gain, usual = (_gain(blocks[which], start) for which in (chosen, rng.permutation(rows)[:count]))
-    poses = {path: values[chosen] for path, values in there.data.pose.items()}
-    ranges = {path: (float(values.min()), float(values.max())) for path, values in there.data.pose.items()}
-    return NextPoses(poses, gain, usual, ranges, within)
+    _, rates = candidates.linearisation(fit.values)
+    seen_combinations = fit.combinations[:, : fit.rank]
+    blocks = (rates * sizes @ seen_combinations).reshape(len(candidates.data), -1, fit.rank)
+    information = np.diag(fit.strengths[: fit.rank] ** 2)
+    chosen = chosen_poses(blocks, information, count)
+    random_poses = rng.permutation(len(blocks))[:count]
+    return NextPoses(
+        poses=_selection(candidates, chosen),
+        sharper=_gain(blocks[chosen], information),
+        random=_gain(blocks[random_poses], information),
+        ranges=_ranges(candidates.data.pose),
+        within=area,
+    )
 
 
-def first_poses(machine: Machine, seen: Observation, sizes: Array, count: int) -> Mapping[str, Array]:
-    """Choose poses to add where there are too few for a fit: within limits, or about those that are there.
+def first_poses(machine: Machine, observed: Observation, sizes: Array, count: int) -> Poses:
+    """Choose poses to add where there are too few for a fit: within limits, or about the measured ones.
 
     Args:
-        machine: that is measured.
-        seen: its few measurements beside the model.
+        machine: the machine that is measured.
+        observed: its few measurements beside the model.
         sizes: plausible size of each unknown, SI [unknowns].
-        count: how many poses are wanted.
-
-    Returns:
-        Coordinates by leaf path, SI [count at most].
+        count: how many poses are wanted; fewer are chosen where fewer candidates can be placed.
     """
     spans = {}
-    for path, values in seen.data.pose.items():
-        least = LEAST_SPAN * (seen.model.length if unit_of(path) == "m" else 1.0)
-        middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
-        spans[path] = (middle - max(half, least), middle + max(half, least))
-    there, _ = _candidates(machine, seen, spans, np.random.default_rng(0))
-    _, known = seen.linearisation(np.zeros(len(sizes)))
-    _, rates = there.linearisation(np.zeros(len(sizes)))
-    blocks = (rates * sizes).reshape(len(there.data), -1, len(sizes))
-    start = (known * sizes).T @ (known * sizes)
-    chosen = chosen_poses(blocks, start, min(count, len(blocks)))
-    return {path: values[chosen] for path, values in there.data.pose.items()}
+    for path, (low, high) in _ranges(observed.data.pose).items():
+        middle, half = 0.5 * (high + low), 0.5 * (high - low)
+        half = max(half, LEAST_SPAN * _scale(machine, path, observed.model.length))
+        spans[path] = (middle - half, middle + half)
+    candidates, _ = _candidates(machine, observed, spans, np.random.default_rng(0))
+    drawn = np.zeros(len(sizes))
+    _, measured_rates = observed.linearisation(drawn)
+    _, rates = candidates.linearisation(drawn)
+    blocks = (rates * sizes).reshape(len(candidates.data), -1, len(sizes))
+    information = (measured_rates * sizes).T @ (measured_rates * sizes)
+    return _selection(candidates, chosen_poses(blocks, information, min(count, len(blocks))))
 
 
-def as_csv(proposed: NextPoses) -> str:
+def as_csv(machine: Machine, proposed: NextPoses) -> str:
     """The poses as CSV, a row each, as `kinetostat path` and `kinetostat command` read them: "x [m]", "roll [rad]"."""
-    heads = [f"{path.removeprefix('pose.')} [{unit_of(path)}]" for path in proposed.poses]
+    heads = [f"{path.removeprefix(POSE)} [{unit_of(machine, path)}]" for path in proposed.poses]
     rows = zip(*(values.tolist() for values in proposed.poses.values()), strict=True)
     lines = [",".join(heads), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
-def unit_of(path: str) -> str:
-    """The SI unit of a coordinate of the pose."""
-    return "m" if path.removeprefix("pose.") in ("x", "y", "z", "length") else "rad"
+def unit_of(machine: Machine, path: str) -> str:
+    """The SI unit of a coordinate of the pose, by its path."""
+    return KINDS[find_field(machine.family, path).quantity.kind].unit
+
+
+def _scale(machine: Machine, path: str, length: float) -> float:
+    """The size with which a coordinate of the pose is compared: the machine's length, m, or 1 rad."""
+    return length if unit_of(machine, path) == "m" else 1.0
+
+
+def _ranges(poses: Poses) -> dict[str, tuple[float, float]]:
+    return {path: (float(values.min()), float(values.max())) for path, values in poses.items()}
+
+
+def _selection(candidates: Observation, numbers: Sequence[int]) -> Poses:
+    return {path: values[list(numbers)] for path, values in candidates.data.pose.items()}
 
 
 def _candidates(
-    machine: Machine, seen: Observation, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
+    machine: Machine, observed: Observation, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
 ) -> tuple[Observation, str]:
-    """Poses at random that the machine reaches, as if the same had been measured there, and a sentence about them.
+    """Random poses that the machine reaches, as if the same had been measured there, and a sentence on where they are.
 
-    They keep the limits of its file; without any they lie within spans.
+    They keep the limits of its file; where that sets none, or no measured pose keeps them, they lie within spans.
     """
-    units = {path: seen.model.length if unit_of(path) == "m" else 1.0 for path in spans}
-    poses = within_limits(machine, seen.data.pose, units, CANDIDATES, rng)
-    within = WITHIN_LIMITS
+    scales = {path: _scale(machine, path, observed.model.length) for path in spans}
+    poses = within_limits(machine, observed.data.pose, scales, CANDIDATES, rng)
+    area, allowed = WITHIN_LIMITS, (Status.OK,)
     if poses is None:
         poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
-        within = BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS
-    whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
-    rows = np.flatnonzero(np.isin(whole.drawn.status, REGULAR if within != WITHIN_LIMITS else Status.OK))
-    poses = {path: values[rows] for path, values in poses.items()}
-    there = observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
-    return replace(there, error_mix=seen.error_mix), within
+        area, allowed = (BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS), REGULAR
+    model = error_model(machine, poses, CANDIDATES, np.zeros(6))
+    placed = np.flatnonzero(np.isin(model.drawn.status, allowed))
+    poses = {path: values[placed] for path, values in poses.items()}
+    data = _alike(observed.data, poses, len(placed))
+    candidates = observation(model.at_poses(placed), data, observed.unknowns, observed.frame)
+    return replace(candidates, error_mix=observed.error_mix), area
 
 
-def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:
-    """Measurements of the same sort at other poses; what they say does not count."""
-    typical = {name: np.full(count, float(np.median(sigma))) for name, sigma in data.sigma.items()}
+def _alike(data: Measurements, pose: Poses, count: int) -> Measurements:
+    """Measurements of the same quantities at other poses, with typical deviations, load and origin; values are zero."""
     loads = data.wrenches[np.flatnonzero(data.wrenches.any(axis=1))[:1]]
-    wrench = np.broadcast_to(loads[0] if len(loads) else np.zeros(6), (count, 6))
-    origins = np.broadcast_to(np.nan_to_num(np.nanmedian(np.nan_to_num(data.origins), axis=0)), (count, 3))
-    values = {name: np.zeros(count) for name in data.values}
-    return Measurements(data.path, tuple(range(count)), pose, values, typical, wrench, origins, data.known)
+    origin = np.nan_to_num(np.nanmedian(np.nan_to_num(data.origins), axis=0))
+    return replace(
+        data,
+        lines=tuple(range(count)),
+        pose=pose,
+        values={name: np.zeros(count) for name in data.values},
+        sigma={name: np.full(count, float(np.median(sigma))) for name, sigma in data.sigma.items()},
+        wrenches=np.broadcast_to(loads[0] if len(loads) else np.zeros(6), (count, 6)),
+        origins=np.broadcast_to(origin, (count, 3)),
+    )
 
 
-def chosen_poses(blocks: Array, start: Array, count: int) -> list[int]:
+def chosen_poses(blocks: Array, measured_information: Array, count: int) -> list[int]:
     """Choose poses whose information has the greatest determinant together with what is known, theory (67).
 
     Args:
         blocks: rates of the values measured at each pose, in standard deviations [poses x values x unknowns].
-        start: the information so far [unknowns x unknowns].
-        count: how many.
+        measured_information: the information of what was measured [unknowns x unknowns].
+        count: how many poses are wanted.
     """
+    least = LEAST_INFORMATION * max(float(np.trace(measured_information)), 1.0)
+    information = measured_information + np.eye(len(measured_information)) * least
     chosen: list[int] = []
-    information = start + np.eye(len(start)) * LEAST_INFORMATION * max(float(np.trace(start)), 1.0)
     for _ in range(count):
         best = int(np.argmax(_growth(blocks, information, chosen)))
         chosen.append(best)
         information = information + blocks[best].T @ blocks[best]
-    for _ in range(EXCHANGES):
-        changed = False
+    for _ in range(MOST_EXCHANGES):
+        before = list(chosen)
         for place in range(count):
-            rest = information - blocks[chosen[place]].T @ blocks[chosen[place]]
-            others = [number for n, number in enumerate(chosen) if n != place]
-            best = int(np.argmax(_growth(blocks, rest, others)))
-            changed = changed or best != chosen[place]
-            chosen[place] = best
-            information = rest + blocks[best].T @ blocks[best]
-        if not changed:
+            others = [*chosen[:place], *chosen[place + 1 :]]
+            of_others = information - blocks[chosen[place]].T @ blocks[chosen[place]]
+            chosen[place] = best = int(np.argmax(_growth(blocks, of_others, others)))
+            information = of_others + blocks[best].T @ blocks[best]
+        if chosen == before:
             break
     return chosen
 
 
-def _growth(blocks: Array, information: Array, taken: list[int]) -> Array:
-    """By how much each pose makes the logarithm of the determinant grow [poses]; nothing of those that are taken."""
+def _growth(blocks: Array, information: Array, chosen: list[int]) -> Array:
+    """Growth of the logarithm of the determinant by each pose [poses]; minus infinity for those that are chosen."""
     spread = blocks @ np.linalg.solve(information, np.swapaxes(blocks, 1, 2))
     growth = np.linalg.slogdet(np.eye(blocks.shape[1]) + spread)[1]
-    growth[taken] = -np.inf
+    growth[chosen] = -np.inf
     return np.asarray(growth)
 
 
-def _gain(blocks: Array, start: Array) -> float:
+def _gain(blocks: Array, information: Array) -> float:
     """The factor by which intervals become shorter, as a geometric mean, theory (68)."""
-    flat = blocks.reshape(-1, blocks.shape[2])
-    before, after = (float(np.linalg.slogdet(information)[1]) for information in (start, start + flat.T @ flat))
-    return float(np.exp((after - before) / (2.0 * len(start))))
+    rows = blocks.reshape(-1, blocks.shape[2])
+    before, after = (float(np.linalg.slogdet(each)[1]) for each in (information, information + rows.T @ rows))
+    return float(np.exp((after - before) / (2.0 * len(information))))
 
 
 def within_limits(
-    machine: Machine, measured: Poses, units: Mapping[str, float], count: int, rng: np.random.Generator
+    machine: Machine, measured: Poses, scales: Mapping[str, float], count: int, rng: np.random.Generator
 ) -> Poses | None:
-    """Draw poses within the limits of a machine's file, those coordinates alone that measurements vary.
+    """Draw poses within the limits of a machine's file; only coordinates that measurements vary differ.
 
     Args:
-        machine: with its limits.
-        measured: poses at which it has been, by leaf path, SI.
-        units: of each of their coordinates: the machine's length, m, or 1 rad.
+        machine: the machine with its limits.
+        measured: poses at which it has been.
+        scales: the size of each of their coordinates: the machine's length, m, or 1 rad.
         count: how many poses are wanted.
-        rng: draws them.
+        rng: the source of random numbers.
 
     Returns:
-        Coordinates by leaf path, SI [count]; None if the file sets no limits or no measured pose keeps them.
+        The poses [count each]; None if the file sets no limits or no measured pose keeps them.
     """
     if not limits_set(machine.tables["limits"]):
         return None
-    paths, scale = list(measured), np.array([units[path] for path in measured])
+    paths, scale = list(measured), np.array([scales[path] for path in measured])
     places = np.stack([measured[path] for path in paths], axis=1)
     margins = _margins(machine, paths, places)
     if not (margins > 0.0).any():
         return None
-    off = np.abs((places - places.mean(axis=0)) / scale).max(axis=1)
-    middle = int(np.argmin(np.where(margins > 0.0, off, np.inf)))
+    distance_from_mean = np.abs((places - places.mean(axis=0)) / scale).max(axis=1)
+    middle = int(np.argmin(np.where(margins > 0.0, distance_from_mean, np.inf)))
     start, least = places[middle], SINGULAR_SHARE * float(margins[middle])
     axes = np.concatenate([np.diag(scale), -np.diag(scale)])
     reach = _reach(machine, paths, start, axes, least).reshape(2, -1).max(axis=0) * scale
@@ -246,12 +273,12 @@ def within_limits(
 
 
 def _reach(machine: Machine, paths: list[str], start: Array, rays: Array, least: float) -> Array:
-    """Reach of rays [rays x coordinates] from a pose before they end: factors of their length [rays]."""
-    steps = np.linspace(0.0, FARTHEST, RAY_STEPS + 1)[1:]
-    places = start + steps[:, None, None] * rays
-    kept = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least
-    ended = np.where(kept.all(axis=0), RAY_STEPS, np.argmin(kept, axis=0))
-    return np.asarray(np.concatenate([[0.0], steps])[ended])
+    """The factor of each ray [rays x coordinates] up to which the margin along it stays above the least one [rays]."""
+    factors = np.linspace(0.0, LONGEST_RAY, RAY_STEPS + 1)
+    places = start + factors[1:, None, None] * rays
+    passes = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least
+    steps_passed = np.where(passes.all(axis=0), RAY_STEPS, np.argmin(passes, axis=0))
+    return np.asarray(factors[steps_passed])
 
 
 def _margins(machine: Machine, paths: list[str], places: Array) -> Array:
