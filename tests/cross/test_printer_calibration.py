@@ -12,7 +12,7 @@ from kinetostat import build, identify, load
 from kinetostat.accuracy.model import error_model
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.identification.fit import Wishes, best_fit
+from kinetostat.studies.identification.fit import FitOptions, best_fit
 from kinetostat.studies.identification.fitted_values import firmware_numbers, klipper_text, marlin_text, reprap_text
 from kinetostat.studies.identification.identification import PREFERENCE, _sizes_by_name, identification_of
 from kinetostat.studies.identification.measurements import Sigmas, read_measurements
@@ -107,11 +107,11 @@ class Linear:
 
 
 def repeated(machine, folder, what, known, draw):
-    """A fit to ten heights, and the wishes with which it is repeated for other printers."""
+    """A fit to ten heights, and the options with which it is repeated for other printers."""
     base = fit_of(machine, folder / "probes.csv", Truth(), what, known, draw)
     before = _sizes_by_name(base.unknowns, {"": {}, "priors": NARROW, "wide": WIDE}[what], "prior")
     weak = np.full(len(before), PREFERENCE)
-    return base, Wishes(base.sizes, before, np.full(len(before), np.inf), weak, False, known)
+    return base, FitOptions(base.sizes, before, np.full(len(before), np.inf), weak, False, known)
 
 
 def true_values(base, truth):
@@ -124,13 +124,13 @@ def true_values(base, truth):
 def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(machine, tmp_path, what, known):
     """In 95 % of 200 repetitions with other errors and noise, and to a tenth, whatever priors say and use up."""
     draw, sigma = np.random.default_rng(3), NOISE if known else 1e-5
-    base, wishes = repeated(machine, tmp_path, what, known, draw)
+    base, options = repeated(machine, tmp_path, what, known, draw)
     rates = base.observed.linearisation(np.zeros(len(base.unknowns)))[1]
     inside, ratios = [], []
     for _ in range(200):
         true = true_values(base, somewhere(draw, what == "wide"))
         noise = draw.normal(0.0, NOISE / sigma, len(PROBED))
-        fit = best_fit(Linear(rates, true, noise), base.observed.row_poses, wishes)
+        fit = best_fit(Linear(rates, true, noise), base.observed.row_poses, options)
         answer = replace(base, fit=fit)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
         inside += [abs(a - b) <= half for a, b, half in zip(fit.values, true, fit.half_intervals, strict=True)]
@@ -149,14 +149,14 @@ def test_truth_is_within_its_intervals_and_residuals_are_those_of_the_noise(mach
 def test_fourteen_numbers_of_exact_printers_leave_residuals_of_the_noise(machine, tmp_path, known):
     """200 printers with the kinematics of the tests: the nozzle is sent to the same ten places of the bed each time."""
     draw, sigma = np.random.default_rng(17), NOISE if known else 1e-5
-    base, wishes = repeated(machine, tmp_path, "wide", known, draw)
+    base, options = repeated(machine, tmp_path, "wide", known, draw)
     inside, ratios = [], []
     for _ in range(200):
         truth = somewhere(draw, wide=True)
         places = [np.array([x, y, height]) for (x, y), height in zip(PROBED, probed_heights(Truth()), strict=True)]
         heights = [reached(commanded(place), truth, place)[2] for place in places]
         observed = replace(base.observed, measured=np.array(heights) + draw.normal(0.0, NOISE, len(PROBED)))
-        fit = best_fit(observed, observed.row_poses, wishes)
+        fit = best_fit(observed, observed.row_poses, options)
         ratios.append((fit.scatter * sigma / NOISE) ** 2)
         inside += (np.abs(fit.values - true_values(base, truth)) <= fit.half_intervals).tolist()
     assert np.mean(inside) == pytest.approx(0.95, abs=0.025)
@@ -171,10 +171,10 @@ def test_freedoms_are_the_mean_sum_of_squares_over_machines_as_the_priors_say(va
     """
     draw, count = np.random.default_rng(4), 14
     rates, priors = draw.normal(size=(values, count)), np.exp(draw.normal(size=count))
-    wishes = Wishes(np.ones(count), priors, np.full(count, np.inf), np.full(count, 1e-6), robust=False)
+    options = FitOptions(np.ones(count), priors, np.full(count, np.inf), np.full(count, 1e-6), robust=False)
 
     def squares(truth, noise):
-        fit = best_fit(Linear(rates, truth, noise), np.arange(values), wishes)
+        fit = best_fit(Linear(rates, truth, noise), np.arange(values), options)
         return float(fit.after @ fit.after), fit.freedom
 
     axes = values + count

@@ -13,7 +13,7 @@ from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.numerics.motions import Motions, exponential
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.identification.fit import Wishes, best_fit
+from kinetostat.studies.identification.fit import FitOptions, best_fit
 from kinetostat.studies.identification.identification import identification_of, identify
 from kinetostat.studies.identification.measurements import POSITION, ROTATION, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
@@ -87,14 +87,14 @@ class Line:
 def test_what_is_not_seen_is_said_and_a_prior_or_a_bound_settles_it():
     line, groups, none = Line(np.zeros(4)), np.arange(4), np.full(2, np.inf)
     small = np.full(2, 1e-5)
-    open_end = best_fit(line, groups, Wishes(np.ones(2), none, none, small))
+    open_end = best_fit(line, groups, FitOptions(np.ones(2), none, none, small))
     assert open_end.rank == 1
     assert np.isinf(open_end.half_intervals).all()
     assert open_end.values == pytest.approx([0.2, 0.2], abs=1e-6)
-    known = best_fit(line, groups, Wishes(np.ones(2), np.array([np.inf, 0.01]), none, small))
+    known = best_fit(line, groups, FitOptions(np.ones(2), np.array([np.inf, 0.01]), none, small))
     assert known.rank == 2
     assert known.values == pytest.approx([0.4, 0.0], abs=1e-3)
-    bounded = best_fit(line, groups, Wishes(np.ones(2), none, np.array([0.05, 10.0]), small))
+    bounded = best_fit(line, groups, FitOptions(np.ones(2), none, np.array([0.05, 10.0]), small))
     assert bounded.values[0] <= 0.05 + 1e-9
     assert bounded.values.sum() == pytest.approx(0.4, abs=1e-6)
 

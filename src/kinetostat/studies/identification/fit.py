@@ -1,7 +1,7 @@
 """The most likely values of unknowns, how sure they are, and which measured values do not belong: theory (64) to (66).
 
-Unknowns are counted in plausible sizes, so that metres and radians compare. A preference for zero decides what no
-measurement sees. Derivatives are exact (`observation`); nothing here knows machines.
+Unknowns are counted in plausible sizes, so that metres and radians compare. A weak preference for zero decides what no
+measurement sees. Equations come with exact derivatives from `observation`; nothing here knows machines.
 
 Source: theory (64)-(66). Least squares by trust regions: `scipy.optimize.least_squares` (M. Branch, T. Coleman and
 Y. Li, 1999); deviation by the median: F. Hampel, 1974; a loss whose scale shrinks: A. Blake and A. Zisserman, *Visual
@@ -9,6 +9,7 @@ Reconstruction*, 1987.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -19,37 +20,38 @@ from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED, LEAST_DIVISOR
 
 Tell = Callable[[int, int, str], None]
+"""Receives how far a fit is: rounds done, rounds at most, and a few words."""
 
 OUTLYING = 4.0
 """Standard deviations from which a value counts as an outlier: one of 16 000 good ones does."""
-MEDIAN = 1.4826
+DEVIATION_OVER_MEDIAN = 1.4826
 """Standard deviation of normal values over the median of their sizes."""
 MOST_ROUNDS = 20
-"""Number of fits at most in which the scale of residuals, outliers and unseen combinations settle: few need half."""
+"""Greatest number of rounds in which the scale of residuals, outliers and unseen combinations settle: few need half."""
 SAME_SPREAD = 0.1
 """Relative change of the spread of residuals below which it has settled."""
 UNSEEN = 1e-6
-"""Share of the best seen combination of unknowns below which one is not seen at all: round-off is 1e-9. One that is
-seen less than it is preferred to be zero counts as unseen too."""
+"""Strength of a combination, as a share of the strongest one, below which it is not seen: round-off is 1e-9."""
 SURELY = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
 UPPER_QUANTILE = 0.975
 """Probability below the upper end of a 95 % interval."""
 FOLDS = 5
-"""Parts of the poses, each of which is predicted from the others."""
+"""Parts of the poses, each of which is predicted from the others: with more, a part has few poses."""
 FULL_PREFERENCE = 50.0
-"""The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
-would go where the curvature of the equations explains some of the noise."""
+"""Factor on the weak preference for zero for combinations that are not seen: with the weak one alone they would go
+where the curvature of the equations explains some of the noise."""
 LEAST_WEIGHT = 1e-12
 """Weight of an unknown of which nothing is known before: without one, its rates would be divided by zero."""
 LEAST_SPREAD = 1e-9
 """Least spread that is tried, as a share of the residuals with all unknowns zero: no machine is measured so well."""
 TRIED_SPREADS = 400
-"""Standard deviations of measurements that are tried, by a constant factor; as many again between the best ones."""
+"""Spreads that are tried, by a constant factor, 5 % of each; as many again between the neighbours of the best one."""
 LEAST_FREEDOM = 0.5
-"""Freedom of residuals at least: measured values that explain themselves say nothing of their standard deviation."""
+"""Least degrees of freedom of residuals: where measured values determine as many unknowns as there are values, their
+residuals say nothing of their standard deviation."""
 MOST_FIT_STEPS = 500
-"""Steps of a fit at most: along a curved valley they are short."""
+"""Greatest number of steps of one least-squares fit: along a curved valley they are short."""
 
 
 class ResidualEquations(Protocol):
@@ -63,8 +65,8 @@ class ResidualEquations(Protocol):
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """Options of a fit.
+class FitOptions:
+    """What is known of unknowns and measurements before a fit, and whether outliers are set aside.
 
     Attributes:
         sizes: plausible size of each unknown, SI [unknowns].
@@ -74,7 +76,7 @@ class Wishes:
         preferred: weak preference of each unknown for zero, in standard deviations per plausible size. It decides about
             combinations that are hardly seen, and does not count as knowledge [unknowns].
         robust: whether outliers are set aside.
-        known: whether standard deviations of measurements are known.
+        known: whether standard deviations of measurements are known; if not, only their ratios count.
         resolution: residual, in standard deviations, up to which it may be round-off.
     """
 
@@ -87,9 +89,9 @@ class Wishes:
     resolution: float = 0.0
 
     @property
-    def judged(self) -> bool:
-        """Whether priors need no standard deviation of the measurements, which is known, or has nothing to weigh."""
-        return self.known or not np.isfinite(self.priors).any()
+    def estimates_spread(self) -> bool:
+        """Whether priors weigh against measurements of unknown standard deviation, which must then be estimated."""
+        return not self.known and bool(np.isfinite(self.priors).any())
 
 
 @former_names(sure="half_intervals", seen="strengths", ways="combinations")
@@ -98,22 +100,23 @@ class Fit:
     """The most likely values of unknowns.
 
     Attributes:
-        values: SI [unknowns].
-        covariance: SI [unknowns x unknowns], of what is seen.
-        half_intervals: half of the 95 % interval of each, SI, with what combinations that are not seen may add if they
-            are of a plausible size; infinity where it is seen only in such [unknowns].
-        kept: rows that are not outliers [rows].
+        values: the values, SI [unknowns].
+        covariance: their covariance by the combinations that are seen, SI [unknowns x unknowns].
+        half_intervals: half of the 95 % interval of each, SI, with what unseen combinations may add if they are of a
+            plausible size; infinity for an unknown that occurs in these alone [unknowns].
+        kept: flags of the rows that are not outliers [rows].
         before, after: residuals with all unknowns zero and with the values, in standard deviations [rows].
-        rates: how residuals fall per plausible size of each unknown, with the values [rows x unknowns].
+        rates: how residuals fall per plausible size of each unknown, at the values [rows x unknowns].
         scatter: standard deviation of the kept residuals over that expected.
         strengths: how strongly each combination is seen, standard deviations per plausible size; those that count as
             seen come first [unknowns].
         combinations: these combinations as columns, in plausible sizes [unknowns x unknowns].
-        rank: how many are seen.
-        interval: covariance of what is seen, widened to squares of halves of 95 % intervals, SI [unknowns x unknowns]:
-            by Student's factor for what measurements say whose standard deviation is estimated, not for priors.
-        freedom: of the kept residuals: their number, less what the measured values, not the priors, use up.
-        predicted: residuals of poses that took no part, in standard deviations [rows].
+        rank: number of combinations that are seen.
+        interval: the covariance widened to squares of halves of 95 % intervals, SI [unknowns x unknowns]. Student's
+            factor widens what measurements say whose standard deviation is estimated; it does not widen priors.
+        freedom: degrees of freedom of the kept residuals: their number less the number of unknowns that the measured
+            values, not the priors, determine.
+        predicted: residuals of each pose as predicted from others, in standard deviations [rows].
     """
 
     values: Array
@@ -146,114 +149,134 @@ class Fit:
         return self.combinations[:, self.rank :]
 
 
-def best_fit(question: ResidualEquations, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
+def best_fit(equations: ResidualEquations, groups: Integers, options: FitOptions, tell: Tell = lambda *_: None) -> Fit:
     """Find the most likely values of unknowns, theory (64).
 
-    Each fit is one of least squares by trust regions: a step is taken only where the residuals fall by about as much as
-    the rates foretell. Where outliers are set aside, Cauchy's loss comes first, with a scale that follows the spread of
-    the residuals down: values that do not belong then do not hold the fit where they happen to be small.
+    Each round is a fit of least squares by trust regions: a step is taken only where the residuals fall by about as
+    much as the rates foretell. Where outliers are set aside, Cauchy's loss comes first, with a scale that follows the
+    spread of the residuals down: values that do not belong then do not hold the fit where they happen to be small.
 
     Args:
-        question: the residuals.
-        groups: to which pose each row belongs; poses are left out together [rows].
-        wishes: priors, bounds, and what to do with outliers.
-        tell: receives how far the work is: rounds done, rounds at most, and a few words.
+        equations: the residuals.
+        groups: number of the pose to which each row belongs; rows of a pose are left out together [rows].
+        options: priors, bounds, and what to do with outliers.
+        tell: receives how far the work is.
     """
-    values = np.zeros(len(wishes.sizes))
-    before, rates = _rates_at(question, values, wishes)
-    kept, after, spread = np.ones(len(before), dtype=bool), before, _spread(before, rates, wishes)
-    for squares in (False, True) if wishes.robust else (True,):
-        settled, rank = False, 0
-        for turn in range(MOST_ROUNDS):
-            if squares and wishes.robust:
-                inside = np.abs(after) < OUTLYING * spread
-                settled, kept = settled and bool((inside == kept).all()), inside
-            seen = _combinations(rates[kept], wishes, spread)
-            if settled and seen.rank == rank:
-                break
-            tell(turn, MOST_ROUNDS, f"{int((~kept).sum())} outliers")
-            values = _least_squares(question, wishes, kept, values, seen, np.inf if squares else spread)
-            after, rates = _rates_at(question, values, wishes)
-            last, rank = spread, seen.rank
-            spread = (
-                _spread(after, rates, wishes)
-                if wishes.judged
-                else _own_spread(after[kept], rates[kept], values, wishes)
-            )
-            settled = abs(spread - last) <= SAME_SPREAD * last
-    return _fit_result(before, after, rates, kept, values, groups, wishes)
+    values = np.zeros(len(options.sizes))
+    before, rates = _rates_at(equations, values, options)
+    state = _Iterate(values, before, rates, np.ones(len(before), dtype=bool), _median_spread(before, rates, options))
+    for with_loss in (True, False) if options.robust else (False,):
+        state = _settle(equations, options, state, with_loss, tell)
+    return _fit_result(before, state, groups, options)
 
 
-def _rates_at(question: ResidualEquations, values: Array, wishes: Wishes) -> tuple[Array, Array]:
+@dataclass(frozen=True)
+class _Iterate:
+    """A fit between two rounds.
+
+    Attributes:
+        values: values of the unknowns, SI [unknowns].
+        after: residuals with them, in standard deviations [rows].
+        rates: how these fall per plausible size of each unknown [rows x unknowns].
+        kept: flags of the rows that are not outliers [rows].
+        spread: standard deviation of the residuals, in those that they are counted in.
+    """
+
+    values: Array
+    after: Array
+    rates: Array
+    kept: Mask
+    spread: float
+
+
+def _settle(
+    equations: ResidualEquations, options: FitOptions, state: _Iterate, with_loss: bool, tell: Tell
+) -> _Iterate:
+    """Repeat a fit until the spread of the residuals, the outliers and the combinations that are seen stay the same.
+
+    With Cauchy's loss all rows are kept; without it, outliers are set aside before each round if the options say so.
+    """
+    settled, rank = False, 0
+    for number in range(MOST_ROUNDS):
+        if options.robust and not with_loss:
+            kept = np.abs(state.after) < OUTLYING * state.spread
+            settled = settled and bool((kept == state.kept).all())
+            state = replace(state, kept=kept)
+        seen = _combinations(state.rates[state.kept], options, state.spread)
+        if settled and seen.rank == rank:
+            break
+        tell(number, MOST_ROUNDS, f"{int((~state.kept).sum())} outliers")
+        values = _least_squares(equations, options, state, seen, with_loss)
+        after, rates = _rates_at(equations, values, options)
+        if options.estimates_spread:
+            spread = _likeliest_spread(after[state.kept], rates[state.kept], values, options)
+        else:
+            spread = _median_spread(after, rates, options)
+        settled, rank = abs(spread - state.spread) <= SAME_SPREAD * state.spread, seen.rank
+        state = _Iterate(values, after, rates, state.kept, spread)
+    return state
+
+
+def _rates_at(equations: ResidualEquations, values: Array, options: FitOptions) -> tuple[Array, Array]:
     """The residuals [rows], and how they fall per plausible size of each unknown [rows x unknowns]."""
-    after, rates = question.linearisation(values)
-    return after, rates * wishes.sizes
+    after, rates = equations.linearisation(values)
+    return after, rates * options.sizes
 
 
-def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
-    """Standard deviation of the greater part of residuals, or more where these do not say it.
+def _median_spread(residuals: Array, rates: Array, options: FitOptions) -> float:
+    """Standard deviation of residuals by the median of their sizes, which outliers hardly change.
 
     It is at least 1 where standard deviations are known, else what may be round-off, or where combinations are unseen,
-    what these may do. Values that no unknown changes, as the height of a planar machine, do not count.
+    what these may do. Values that no unknown changes, such as the height of a planar machine, do not count.
     """
     touched, least = rates.any(axis=1), 1.0
     if not touched.any():
         return least
-    if not wishes.known:
+    if not options.known:
         strengths = np.linalg.svd(rates, compute_uv=False)
-        hides = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
-        least = max(wishes.resolution, UNSEEN * float(strengths[0]) if hides else 0.0)
-    return max(MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
+        has_unseen = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
+        least = max(options.resolution, UNSEEN * float(strengths[0]) if has_unseen else 0.0)
+    return max(DEVIATION_OVER_MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
 
 
-def _own_spread(residuals: Array, rates: Array, values: Array, wishes: Wishes) -> float:
-    """Estimate the standard deviation of measurements from residuals, where priors weigh against these.
+def _likeliest_spread(residuals: Array, rates: Array, values: Array, options: FitOptions) -> float:
+    """Estimate the standard deviation of measurements where priors weigh against them.
 
-    It is the one for which the values are most likely whatever the unknowns are, to first order: errors as large as the
-    priors say, seen through the rates, and the measurements' own make up their variance along each combination that
-    is seen, and their own alone along all others. Where this is greatest, the squares of the residuals are the variance
-    times their freedom; but these may also agree, or nearly, far from there, where steps towards them would end.
+    Residuals alone do not say it, because the larger it is, the more of them the priors leave. Of each standard
+    deviation that is tried follows how likely the measured values are, whatever the unknowns: their variance along a
+    direction is that of the measurements, and in the directions that unknowns change, also that of unknowns as large
+    as the priors say, seen through the rates (to first order). The one that makes them most likely is taken. A grid is
+    searched, not the slope, because a second maximum may lie far away.
 
     Args:
-        residuals: of the kept rows, at the values [rows].
-        rates: of the same rows, per plausible size [rows x unknowns].
-        values: of the unknowns, SI [unknowns].
-        wishes: priors and preferences.
+        residuals: residuals of the kept rows at the values [rows].
+        rates: how they fall per plausible size of each unknown [rows x unknowns].
+        values: values of the unknowns, SI [unknowns].
+        options: priors and preferences.
 
     Source: D. MacKay, Neural Computation 4(3), 1992, equations 2.9 and 2.14.
     """
-    weights = np.maximum(np.hypot(wishes.sizes / wishes.priors, wishes.preferred), LEAST_WEIGHT)
-    directions, sizes, _ = np.linalg.svd(rates / weights, full_matrices=False)
-    whole = residuals + rates @ (values / wishes.sizes)  # the residuals with all unknowns zero
-    squares, total = (directions.T @ whole) ** 2, float(whole @ whole)
-    unseen_square, unseen_count = max(total - float(squares.sum()), 0.0), len(whole) - len(sizes)
-    most = np.sqrt(total / len(whole)) + wishes.resolution
-    least, most = max(wishes.resolution, LEAST_SPREAD * most, LEAST_DIVISOR), max(most, LEAST_DIVISOR)
-    for _ in range(2):
+    weights = np.maximum(np.hypot(options.sizes / options.priors, options.preferred), LEAST_WEIGHT)
+    directions, prior_spreads, _ = np.linalg.svd(rates / weights, full_matrices=False)
+    drawn_residuals = residuals + rates @ (values / options.sizes)  # with all unknowns zero
+    squares = (directions.T @ drawn_residuals) ** 2
+    total, count = float(drawn_residuals @ drawn_residuals), len(drawn_residuals)
+    other_squares, other_count = max(total - float(squares.sum()), 0.0), count - len(squares)
+
+    def surprise(spreads: Array) -> Array:
+        """Minus twice the logarithm of the likelihood of the measured values, up to a constant, for each spread."""
+        variances = spreads**2
+        changed = variances[:, None] + prior_spreads**2
+        of_changed = (np.log(changed) + squares / changed).sum(axis=1)
+        return np.asarray(of_changed + (other_count * np.log(variances) + other_squares / variances))
+
+    most = np.sqrt(total / count) + options.resolution
+    least, most = max(options.resolution, LEAST_SPREAD * most, LEAST_DIVISOR), max(most, LEAST_DIVISOR)
+    for _ in range(2):  # the second time between the neighbours of the best spread
         tried = np.geomspace(least, max(most, least), TRIED_SPREADS)
-        variances = tried**2
-        along_seen = variances[:, None] + sizes**2
-        unlikely = (np.log(along_seen) + squares / along_seen).sum(axis=1)
-        unlikely += unseen_count * np.log(variances) + unseen_square / variances
-        best = int(np.argmin(unlikely))
+        best = int(np.argmin(surprise(tried)))
         least, most = float(tried[max(best - 1, 0)]), float(tried[min(best + 1, TRIED_SPREADS - 1)])
     return float(tried[best])
-
-
-def _freedom(rates: Array, seen: "_SeenCombinations") -> float:
-    """Number of residuals less the freedoms that measured values use up, theory (65).
-
-    Each combination takes as much of a freedom as the measurements say of what they and the priors say together.
-
-    Args:
-        rates: how the kept residuals fall per plausible size [rows x unknowns].
-        seen: the combinations, with the priors.
-    """
-    basis = seen.columns[:, : seen.rank]
-    measured, prior = rates @ basis, seen.prior @ basis
-    both = measured.T @ measured + prior.T @ prior
-    used = float(np.trace(np.linalg.solve(both, measured.T @ measured))) if seen.rank else 0.0
-    return max(len(rates) - used, LEAST_FREEDOM)
 
 
 @dataclass(frozen=True)
@@ -263,8 +286,8 @@ class _SeenCombinations:
     Attributes:
         strengths: of each, standard deviations per plausible size; those that are seen come first [unknowns].
         columns: the combinations, orthonormal [unknowns x unknowns].
-        rank: how many are seen.
-        unit: the true standard deviation of measurements in those that residuals are counted in.
+        rank: number of those that are seen.
+        unit: the true standard deviation of measurements, in the one that residuals are counted in.
         prior: rows that say what was known of the unknowns before [unknowns x unknowns].
         preference: rows of the preference for zero [rows x unknowns].
     """
@@ -276,139 +299,142 @@ class _SeenCombinations:
     prior: Array
     preference: Array
 
+    @property
+    def known(self) -> Array:
+        """Rows of priors and preference, which stand beside those of the measured values [rows x unknowns]."""
+        return np.concatenate([self.prior, self.preference])
 
-def _combinations(rates: Array, wishes: Wishes, spread: float) -> _SeenCombinations:
-    """Find which combinations are seen better than round-off and the weak preference for zero.
 
-    The preference is weak for these, and full for the others. Both, and what was known before, are in true standard
-    deviations: where nobody knows these of the measurements, they are those of the residuals.
+def _combinations(rates: Array, options: FitOptions, spread: float) -> _SeenCombinations:
+    """Find the combinations that are seen better than round-off and the weak preference for zero.
+
+    The preference is weak for these, and full for the others. Both it and the priors are in true standard deviations:
+    where those of the measurements are not known, they are those of the residuals.
 
     Args:
         rates: how the residuals fall per plausible size [rows x unknowns].
-        wishes: priors and preferences.
-        spread: of the residuals, in the standard deviations that they are counted in.
+        options: priors and preferences.
+        spread: standard deviation of the residuals, in those that they are counted in.
     """
-    unit = 1.0 if wishes.known else spread
-    prior = unit * np.diag(wishes.sizes / wishes.priors)
-    _, sizes, directions = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
-    preferred = np.diag(unit * wishes.preferred)
-    least = np.maximum(UNSEEN * sizes[0], np.linalg.norm(directions @ preferred, axis=1))
-    order = np.argsort(sizes <= least, kind="stable")
-    rank = int((sizes > least).sum())
-    hidden = np.linalg.qr(preferred @ directions[order[rank:]].T)[0]
-    preference = np.concatenate([preferred, FULL_PREFERENCE * hidden.T @ preferred])
-    return _SeenCombinations(sizes[order], directions[order].T, rank, unit, prior, preference)
+    unit = 1.0 if options.known else spread
+    prior = unit * np.diag(options.sizes / options.priors)
+    _, strengths, directions = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
+    weak = np.diag(unit * options.preferred)
+    seen = strengths > np.maximum(UNSEEN * strengths[0], np.linalg.norm(directions @ weak, axis=1))
+    order, rank = np.argsort(~seen, kind="stable"), int(seen.sum())
+    unseen = np.linalg.qr(weak @ directions[order[rank:]].T)[0]
+    preference = np.concatenate([weak, FULL_PREFERENCE * unseen.T @ weak])
+    return _SeenCombinations(strengths[order], directions[order].T, rank, unit, prior, preference)
 
 
 def _least_squares(
-    question: ResidualEquations, wishes: Wishes, kept: Mask, start: Array, seen: _SeenCombinations, scale: float
+    equations: ResidualEquations, options: FitOptions, state: _Iterate, seen: _SeenCombinations, with_loss: bool
 ) -> Array:
-    """Fit values by least squares from a start; `scale` is that of Cauchy's loss, infinite for squares."""
+    """Values of the unknowns by least squares of the kept rows, or by Cauchy's loss at the scale of the spread, SI."""
     from scipy.optimize import least_squares  # half a second to import
 
-    count, most = int(kept.sum()), wishes.bounds / wishes.sizes
-    known = np.concatenate([seen.prior, seen.preference])
+    kept, most = state.kept, options.bounds / options.sizes
     # One residual that never changes: a fall of the sum of squares is small beside one squared standard deviation.
-    constant, still = np.array([seen.unit]), np.zeros((1, len(start)))
+    constant, no_slope = np.array([seen.unit]), np.zeros((1, len(most)))
 
     def residuals(units: Array) -> Array:
-        return np.concatenate([question.residuals(units * wishes.sizes)[kept], known @ units, constant])
+        measured = equations.residuals(units * options.sizes)[kept]
+        return np.concatenate([measured, seen.known @ units, constant])
 
     def slopes(units: Array) -> Array:
-        return np.concatenate([-_rates_at(question, units * wishes.sizes, wishes)[1][kept], known, still])
+        measured = -_rates_at(equations, units * options.sizes, options)[1][kept]
+        return np.concatenate([measured, seen.known, no_slope])
 
     def loss(squares: Array) -> Array:
-        measured, trust = np.arange(len(squares)) < count, 1.0 / (1.0 + squares)
+        """Cauchy's loss of measured values and the square of all other rows, with first and second derivatives."""
+        is_measured, trust = np.arange(len(squares)) < kept.sum(), 1.0 / (1.0 + squares)
         plain = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
-        return np.where(measured, np.stack([np.log1p(squares), trust, -(trust**2)]), plain)
+        return np.where(is_measured, np.stack([np.log1p(squares), trust, -(trust**2)]), plain)
 
-    robust = bool(np.isfinite(scale))
-    form, precision = (loss, FIT_BEGUN) if robust else ("linear", FIT_SETTLED)
+    form, scale, precision = (loss, state.spread, FIT_BEGUN) if with_loss else ("linear", 1.0, FIT_SETTLED)
     answer = least_squares(
-        residuals, start / wishes.sizes, slopes, (-most, most), loss=form, f_scale=scale if robust else 1.0,
+        residuals, state.values / options.sizes, slopes, (-most, most), loss=form, f_scale=scale,
         ftol=precision, xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
     )  # fmt: skip
-    return np.asarray(answer.x * wishes.sizes)
+    return np.asarray(answer.x * options.sizes)
 
 
-def _fit_result(
-    before: Array,
-    after: Array,
-    rates: Array,
-    kept: Mask,
-    values: Array,
-    groups: Integers,
-    wishes: Wishes,
-) -> Fit:
+def _fit_result(before: Array, state: _Iterate, groups: Integers, options: FitOptions) -> Fit:
     """Describe the fit at its values: covariance and intervals, theory (65), rank, and poses that took no part."""
-    spread = _spread(after, rates, wishes) if wishes.judged else _own_spread(after[kept], rates[kept], values, wishes)
-    seen = _combinations(rates[kept], wishes, spread)
-    freedom = _freedom(rates[kept], seen)
-    scatter = float(np.sqrt((after[kept] ** 2).sum() / freedom))
-    covariance, interval = _covariance_and_interval(rates[kept], seen, wishes, scatter, freedom)
+    kept_residuals, kept_rates = state.after[state.kept], state.rates[state.kept]
+    seen = _combinations(kept_rates, options, state.spread)
+    freedom = _freedom(kept_rates, seen)
+    scatter = float(np.sqrt((kept_residuals**2).sum() / freedom))
+    covariance, interval = _covariance_and_interval(kept_rates, seen, options, scatter, freedom)
     return Fit(
-        values=values,
+        values=state.values,
         covariance=covariance,
-        half_intervals=_half_intervals(interval, seen, wishes),
-        kept=kept,
+        half_intervals=_half_intervals(interval, seen, options),
+        kept=state.kept,
         before=before,
-        after=after,
-        rates=rates,
+        after=state.after,
+        rates=state.rates,
         scatter=scatter,
         strengths=seen.strengths,
         combinations=seen.columns,
         rank=seen.rank,
         interval=interval,
         freedom=freedom,
-        predicted=_left_out(after, rates, kept, groups, np.concatenate([seen.prior, seen.preference])),
+        predicted=_predicted_residuals(state, groups, seen.known),
     )
 
 
-def _covariance_and_interval(
-    rates: Array, seen: _SeenCombinations, wishes: Wishes, scatter: float, freedom: float
-) -> tuple[Array, Array]:
-    """The covariance of what is seen, and `Fit.interval`, SI [unknowns x unknowns each].
+def _freedom(rates: Array, seen: _SeenCombinations) -> float:
+    """Degrees of freedom of residuals: their number less the unknowns that measured values determine, theory (65).
 
-    Args:
-        rates: how the kept residuals fall per plausible size [rows x unknowns].
-        seen: the combinations, with the priors.
-        wishes: plausible sizes, and whether standard deviations of measurements are known.
-        scatter, freedom: of the kept residuals.
+    Each combination counts by the share of the measurements in what they and the priors say of it together.
     """
+    basis = seen.columns[:, : seen.rank]
+    measured, prior = rates @ basis, seen.prior @ basis
+    both = measured.T @ measured + prior.T @ prior
+    determined = float(np.trace(np.linalg.solve(both, measured.T @ measured))) if seen.rank else 0.0
+    return max(len(rates) - determined, LEAST_FREEDOM)
+
+
+def _covariance_and_interval(
+    rates: Array, seen: _SeenCombinations, options: FitOptions, scatter: float, freedom: float
+) -> tuple[Array, Array]:
+    """`Fit.covariance` and `Fit.interval` by `Fit.scatter` and `Fit.freedom` of the kept residuals and their rates."""
     basis = seen.columns[:, : seen.rank] / seen.strengths[: seen.rank]
-    spread = 1.0 if wishes.known else max(scatter, wishes.resolution)
-    units = spread**2 * np.outer(wishes.sizes, wishes.sizes)
+    spread = 1.0 if options.known else max(scatter, options.resolution)
+    units = spread**2 * np.outer(options.sizes, options.sizes)
     measured, known_before = rates @ basis, seen.prior @ basis
-    factor = SURELY if wishes.known else _quantile(freedom)
+    factor = SURELY if options.known else _student_factor(freedom)
     widened = factor**2 * measured.T @ measured + SURELY**2 * known_before.T @ known_before
     return basis @ basis.T * units, basis @ widened @ basis.T * units
 
 
-def _half_intervals(interval: Array, seen: _SeenCombinations, wishes: Wishes) -> Array:
+def _half_intervals(interval: Array, seen: _SeenCombinations, options: FitOptions) -> Array:
     """Half of the 95 % interval of each unknown, with what unseen combinations of plausible size may add [unknowns]."""
     hidden = seen.columns[:, seen.rank :]
-    likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * wishes.preferred) ** 2) @ hidden)
-    unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * wishes.sizes
+    likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * options.preferred) ** 2) @ hidden)
+    unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * options.sizes
     result = np.hypot(np.sqrt(np.diag(interval)), SURELY * unseen)
     result[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
     return np.asarray(result)
 
 
-def _quantile(freedom: float) -> float:
+def _student_factor(freedom: float) -> float:
     """Half of the 95 % interval over the standard deviation, where that is estimated: Student's t."""
-    from scipy.special import stdtrit  # a quarter of a second to import: only where nobody knows standard deviations
+    from scipy.special import stdtrit  # a quarter of a second to import: only where standard deviations are not known
 
     return float(stdtrit(freedom, UPPER_QUANTILE))
 
 
-def _left_out(after: Array, rates: Array, kept: Mask, groups: Integers, known: Array) -> Array:
+def _predicted_residuals(state: _Iterate, groups: Integers, known: Array) -> Array:
     """Residuals of each fifth of the poses, predicted from the others: the fit to these is one linear step away."""
-    result, fold = after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
+    result, folds = state.after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
     for number in range(FOLDS):
-        others, mine = kept & (fold != number), fold == number
-        if not others.any() or not mine.any():
+        others, left_out = state.kept & (folds != number), folds == number
+        if not others.any() or not left_out.any():
             continue
-        rows = np.concatenate([rates[others], known])
-        step = np.linalg.lstsq(rows, np.concatenate([after[others], np.zeros(len(known))]), rcond=None)[0]
-        result[mine] = after[mine] - rates[mine] @ step
+        rows = np.concatenate([state.rates[others], known])
+        residuals = np.concatenate([state.after[others], np.zeros(len(known))])
+        step = np.linalg.lstsq(rows, residuals, rcond=None)[0]
+        result[left_out] = state.after[left_out] - state.rates[left_out] @ step
     return result

@@ -1,4 +1,8 @@
-"""Identify a machine as built: from measurements to its most likely numbers, their sureness, and what is not seen."""
+"""Identify a machine as built: from measurements to its most likely numbers, their intervals, and what is not seen.
+
+The question is put together here from what a user writes: unknowns by groups, paths and ties, priors and bounds. What
+measurements say about it is computed in `observation`, `fit`, `unseen` and `next_poses`.
+"""
 
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -15,11 +19,12 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, positive
-from kinetostat.studies.identification.fit import Fit, Tell, Wishes, best_fit
+from kinetostat.studies.identification.fit import Fit, FitOptions, Tell, best_fit
 from kinetostat.studies.identification.measurements import EULER, ROTATION, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import MOST_PROPOSED, NextPoses, first_poses, next_poses, unit_of
 from kinetostat.studies.identification.observation import (
     FRAME_UNKNOWNS,
+    PLACES,
     TARGET_UNKNOWNS,
     Observation,
     observation,
@@ -30,20 +35,21 @@ from kinetostat.tolerances import ROUND_OFF_OF_MEASUREMENT
 from kinetostat.units import KINDS, UnitError, parse
 
 USUALLY_FITTED = ("geometry", "zeros")
-"""Groups of errors that are fitted by default."""
+"""Groups of errors that are fitted by default: nearly every calibration sees them, by positions alone."""
 PLAUSIBLE_SIZES = {"length": 1e-3, "angle": 1e-3, "share": 1e-3}
-"""Plausible sizes of unknowns: a millimetre, a milliradian, a thousandth."""
+"""Plausible sizes of unknowns by kind, as machines are built: a millimetre, a milliradian, a thousandth. They make
+kinds comparable, and say how far combinations may go that nothing sees."""
 PLAUSIBLE_COMPLIANCE_ERROR = 0.1
-"""Plausible size of the relative error of a compliance."""
+"""Plausible size of the relative error of a compliance: tables and models of springs are no better."""
 PREFERENCE = 0.02
-"""Weight of zero for errors of a machine, in standard deviations per plausible size: half a metre in ten standard
-deviations hides nothing that is measured, but what is hardly seen does not run away."""
-PLACED_ANYWHERE = 1e-5
+"""Preference of errors of the machine for zero, in standard deviations per plausible size: an error of ten plausible
+sizes costs a fifth of a standard deviation, which hides nothing that is measured; what is hardly seen stays small."""
+PREFERENCE_OF_PLACES = 1e-5
 """The same for the measuring frame and the target, which may be metres away."""
 MOST_NAMED_POSES = 12
-"""Poses to add that a refusal names."""
+"""Greatest number of poses to add that a refusal names: more would bury the rest of its message."""
 USUAL_SIGMA = 1e-5
-"""Standard deviation of measured lengths, m, where nobody says it; only ratios count then."""
+"""Standard deviation of measured lengths, m, where nobody says it; only its ratio to that of angles counts then."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +57,12 @@ class Identification:
     """Errors of a machine as built that follow from measurements.
 
     Attributes:
-        machine: as drawn.
+        machine: the machine as drawn.
         observed: the measurements beside the model.
         fit: the most likely values of the unknowns.
         sizes: plausible size of each unknown, SI [unknowns].
-        unseen: combinations that nothing measured sees.
-        next: poses that should be measured next; None if nobody asked.
+        unseen: combinations of unknowns that change nothing that was measured.
+        next: poses that should be measured next; None if none were asked for, or too few can be placed.
     """
 
     machine: Machine
@@ -95,12 +101,11 @@ class Identification:
         """Root mean square of kept residuals, of positions and distances (m) and of angles (rad).
 
         Args:
-            residuals: in standard deviations [rows].
+            residuals: residuals in standard deviations, of all rows [rows].
         """
-        fit, off = self.fit, residuals * self.observed.sigma
-        turns = np.array([name.removeprefix("deflection.") in (*ROTATION, *EULER) for name in self.observed.row_names])
-        kinds = {"length": fit.kept & ~turns, "angle": fit.kept & turns}
-        return {kind: float(np.sqrt((off[rows] ** 2).mean())) for kind, rows in kinds.items() if rows.any()}
+        differences, kept, turns = residuals * self.observed.sigma, self.fit.kept, self.observed.turns
+        kinds = {"length": kept & ~turns, "angle": kept & turns}
+        return {kind: float(np.sqrt((differences[rows] ** 2).mean())) for kind, rows in kinds.items() if rows.any()}
 
 
 @checked
@@ -123,9 +128,9 @@ def identify(
     """Find the errors of a machine that explain what was measured of it.
 
     Args:
-        machine: as drawn.
+        machine: the machine as drawn.
         data: path of a CSV file; its columns are described in docs/calibration.md.
-        fit: what to find: "geometry", "zeros", "gains", "compliances", "shared", or paths of errors with * and ?.
+        fit: errors to find: "geometry", "zeros", "gains", "compliances", "shared", or paths of errors with * and ?.
         frame: whether the place of the measuring frame is unknown; otherwise it is the base frame.
         target: whether the place of the target on the platform is unknown; otherwise it is the tool point.
         sigma, sigma_angle: standard deviations of measured lengths and angles that have no column, text with a unit.
@@ -168,51 +173,52 @@ def identification_of(
     tell: Tell = lambda *_: None,
     ties: Mapping[str, str] | None = None,
 ) -> Identification:
-    """Find errors from measurements that are there as numbers; arguments and errors as for `identify`.
+    """Find errors from measurements that are numbers already; arguments and errors as for `identify`.
 
     Args:
-        model: of the machine at the commanded poses.
+        model: the errors of the machine at the commanded poses.
         data: what was measured there.
         fit, frame, target, priors, bounds, robust, more, tell, ties: see `identify`.
 
     Raises:
         InputError: as for `identify`.
     """
-    shares: dict[str, Mapping[str, float]] = {}
-    unknowns = _unknowns_named(model, fit) if several(fit) or not ties else []
-    for name, terms in (ties or {}).items():
-        tied, shares[name] = _tied_error(model, name, terms)
-        unknowns.append(tied)
-    turned = any(name in (*ROTATION, *EULER) for name in data.values)
-    places = [
-        *(FRAME_UNKNOWNS if frame else ()),
-        *(TARGET_UNKNOWNS if target and turned else TARGET_UNKNOWNS[3:] if target else ()),
-    ]
-    unknowns += [place_unknown(path) for path in places]
-    seen = observation(model, data, unknowns, ties=shares)
+    unknowns = _errors_named(model, fit) if several(fit) or not ties else []
+    tied = {name: _tied_error(model, name, terms) for name, terms in (ties or {}).items()}
+    unknowns += [unknown for unknown, _ in tied.values()]
+    unknowns += [place_unknown(path) for path in _place_paths(data, frame, target)]
+    observed = observation(model, data, unknowns, ties={name: shares for name, (_, shares) in tied.items()})
     sizes = np.array([_plausible_size(unknown) for unknown in unknowns])
     known_before = _sizes_by_name(unknowns, priors or {}, "prior")
-    _enough(model.machine, seen, sizes, int(np.isfinite(known_before).sum()))
-    wishes = Wishes(
-        sizes,
-        known_before,
-        _sizes_by_name(unknowns, bounds or {}, "bound"),
-        np.array([PLACED_ANYWHERE if u.group in ("frame", "target") else PREFERENCE for u in unknowns]),
-        robust,
-        data.known,
-        float((ROUND_OFF_OF_MEASUREMENT * np.where(seen.turns, 1.0, model.length) / seen.sigma).min(initial=np.inf)),
+    _check_count(model.machine, observed, sizes, int(np.isfinite(known_before).sum()))
+    units = np.where(observed.turns, 1.0, model.length)
+    options = FitOptions(
+        sizes=sizes,
+        priors=known_before,
+        bounds=_sizes_by_name(unknowns, bounds or {}, "bound"),
+        preferred=np.array([PREFERENCE_OF_PLACES if u.group in PLACES else PREFERENCE for u in unknowns]),
+        robust=robust,
+        known=data.known,
+        resolution=float((ROUND_OFF_OF_MEASUREMENT * units / observed.sigma).min(initial=np.inf)),
     )
-    answer = best_fit(seen, seen.row_poses, wishes, tell)
-    hidden = tuple(unseen_of(seen, answer, sizes))
-    proposed = next_poses(model.machine, seen, answer, sizes, more) if more else None
-    return Identification(model.machine, seen, answer, sizes, hidden, proposed)
+    result = best_fit(observed, observed.row_poses, options, tell)
+    unseen = tuple(unseen_of(observed, result, sizes))
+    proposed = next_poses(model.machine, observed, result, sizes, more) if more else None
+    return Identification(model.machine, observed, result, sizes, unseen, proposed)
 
 
-def _unknowns_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineError]:
+def _place_paths(data: Measurements, frame: bool, target: bool) -> list[str]:
+    """Paths of the unknown places; how the target is turned matters only where orientations are measured."""
+    measures_turns = any(name in (*ROTATION, *EULER) for name in data.values)
+    of_target = TARGET_UNKNOWNS if measures_turns else TARGET_UNKNOWNS[3:]
+    return [*(FRAME_UNKNOWNS if frame else ()), *(of_target if target else ())]
+
+
+def _errors_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineError]:
     """The errors that groups and patterns name, in the order of the model.
 
     Raises:
-        InputError: one names nothing.
+        InputError: a pattern names nothing.
     """
     if not several(patterns):
         raise InputError(f'fit is empty; name groups or paths of what is to be found, e.g. "{USUALLY_FITTED[0]}".')
@@ -230,10 +236,10 @@ def _unknowns_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineE
 
 
 def _tied_error(model: ErrorModel, name: str, terms: str) -> tuple[MachineError, dict[str, float]]:
-    """An unknown that is several errors at once, and how far each of them goes with it, by path.
+    """An unknown that stands for several errors, and the share of it that each of them takes, by path.
 
     Raises:
-        InputError: the name is not one, a term names nothing, or errors of several kinds.
+        InputError: the name is not an identifier, a term names nothing, or the errors are of several kinds.
     """
     if not name.isidentifier():
         raise InputError(f"the tie {shorten(name)} needs a name of letters, digits and _, such as rod_length.")
@@ -273,14 +279,14 @@ def _matches(error: MachineError, pattern: str) -> bool:
     return fnmatchcase(error.path, pattern) and (error.group != "clearances" or "clearance" in pattern)
 
 
-def _enough(machine: Machine, seen: Observation, sizes: Array, priors: int) -> None:
-    """Refuse fewer values, with what is known before, than unknowns; say how many poses are needed, and which."""
-    data, unknowns = seen.data, len(seen.unknowns) - priors
+def _check_count(machine: Machine, observed: Observation, sizes: Array, priors: int) -> None:
+    """Refuse fewer measured values than unknowns without a prior; say how many poses are needed, and which."""
+    data, unknowns = observed.data, len(observed.unknowns) - priors
     if data.count >= unknowns:
         return
-    each = max(data.count / max(len(data), 1), 1.0)
-    needed = int(np.ceil(unknowns / each))
-    poses = first_poses(machine, seen, sizes, min(needed - len(data), MOST_NAMED_POSES))
+    values_of_a_pose = max(data.count / max(len(data), 1), 1.0)
+    needed = int(np.ceil(unknowns / values_of_a_pose))
+    poses = first_poses(machine, observed, sizes, min(needed - len(data), MOST_NAMED_POSES))
     scales = [machine.display.scale(unit_of(machine, path)) for path in poses]
     heads = ", ".join(scale.label(path.removeprefix("pose.")) for scale, path in zip(scales, poses, strict=True))
     rows = np.column_stack([scale.factor * values for scale, values in zip(scales, poses.values(), strict=True)])
@@ -292,29 +298,49 @@ def _enough(machine: Machine, seen: Observation, sizes: Array, priors: int) -> N
     )
 
 
-def _sizes_by_name(unknowns: Sequence[MachineError], given: Mapping[str, str], what: str) -> Array:
-    """Sizes by group or path for all unknowns, SI; infinity where none is given."""
+def _sizes_by_name(unknowns: Sequence[MachineError], texts: Mapping[str, str], subject: str) -> Array:
+    """Sizes of all unknowns, SI, from texts by group or path; infinity where there is none [unknowns].
+
+    A group may have lengths and angles: a text is about those of its kind. Of two texts, the smaller size counts.
+
+    Args:
+        unknowns: the unknowns of the fit.
+        texts: a size with its unit, by group or by a path with * and ?.
+        subject: "prior" or "bound", for messages.
+    """
     result = np.full(len(unknowns), np.inf)
-    for pattern, text in given.items():
-        named = [n for n, u in enumerate(unknowns) if u.group == pattern or fnmatchcase(u.path, pattern)]
-        kinds = {kind for kind in PLAUSIBLE_SIZES for n in named if unknowns[n].kind == kind}
-        if not named:
+    for pattern, text in texts.items():
+        rows = [n for n, u in enumerate(unknowns) if u.group == pattern or fnmatchcase(u.path, pattern)]
+        kinds = {unknowns[n].kind for n in rows}
+        if not rows:
             raise InputError(
-                f'the {what} "{pattern}" belongs to nothing that is fitted; name a group or a path with *.'
+                f'the {subject} "{pattern}" belongs to nothing that is fitted; name a group or a path with *.'
             )
-        fitting = {}
-        for kind in kinds:
-            try:
-                fitting[kind] = parse(text, kind)
-            except UnitError:
-                continue
-            try:
-                Quantity(kind, "", positive=True).check(fitting[kind])
-            except UnitError as error:
-                raise InputError(f"the {what} of {pattern} is {shorten(text)}: {error}.") from None
-        if not fitting:
+        sizes = {
+            kind: size for kind in kinds if (size := _read_size(text, kind, f"{subject} of {pattern}")) is not None
+        }
+        if not sizes:
             unit = " or ".join(f'"{KINDS[kind].example}"' for kind in sorted(kinds))
-            raise InputError(f"the {what} of {pattern} is {text}, which is of another kind; write for example {unit}.")
-        for n in named:
-            result[n] = min(result[n], fitting.get(unknowns[n].kind, np.inf))
+            raise InputError(
+                f"the {subject} of {pattern} is {text}, which is of another kind; write for example {unit}."
+            )
+        for n in rows:
+            result[n] = min(result[n], sizes.get(unknowns[n].kind, np.inf))
     return result
+
+
+def _read_size(text: str, kind: str, subject: str) -> float | None:
+    """The size that a text means, SI; None if it is of another kind.
+
+    Raises:
+        InputError: it is not more than 0.
+    """
+    try:
+        size = parse(text, kind)
+    except UnitError:
+        return None
+    try:
+        Quantity(kind, "", positive=True).check(size)
+    except UnitError as error:
+        raise InputError(f"the {subject} is {shorten(text)}: {error}.") from None
+    return size
