@@ -16,9 +16,9 @@ from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loads import located_members
 from kinetostat.validation import exudyn_machine
-from kinetostat.validation.as_written import drawing
 from kinetostat.validation.comparison import KNOWN
 from kinetostat.validation.exudyn_machine import modal_frequencies, weigh
+from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.validation.pieces import bodies_before
 from kinetostat.vibration.modes import frequencies
 from machines import STRETCH, cable, load_without_limits, written
@@ -213,7 +213,7 @@ def test_frequencies_about_the_loaded_state_are_those_of_exudyn(what):
     joints = solve_joints(machine) if machine.family.chains else None
     loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints).configuration, joints)).balance)[0]
     engine = Engine(machine)
-    weigh(engine.model, engine.platform, machine, drawing(machine, engine.response, engine.joints))
+    weigh(engine.model, engine.platform, machine, machine_from_file(machine, engine.response, engine.joints))
     engine.model.system.Assemble()
     engine.start = engine.model.system.systemData.GetODE2Coordinates()
     engine.displacement(wrench_of(machine))

@@ -24,7 +24,7 @@ from kinetostat.machine.parameters import values
 from kinetostat.machine.written import family, joints
 from kinetostat.machine.written.joints import JOINT_TYPES
 from kinetostat.validation import exudyn_machine
-from kinetostat.validation.as_written import drawing
+from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.validation.pieces import array
 
 pytest.importorskip("exudyn")
@@ -114,7 +114,7 @@ def agree(machine):
     """The machine of the file is that of the chain, part by part, with what carries the ends and centres of links."""
     coordinates = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, coordinates)
-    drawn = drawing(machine, response, coordinates)
+    drawn = machine_from_file(machine, response, coordinates)
     assert array(drawn.reference) == pytest.approx(array(response.reference), abs=SAME)
     for leg, expected in zip(drawn.configuration.legs, response.configuration.legs, strict=True):
         for part, other in zip(leg.chain, expected.chain, strict=True):
@@ -174,7 +174,7 @@ def test_the_engine_prints_nothing_into_the_answer(capfd):
     """It has advice for systems of more than 1000 coordinates, which had stood before the JSON of a large machine."""
     machine = build((CASES / "every-joint-and-link.toml").read_text("utf-8"))
     found = solve_joints(machine)
-    drawn = drawing(machine, respond(machine, found), found)
+    drawn = machine_from_file(machine, respond(machine, found), found)
     model, _ = exudyn_machine.build(drawn.configuration, drawn.reference)
     model.system.Assemble()
     model.system.ComputeLinearizedSystem(exudyn_machine.settings_of(model))

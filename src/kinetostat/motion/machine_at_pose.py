@@ -166,24 +166,24 @@ class Operators:
     def at_drives(self) -> tuple[list[Row], list[Row], Row]:
         """Return M, C and g over the coordinates of the drives, as many as of the pose, theory (95)."""
         inverse, _ = dual_basis(self.drive_rates)  # the dual vectors of the rows of J are the columns of J^-1
-        momenta = _times_transposed(self.mass, inverse)  # M J^-1
-        changes = _times_transposed(self.drive_changes, inverse)  # dJ/dt J^-1
-        of_changes = _times_transposed(momenta, _transposed(changes))
+        momenta = _product_with_transpose(self.mass, inverse)  # M J^-1
+        changes = _product_with_transpose(self.drive_changes, inverse)  # dJ/dt J^-1
+        of_changes = _product_with_transpose(momenta, _transpose(changes))
         coriolis = [
             [a - b for a, b in zip(*rows, strict=True)]
-            for rows in zip(_times_transposed(self.coriolis, inverse), of_changes, strict=True)
+            for rows in zip(_product_with_transpose(self.coriolis, inverse), of_changes, strict=True)
         ]
-        mass, coriolis = (_times_transposed(inverse, _transposed(rows)) for rows in (momenta, coriolis))
+        mass, coriolis = (_product_with_transpose(inverse, _transpose(rows)) for rows in (momenta, coriolis))
         gravity = [total([a * b for a, b in zip(row, self.gravity, strict=True)]) for row in inverse]
         return mass, coriolis, gravity
 
 
-def _times_transposed(left: Sequence[Row], right: Sequence[Row]) -> list[Row]:
+def _product_with_transpose(left: Sequence[Row], right: Sequence[Row]) -> list[Row]:
     """Return A B^T of two matrices, by their rows."""
     return [[total([a * b for a, b in zip(row, other, strict=True)]) for other in right] for row in left]
 
 
-def _transposed(rows: Sequence[Row]) -> list[Row]:
+def _transpose(rows: Sequence[Row]) -> list[Row]:
     return [list(row) for row in zip(*rows, strict=True)]
 
 
@@ -203,8 +203,8 @@ def operators(placed: MachineAtPose, rates: Mapping[str, Scalar]) -> Operators:
         mass=_mass(placed, columns),
         coriolis=[[_work(demand, other) * length for demand in of_speed] for other in columns],
         gravity=[_work(of_weight, other) * length for other in columns],
-        drive_rates=_transposed([placed.drive_rates(column) for column in columns]),
-        drive_changes=_transposed([placed.drive_rates(column, change=True) for column in columns]),
+        drive_rates=_transpose([placed.drive_rates(column) for column in columns]),
+        drive_changes=_transpose([placed.drive_rates(column, change=True) for column in columns]),
     )
 
 
@@ -217,7 +217,7 @@ def _mass(placed: MachineAtPose, columns: Sequence[MachineMotion]) -> list[Row]:
 def mass_at_drives(placed: MachineAtPose) -> list[Row]:
     """Return M over the coordinates of the drives, as many as of the pose, SI, theory (95)."""
     columns = placed.unit_motions()
-    rates = _transposed([placed.drive_rates(column) for column in columns])
+    rates = _transpose([placed.drive_rates(column) for column in columns])
     zeros = [0.0] * len(rates)
     return Operators(
         mass=_mass(placed, columns),

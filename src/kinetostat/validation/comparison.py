@@ -27,7 +27,7 @@ from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.installation import extra_command
 from kinetostat.studies.analysis_parts import clean_matrix
 from kinetostat.tolerances import AGREED, RIGID_BLOCK_OF_ENGINE, ROUND_OFF_OF_ENTRY
-from kinetostat.validation.as_written import drawing
+from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.vibration.modes import frequencies
 
 ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)
@@ -268,7 +268,7 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     state = state_of(machine)
     response = state.free
     ours = _our_compliance(response)
-    drawn = drawing(machine, response, state.joints)
+    drawn = machine_from_file(machine, response, state.joints)
     answer = chosen.solve(drawn.configuration, drawn.reference)
     length = float(response.configuration.length)
     uncertainty = _uncertainty(answer, ours, length)

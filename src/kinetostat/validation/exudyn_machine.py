@@ -19,9 +19,9 @@ from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Machine, Plane
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, NO_MOMENTUM, UNBALANCED_LOAD, UNMOVED
-from kinetostat.validation.as_written import DrawnMachine, drawing
 from kinetostat.validation.comparison import Answer, Trial
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
+from kinetostat.validation.machine_from_file import MachineFromFile, machine_from_file
 from kinetostat.validation.pieces import (
     Piece,
     StrutPiece,
@@ -313,7 +313,7 @@ def frequencies(machine: Machine) -> Array:
         InputError: if the machine has a part that cannot be built.
     """
     state = state_of(machine)
-    drawn, struts = drawing(machine, state.free, state.joints), not has_rotors(machine)
+    drawn, struts = machine_from_file(machine, state.free, state.joints), not has_rotors(machine)
     model, _ = build(drawn.configuration, drawn.reference)
     model.system.Assemble()
     unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1])))
@@ -323,7 +323,7 @@ def frequencies(machine: Machine) -> Array:
     return modal_frequencies(model)
 
 
-def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: DrawnMachine) -> None:
+def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: MachineFromFile) -> None:
     """Add the masses of platform, payload and links to the bodies of a machine.
 
     Args:

@@ -1,7 +1,8 @@
 """Legs of bodies, joints and links at the home pose, and where joint coordinates take them: kinematics for engines.
 
-Joints are moved by products of exponentials of their screws at the home pose, and nothing of `machine.written.family`
-or `kinematics` is used. Points and axes are in the base frame, placements are matrices [4 x 4].
+Joints are moved by products of exponentials of their screws at the home pose, and legs are closed on the platform by
+Newton's method over these. Nothing of `machine.written.family` or `kinematics` is used. Points and axes are in the base
+frame, placements are matrices [4 x 4].
 """
 
 import math
@@ -18,7 +19,11 @@ from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Member
 from kinetostat.spec.errors import InputError
-from kinetostat.validation.pieces import array
+from kinetostat.tolerances import CLOSED
+from kinetostat.validation.pieces import array, tensor_of
+
+MOST_CLOSING_STEPS = 20
+"""Steps of Newton's method from coordinates that should be those of the pose already: a handful are enough."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +31,7 @@ class LegPart:
     """A part of a leg at the home pose.
 
     Attributes:
-        element: with its points and axes; the stiffness of a rod is its E A.
+        element: the element with its points and axes; the stiffness of a rod is its E A.
         moves: whether a joint coordinate moves what follows.
         rod: whether it is the rod of a strut, whose stiffness depends on its length.
     """
@@ -36,11 +41,10 @@ class LegPart:
     rod: bool = False
 
     def motion(self, amount: float) -> Array:
-        """Placement of what follows once the part has moved by an amount (rad, m) from the home pose [4 x 4]."""
+        """Return the placement of what follows once the part has moved by an amount (rad, m) from the home pose."""
         if isinstance(self.element, Parallelogram):
-            span, normal = _bars(self.element)
-            turned = turn(normal, amount / float(np.linalg.norm(span))) @ span
-            return placement(np.eye(3), turned - span)
+            span, swung_span, _ = _swing(self.element, amount)
+            return placement(np.eye(3), swung_span - span)
         joint = joint_in(self.element)
         axis = array(joint.axis)
         if joint.point is None:
@@ -53,15 +57,13 @@ class LegPart:
 
         Args:
             before: placement of what carries the part.
-            amount: its coordinate.
+            amount: coordinate of the part, rad or m.
         """
+        rotation = before[:3, :3]
         if isinstance(self.element, Parallelogram):
-            span, normal = _bars(self.element)
-            length = float(np.linalg.norm(span))
-            direction = np.cross(normal, turn(normal, amount / length) @ span) / length
-            return np.concatenate([np.zeros(3), before[:3, :3] @ direction])
+            return np.concatenate([np.zeros(3), rotation @ _swing(self.element, amount)[2]])
         joint = joint_in(self.element)
-        axis = before[:3, :3] @ array(joint.axis)
+        axis = rotation @ array(joint.axis)
         if joint.point is None:
             return np.concatenate([np.zeros(3), axis])
         point = apply(before, array(joint.point))
@@ -82,11 +84,11 @@ class LegPart:
         if isinstance(element, Spring):
             return replace(element, joint=_joint_at(element.joint, before))
         if isinstance(element, Parallelogram):
-            near, far = moved_point(before, element.near), moved_point(after, element.far)
-            return replace(element, near=near, far=far, side=turned_direction(before, element.side))
+            near, far = point_at(before, element.near), point_at(after, element.far)
+            return replace(element, near=near, far=far, side=direction_at(before, element.side))
         if isinstance(element, Beam):
-            ends = moved_point(before, element.start), moved_point(before, element.end)
-            return Beam(element.name, *ends, turned_direction(before, element.up), element.rigidity)
+            ends = point_at(before, element.start), point_at(before, element.end)
+            return Beam(element.name, *ends, direction_at(before, element.up), element.rigidity)
         raise InputError(f"The independent engines have no {type(element).__name__}; validate the machine without one.")
 
 
@@ -95,12 +97,12 @@ class LegBody:
     """A link of a leg at the home pose, as far as it moves.
 
     Attributes:
-        name: of it.
-        mass: kg.
-        ends: of its axis, m.
-        parts: how many parts of the leg carry its beginning and its end.
-        centre: of its mass, m; None if it is a uniform rod.
-        inertia: about that centre, base axes, kg·m² [3 x 3]; None where nothing says it.
+        name: name of the link.
+        mass: its mass, kg.
+        ends: both ends of its axis, m.
+        parts: numbers of parts of the leg that carry its beginning and its end.
+        centre: centre of its mass, m; None if it is a uniform rod.
+        inertia: inertia about that centre, base axes, kg·m² [3 x 3]; None where nothing says it.
     """
 
     name: str
@@ -115,24 +117,24 @@ class LegBody:
 
         Args:
             leg: name of its leg.
-            placements: of what is before each part of the leg, and of its end.
+            placements: placements of what is before each part of the leg, and of its end.
         """
-        before, after = (placements[count] for count in self.parts)
-        start, end = moved_point(before, vector(self.ends[0])), moved_point(after, vector(self.ends[1]))
-        ends = (self.parts[0], start), (self.parts[1], end)
-        at: Station | None = None if self.centre is None else (self.parts[0], moved_point(before, vector(self.centre)))
+        first, last = self.parts
+        before, after = placements[first], placements[last]
+        ends = (first, point_at(before, vector(self.ends[0]))), (last, point_at(after, vector(self.ends[1])))
+        centre: Station | None = None
+        if self.centre is not None:
+            centre = first, point_at(before, vector(self.centre))
         tensor = None
         if self.inertia is not None:
-            matrix = before[:3, :3] @ self.inertia @ before[:3, :3].T
-            tensor = tuple(float(matrix[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-        length = float(np.linalg.norm(self.ends[1] - self.ends[0]))
+            tensor = tensor_of(before[:3, :3] @ self.inertia @ before[:3, :3].T)
         return Member(
-            leg,
-            self.name,
-            length,
-            self.mass,
+            leg=leg,
+            name=self.name,
+            length=float(np.linalg.norm(self.ends[1] - self.ends[0])),
+            mass=self.mass,
             ends=lambda: ends,
-            centre=None if at is None else lambda: at,
+            centre=None if centre is None else lambda: centre,
             inertia=None if tensor is None else lambda: tensor,
         )
 
@@ -142,8 +144,8 @@ class MovingLeg:
     """A leg at the home pose.
 
     Attributes:
-        name: of it.
-        parts: from base to platform.
+        name: name of the leg.
+        parts: its parts from base to platform.
         bodies: its links that move.
     """
 
@@ -158,40 +160,67 @@ class MovingLeg:
 
     def placements(self, coordinates: Sequence[float]) -> list[Array]:
         """Return the placements of what is before each part, and of the platform end, at coordinates in rad and m."""
-        given = iter(coordinates)
-        rows = [np.eye(4)]
+        remaining = iter(coordinates)
+        placements = [np.eye(4)]
         for part in self.parts:
-            rows.append(rows[-1] @ part.motion(next(given)) if part.moves else rows[-1])
-        return rows
+            placements.append(placements[-1] @ part.motion(next(remaining)) if part.moves else placements[-1])
+        return placements
 
     def rates(self, placements: Sequence[Array], coordinates: Sequence[float]) -> Array:
         """Return the twists of the platform end about the origin per unit of each coordinate [6 x size]."""
-        given = iter(coordinates)
-        pairs = zip(self.parts, placements, strict=False)
-        return np.array([part.rate(before, next(given)) for part, before in pairs if part.moves]).reshape(-1, 6).T
+        moving = [pair for pair in zip(self.parts, placements, strict=False) if pair[0].moves]
+        twists = [part.rate(before, amount) for (part, before), amount in zip(moving, coordinates, strict=True)]
+        return np.array(twists).reshape(-1, 6).T
+
+    def closed_placements(self, start: Sequence[float], target: Array, length: float) -> list[Array]:
+        """Return the placements along the leg if its platform end is displaced to a target, by Newton's method.
+
+        Args:
+            start: coordinates to begin with, rad and m.
+            target: displacement of the platform from the home pose [4 x 4].
+            length: characteristic length of the machine, m.
+
+        Raises:
+            InputError: if the leg does not reach there.
+        """
+        coordinates = np.array(start, dtype=float)
+        for _ in range(MOST_CLOSING_STEPS):
+            placements = self.placements(coordinates.tolist())
+            gap = _twist(target @ np.linalg.inv(placements[-1]))
+            if _motion_size(gap, target, length) <= CLOSED:
+                return placements
+            rates = self.rates(placements, coordinates.tolist())
+            coordinates = coordinates + np.linalg.lstsq(rates, gap, rcond=None)[0]
+        raise InputError(
+            f'Leg "{self.name}", as the file describes it, does not reach the platform where kinetostat places it: '
+            f"{1000.0 * length * _motion_size(gap, target, length):.3g} mm are missing. Please report this machine."
+        )
 
     def at_pose(self, placements: Sequence[Array]) -> Leg:
         """Return the leg at the pose, its rods as long as the pose makes them."""
         pairs = list(zip(self.parts, placements, placements[1:], strict=False))
         chain = [part.at_pose(before, after) for part, before, after in pairs]
-        for i, part in enumerate(self.parts):
-            if part.rod:
-                start, end = self._rod_ends(i, chain)
-                stiffness = float(part.element.stiffness) / float(np.linalg.norm(end - start))  # type: ignore[attr-defined]
-                chain[i] = replace(chain[i], stiffness=stiffness)  # type: ignore[type-var]
+        for number, part in enumerate(self.parts):
+            rod = chain[number]
+            if part.rod and isinstance(rod, Spring):
+                start, end = self._rod_ends(number, chain)
+                chain[number] = replace(rod, stiffness=float(rod.stiffness) / float(np.linalg.norm(end - start)))
         return Leg(self.name, tuple(chain))
 
-    def _rod_ends(self, at: int, chain: Sequence[Element]) -> tuple[Array, Array]:
-        """Centres of the joints before and after a rod; a slide that comes first is written where its rod begins."""
+    def _rod_ends(self, number: int, chain: Sequence[Element]) -> tuple[Array, Array]:
+        """Return the centres of the joints before and after a rod of the leg at the pose, by the rod's number.
+
+        Where a slide comes first, the rod begins at the carriage of the slide.
+        """
         turning = [
             (i, element)
             for i, (part, element) in enumerate(zip(self.parts, chain, strict=True))
             if part.moves and (isinstance(element, Parallelogram) or joint_in(element).point is not None)
         ]
-        before = [element for i, element in turning if i < at]
-        after = next(element for i, element in turning if i > at)
-        start = _centre(before[-1], far=True) if before else array(joint_in(chain[at]).carriage)
-        return start, _centre(after, far=False)
+        before = [element for i, element in turning if i < number]
+        after = next(element for i, element in turning if i > number)
+        start = _far_centre(before[-1]) if before else array(joint_in(chain[number]).carriage)
+        return start, array(after.near if isinstance(after, Parallelogram) else joint_in(after).point)
 
 
 def turn(axis: Array, angle: float) -> Array:
@@ -213,12 +242,12 @@ def apply(place: Array, point: Array) -> Array:
     return np.asarray(place[:3, :3] @ point + place[:3, 3])
 
 
-def moved_point(place: Array, point: Vector) -> Vector:
+def point_at(place: Array, point: Vector) -> Vector:
     """Return a point (m) under a placement, as a vector."""
     return vector(apply(place, array(point)))
 
 
-def turned_direction(place: Array, direction: Vector) -> Vector:
+def direction_at(place: Array, direction: Vector) -> Vector:
     """Return a direction under a placement."""
     return vector(place[:3, :3] @ array(direction))
 
@@ -240,19 +269,31 @@ def joint_in(element: Any) -> Any:
 
 
 def _joint_at(joint: Joint, place: Array) -> Joint:
-    point = None if joint.point is None else moved_point(place, joint.point)
-    carriage = None if joint.carriage is None else moved_point(place, joint.carriage)
-    return replace(joint, axis=turned_direction(place, joint.axis), point=point, carriage=carriage)
+    point = None if joint.point is None else point_at(place, joint.point)
+    carriage = None if joint.carriage is None else point_at(place, joint.carriage)
+    return replace(joint, axis=direction_at(place, joint.axis), point=point, carriage=carriage)
 
 
-def _bars(bars: Parallelogram) -> tuple[Array, Array]:
-    """Return the way along the bars at the home pose, m, and the unit normal about which they swing."""
+def _swing(bars: Parallelogram, amount: float) -> tuple[Array, Array, Array]:
+    """Return the vector along bars at the home pose, the same after a swing by an arc, and its rate per arc, m."""
     span = array(bars.far) - array(bars.near)
-    return span, unit(np.cross(array(bars.side), span))
+    length, normal = float(np.linalg.norm(span)), unit(np.cross(array(bars.side), span))
+    swung_span = turn(normal, amount / length) @ span
+    return span, swung_span, np.cross(normal, swung_span) / length
 
 
-def _centre(element: Any, far: bool) -> Array:
-    """Return the centre of a joint that turns, or of the near or far side of a parallelogram, m."""
-    if isinstance(element, Parallelogram):
-        return array(element.far if far else element.near)
-    return array(joint_in(element).point)
+def _far_centre(element: Any) -> Array:
+    """Return the centre of a joint that turns, or of the far side of a parallelogram, m."""
+    return array(element.far if isinstance(element, Parallelogram) else joint_in(element).point)
+
+
+def _twist(displacement: Array) -> Array:
+    """Return a small displacement as a twist about the origin, rotation first [6]."""
+    skew = 0.5 * (displacement[:3, :3] - displacement[:3, :3].T)
+    return np.array([skew[2, 1], skew[0, 2], skew[1, 0], *displacement[:3, 3]])
+
+
+def _motion_size(gap: Array, target: Array, length: float) -> float:
+    """Return the size of the motion of the platform by a twist: rad, or share of the machine's length."""
+    translation = gap[3:] + np.cross(gap[:3], target[:3, 3])
+    return max(float(np.linalg.norm(gap[:3])), float(np.linalg.norm(translation)) / length)

@@ -343,6 +343,11 @@ def matrix_of(tensor: Sequence[Scalar]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+def tensor_of(matrix: Array) -> tuple[float, ...]:
+    """Return an inertia matrix [3 x 3] as xx, yy, zz, xy, xz, yz."""
+    return tuple(float(matrix[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+
+
 def thin_rod(mass: float, start: Array, end: Array) -> Heavy:
     """Return a straight uniform rod (kg) between two points (m), without inertia about its own axis."""
     span = end - start
