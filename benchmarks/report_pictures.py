@@ -14,9 +14,8 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.report import gather
 from kinetostat.validation.comparison import validate
-from kinetostat.views.report.pdf import page_pictures
-from kinetostat.views.report.stiffness import Origin
-from kinetostat.views.report.writing import report_of
+from kinetostat.views.report.writers import page_pictures
+from kinetostat.views.report.writing import Origin, report_of
 
 ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / "tests" / "edges"))

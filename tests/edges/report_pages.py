@@ -11,7 +11,7 @@ from PIL import Image
 
 from kinetostat.cli import main
 from kinetostat.views.rendering import light
-from kinetostat.views.report import pictures
+from kinetostat.views.report import summary
 
 MACHINE = "zhang-gosselin-4dof"
 QUICK = [word for part in ("guidelines", "sensitivity", "validation") for word in ("--without", part)]
@@ -27,7 +27,7 @@ def reported(path, subject, *words):
 
 def small_pictures(patch):
     """Draw the machine small and by few lamps, because that is what takes longest."""
-    patch.setattr(pictures, "PICTURE_SIZE", (160, 112))
+    patch.setattr(summary, "PICTURE_SIZE", (160, 112))
     few_lamps(patch)
 
 
@@ -41,7 +41,7 @@ def no_pictures(patch):
     """Draw no machine at all."""
     blank = io.BytesIO()
     Image.new("RGB", (8, 6)).save(blank, "png")
-    patch.setattr(pictures, "picture", lambda *_: blank.getvalue())
+    patch.setattr(summary, "picture", lambda *_: blank.getvalue())
 
 
 def no_layout(patch):

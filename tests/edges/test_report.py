@@ -22,10 +22,9 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.datasets import usual_ranges
 from kinetostat.studies.report import REPORT_PARTS
 from kinetostat.studies.requirements import requirements
-from kinetostat.views.report import pdf, pictures
-from kinetostat.views.report.html_page import html_page
-from kinetostat.views.report.method import Origin
-from kinetostat.views.report.writing import report_of
+from kinetostat.views.report import summary, writers
+from kinetostat.views.report.writers import html_page
+from kinetostat.views.report.writing import Origin, report_of
 from pages import ROOT
 from studies import SMALL
 
@@ -249,13 +248,14 @@ def test_bad_input_is_refused_with_its_reason(words, reason, tmp_path, capsys, m
 
 
 def test_without_typst_a_pdf_is_refused_at_once(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(pdf, "find_spec", lambda _: None)
+    monkeypatch.setattr(writers, "find_spec", lambda _: None)
     assert main(["report", MACHINE, "-o", str(tmp_path / "r.pdf")]) == 2
     assert extra_command("report") in capsys.readouterr().err
 
 
 def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
-    monkeypatch.setattr(pictures, "renderer", lambda: None)
+    for module in (summary, writers):
+        monkeypatch.setattr(module, "renderer_modules", lambda: None)
     page = Page(quick(load(MACHINE)))
     assert "live-data" not in page.attached
     assert "img" in page.tags

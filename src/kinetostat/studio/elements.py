@@ -14,7 +14,7 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
 from kinetostat.spec.document import LARGEST_FILE
-from kinetostat.views.scene.browser import RENDERER
+from kinetostat.views.scene import RENDERER
 from kinetostat.views.scene.solids import looks_data
 
 COMPONENTS = Path(__file__).parent / "components"

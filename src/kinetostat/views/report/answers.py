@@ -47,8 +47,7 @@ from kinetostat.views.optimisation import (
 )
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.question import Description
-from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, as_table, typeset
-from kinetostat.views.report.pictures import figure_of
+from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, as_figure, as_table, typeset
 from kinetostat.views.sensitivity import SENSITIVITY
 from kinetostat.views.validation import VALIDATION
 
@@ -106,7 +105,7 @@ def _description_blocks(description: Description, answer: Any) -> Iterator[Block
         yield Paragraph(typeset(part)) if isinstance(part, str) else as_table(part, f"{part.title}.")
     for drawing in description.drawings(answer).values():
         if not drawing.minor:
-            yield figure_of(drawing(title=""), drawing.caption)
+            yield as_figure(drawing(title=""), drawing.caption)
 
 
 def _frequencies(answers: Answers) -> Iterator[Block]:
@@ -115,7 +114,7 @@ def _frequencies(answers: Answers) -> Iterator[Block]:
     if over is not None and (over["status"] == int(Status.OK)).any():
         draw = contour_maps if over["status"].ndim == 2 else grid_curves
         names = [str(name) for name in over.data_vars if "frequency" in str(name)]
-        yield figure_of(draw(over, names, ""), "The first natural frequency over the poses.")
+        yield as_figure(draw(over, names, ""), "The first natural frequency over the poses.")
 
 
 def loaded_section(state: LoadedState, answers: Answers) -> Section:
@@ -140,9 +139,9 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     yield Paragraph(typeset(stability_of(state)), "Stability:")
     display = state.machine.display
     displacements = displacement_table(state, display)
-    yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
+    yield as_figure(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
     yield as_table(displacements, f"{displacements.title}, with exact geometry and by linear equations; base axes.")
-    yield figure_of(bars_figure(state), "What each leg carries.")
+    yield as_figure(bars_figure(state), "What each leg carries.")
     yield as_table(springs_or_kinds_table(state, display), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
         yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
@@ -154,7 +153,7 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
             "all others held. The part of K under load that is not of springs is what loads and weights do by turning."
         )
         yield as_table(tangent, caption)
-    yield figure_of(load_figure(state, ""), "Displacement and loads while the loads grow, beside the linear answer.")
+    yield as_figure(load_figure(state, ""), "Displacement and loads while the loads grow, beside the linear answer.")
 
 
 WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": loaded_section}
@@ -223,7 +222,7 @@ def _study_search(result: Result) -> tuple[Block, ...]:
     settings = problem.study.optimizer
     method = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {result.message}"
     names = (name for name in ("convergence", "front") if name in figures)
-    return (Paragraph(typeset(method)), *(figure_of(figures[name](), figures[name].caption) for name in names))
+    return (Paragraph(typeset(method)), *(as_figure(figures[name](), figures[name].caption) for name in names))
 
 
 def _study_answer(result: Result) -> tuple[Block, ...]:
@@ -236,14 +235,14 @@ def _study_answer(result: Result) -> tuple[Block, ...]:
             f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
         ),
         as_table(direction_table(result), "Compliance before and after, at the worst of all poses."),
-        figure_of(figures["comparison"](), figures["comparison"].caption),
+        as_figure(figures["comparison"](), figures["comparison"].caption),
     ]
     if several:
         blocks.append(as_table(front_table(result), "Designs of the front."))
     if result.robustness:
         scatter = scatter_table(result.robustness, result.problem.machine.display)
         blocks.append(as_table(scatter, "Objectives under the tolerances."))
-        blocks.append(figure_of(figures["tolerances"](), figures["tolerances"].caption))
+        blocks.append(as_figure(figures["tolerances"](), figures["tolerances"].caption))
         if result.robustness.failing:
             blocks.append(Paragraph(failing(result.robustness)))
     items = tuple((typeset(line), "") for line in remarks(result))

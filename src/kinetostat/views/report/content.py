@@ -1,19 +1,31 @@
 """Content of a report as plain data: sections of paragraphs, lists, tables, figures, formulas and listings.
 
 All texts are plain: writers do not interpret markup in them. Sentences and tables of the terminal are typeset here,
-with proper powers of ten, minus signs and degrees. The writers (`html_page`, `pdf`) number sections, figures and
-tables; file formats are known only to them.
+with proper powers of ten, minus signs and degrees, and drawings become figures. The writers (`writers`) number
+sections, figures and tables; file formats are known only to them.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rich.table import Table as TerminalTable
 
 from kinetostat.display import with_minus_signs, without_round_off
 from kinetostat.frozen import dataclass
+from kinetostat.late import LateModule
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
+
+FULL_WIDTH_INCHES = 7.4
+"""Width of a drawing that takes the whole width of the text, which is 6.7 inches on A4: drawings are shrunk to nine
+tenths of their size, and their letters of 8 points to 7.2, less than those of captions."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +163,11 @@ def _scientific(digits: str, zeros: int) -> str:
     """A large whole number, given by its leading digits and the number of zeros that follow, with a power of ten."""
     decimals = f".{digits[1:]}" if digits[1:] else ""
     return f"{digits[0]}{decimals}e{zeros + len(digits) - 1}"
+
+
+def as_figure(drawing: "Drawing", caption: str) -> Figure:
+    """Convert a drawing of Matplotlib for a report, in which all drawings have one scale."""
+    return Figure(caption, figures.as_svg(drawing), min(1.0, drawing.get_figwidth() / FULL_WIDTH_INCHES))
 
 
 def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:

@@ -1,4 +1,4 @@
-"""Sections on the stiffness: K and C, attribution, indices, load case, maps.
+"""Sections on the stiffness: its theory in formulas, K and C, attribution, indices, load case, maps.
 
 Nothing is computed here.
 """
@@ -9,6 +9,7 @@ from kinetostat.display import DASH, number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.datasets import failures
+from kinetostat.studies.printed_numbers import CITATION
 from kinetostat.studies.report import NOTHING_TO_MAP, Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,
@@ -25,15 +26,85 @@ from kinetostat.views.analysis_tables import (
 from kinetostat.views.figures import missing_line
 from kinetostat.views.grid import axis_values, display_of
 from kinetostat.views.grid_figures import contour_maps, grid_curves
-from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table, as_table, typeset
-from kinetostat.views.report.method import MOTION
-from kinetostat.views.report.pictures import PICTURE_WIDTH, MachinePictures, figure_of
+from kinetostat.views.report.content import (
+    Block,
+    Figure,
+    Formula,
+    Paragraph,
+    Section,
+    Table,
+    as_figure,
+    as_table,
+    typeset,
+)
+from kinetostat.views.report.summary import PICTURE_WIDTH, MachinePictures
 
 BLOCK_UNITS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
     "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the {} to see "
     "deflections, actuator loads and joint reactions here."
 )
+THEORY_TEXT = (
+    "Every elastic part is described by its compliance, which is 0 for a rigid part: rigid and flexible parts are one "
+    "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; a twist is "
+    "(rotation, translation), a wrench (moment, force), both at the reference point. K and C hold for small motions."
+)
+LEGS_TEXT = (
+    "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p). Under them it "
+    "deflects by its elastic coordinates (unit twists J with index e, compliances S):"
+)
+SUM_TEXT = (
+    "The stiffnesses of the legs add up; where springs are rigid or the machine is overconstrained, the force method "
+    "is used instead:"
+)
+
+
+def _matrix(letter: str, below: str = "", above: str = "") -> str:
+    """Write a bold letter with an index and a power, as MathML."""
+    base = f'<mi mathvariant="normal" class="matrix">{letter}</mi>'
+    if below and above:
+        return f"<msubsup>{base}{below}{above}</msubsup>"
+    return f"<msub>{base}{below}</msub>" if below else base
+
+
+_LEG, _ELASTIC, _PASSIVE, _TRANSPOSED = (f"<mi>{letter}</mi>" for letter in ("i", "e", "p", "T"))
+_INVERSE = "<mrow><mo>−</mo><mn>1</mn></mrow>"
+_EQUALS, _AND = "<mo>=</mo>", '<mo>,</mo><mspace width="2em"/>'
+_CARRIED = [_matrix("J", _PASSIVE, _TRANSPOSED), _matrix("W", _LEG), _EQUALS, "<mn>0</mn>"]
+_DEFLECTING = [
+    _matrix("G", _LEG), _EQUALS, _matrix("W", _LEG, _TRANSPOSED), _matrix("J", _ELASTIC), _matrix("S"),
+    _matrix("J", _ELASTIC, _TRANSPOSED), _matrix("W", _LEG),
+]  # fmt: skip
+
+MOTION = Formula(
+    "".join([
+        _matrix("w"), _EQUALS, _matrix("K"), _matrix("t"), _AND, _matrix("t"), _EQUALS, _matrix("C"), _matrix("w"),
+    ]),
+    "bold(w) = bold(K) thin bold(t), quad quad bold(t) = bold(C) thin bold(w)",
+)  # fmt: skip
+"""Relation of a load and the small motion that it causes."""
+LEG = Formula(
+    "".join([*_CARRIED, _AND, *_DEFLECTING]),
+    "bold(J)_p^T bold(W)_i = 0, quad quad bold(G)_i = bold(W)_i^T bold(J)_e bold(S) bold(J)_e^T bold(W)_i",
+)
+"""Wrenches that a leg carries, and its deflection."""
+ASSEMBLY = Formula(
+    "".join([
+        _matrix("K"), _EQUALS, f"<munder><mo>∑</mo>{_LEG}</munder>", _matrix("W", _LEG), _matrix("G", _LEG, _INVERSE),
+        _matrix("W", _LEG, _TRANSPOSED),
+    ]),
+    "bold(K) = sum_i bold(W)_i bold(G)_i^(-1) bold(W)_i^T",
+)  # fmt: skip
+"""Sum of the stiffnesses of the legs."""
+
+
+def method_section() -> Section:
+    """Write the section with the theory in two formulas."""
+    source = f"Source: {CITATION}, and the documentation of kinetostat, theory."
+    return Section(
+        "Method",
+        (Paragraph(THEORY_TEXT), Paragraph(LEGS_TEXT), LEG, Paragraph(SUM_TEXT), ASSEMBLY, Paragraph(source)),
+    )
 
 
 def stiffness_section(analysis: Analysis) -> Section:
@@ -144,7 +215,7 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
     draw = contour_maps if len(dims) == 2 else grid_curves
     return [
         Paragraph(setting),
-        figure_of(draw(maps, names, ""), "Compliance in each direction over the poses."),
+        as_figure(draw(maps, names, ""), "Compliance in each direction over the poses."),
         _extremes(maps, names),
     ]
 

@@ -1,17 +1,20 @@
 """The first sections: the results in sentences, each direction in a line, the machine, and every number of its file.
 
-Nothing is computed here but sums of shares.
+The machine has still pictures, and on a page a scene that turns under the mouse. Nothing is computed here but sums of
+shares.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from kinetostat.display import Display, number
 from kinetostat.equilibrium.state import state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.leg import Spring
@@ -23,17 +26,44 @@ from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
+from kinetostat.studies.vibration import Vibration
 from kinetostat.units import load_unit
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.analysis_tables import first_lines, margin_sentence
 from kinetostat.views.drawing import three_views
 from kinetostat.views.loaded import KINDS_OF_LOADS, actuator_springs, loaded_lines
+from kinetostat.views.picture import picture
 from kinetostat.views.report.answers import gains, verdict_of
-from kinetostat.views.report.content import Block, Bullets, Figure, Paragraph, Section, Table, as_table, typeset
-from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
+from kinetostat.views.report.content import (
+    Block,
+    Bullets,
+    Figure,
+    Paragraph,
+    Section,
+    Table,
+    as_figure,
+    as_table,
+    typeset,
+)
+from kinetostat.views.scene import renderer_modules
+from kinetostat.views.scene.anatomy import proportions_of
+from kinetostat.views.scene.machine_scene import machine_scene
+from kinetostat.views.scene.overlays import overlays_of, swing_data
+from kinetostat.views.scene.solids import Scene, Solid, as_data, solid_data
 from kinetostat.views.tables import headline, machine_table, requirement_lines
 from kinetostat.views.validation import verdict
 
+PICTURE_SIZE = (800, 560)
+"""Pixels of a picture of the machine: 200 to an inch at `PICTURE_WIDTH` of an A4 page. More would be seen in the time
+alone: these take a quarter of a report's."""
+PICTURE_WIDTH = 0.6
+"""Width of that picture as a share of the width of the text: its caption and the text around it stay on the page."""
+LOADED_LAYERS = ("load", "deflection")
+"""Layers of a loaded machine."""
+SWINGING_MODES = 6
+"""Modes whose shapes swing on a page: the lowest ones, since each adds its solids to the file."""
+NO_RENDERER = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
+"""Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 LINES_OF_THE_POSE = ("Pose", "Margin")
 """Lines about the free machine that stand in the summary of a loaded one, whose stiffness is that at rest."""
 
@@ -141,6 +171,55 @@ def _contributors(analysis: Analysis, springs: Sequence[Spring], i: int) -> str:
     return largest_contributors(*parts_and_kinds(springs, shares)) or "nothing"
 
 
+@dataclass(frozen=True)
+class MachinePictures:
+    """A machine at its pose as solids.
+
+    Attributes:
+        scene: the machine.
+        overlays: compliance ellipsoids, load and deflected shape.
+        factor: the factor by which deflections are exaggerated; None without a load.
+        swings: name of each mode of vibration, and its solids at both ends of their swing as plain data.
+    """
+
+    scene: Scene
+    overlays: tuple[Solid, ...]
+    factor: float | None
+    swings: tuple[tuple[str, list[dict[str, Any]]], ...] = ()
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Scene and overlays as plain data for the renderer of a page."""
+        return {
+            "scene": {**as_data(self.scene), "fit": True},
+            "overlays": [solid_data(solid) for solid in self.overlays],
+            "swings": [{"name": name, "solids": solids} for name, solids in self.swings],
+        }
+
+    def portrait(self) -> bytes:
+        """Return a PNG of the machine."""
+        return picture(self.scene, PICTURE_SIZE)
+
+    def deflected_picture(self) -> bytes:
+        """Return a PNG of the loaded machine with its deflected shape."""
+        loaded = (solid for solid in self.overlays if solid.layer in LOADED_LAYERS)
+        return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), PICTURE_SIZE)
+
+
+def machine_pictures(analysis: Analysis, vibration: Vibration | None = None) -> MachinePictures:
+    """Build the solids of an analysed machine with its overlays, and the swings of its modes where these are known."""
+    machine = analysis.machine
+    configuration = analysis.state.configuration
+    sizes = proportions_of(machine, configuration)
+    overlays, factor = overlays_of(analysis, sizes)
+    swings = [
+        (f"mode {number}, {machine.display.show(mode.frequency, 'Hz')}", solids)
+        for number, mode in enumerate(vibration.modes[:SWINGING_MODES] if vibration else (), 1)
+        if mode.shape is not None and (solids := swing_data(machine, configuration, sizes, mode.shape))
+    ]
+    return MachinePictures(machine_scene(machine, configuration, sizes), tuple(overlays), factor, tuple(swings))
+
+
 def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figure:
     """Return the picture of the machine on the first page.
 
@@ -149,7 +228,7 @@ def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figur
         pictures: the pictures of the machine.
         live: whether the report will be a page, which shows the machine in three dimensions if it can.
     """
-    machine, turning = analysis.machine, live and can_be_live()
+    machine, turning = analysis.machine, live and renderer_modules() is not None
     caption = f"{machine.name} at its pose: actuated legs blue, passive ones orange."
     if live and not turning:
         caption += NO_RENDERER.format(extra_command("report"))
@@ -169,7 +248,7 @@ def machine_section(analysis: Analysis) -> Section:
 def _drawing(analysis: Analysis) -> Figure:
     """Front, side and plan of the machine; of a planar machine the plan alone."""
     views = "Plan" if analysis.machine.family.planar else "Front, side and plan"
-    return figure_of(
+    return as_figure(
         three_views(analysis.machine, ""),
         f"{views}, to scale; K, C and the load refer to {analysis.machine.reference[-1]}.",
     )

@@ -1,9 +1,11 @@
 """A report as a file: the answers are gathered, its sections put in order, and written as a page or as a PDF.
 
-Sections are written in the modules beside this one; only the order of the work and the file are decided here.
+Sections are written in the modules beside this one, but for the record of how to repeat the report; the order of the
+work and the file are decided here.
 """
 
 import json
+import platform
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -32,15 +34,41 @@ from kinetostat.views.report.answers import (
     study_section,
     validation_section,
 )
-from kinetostat.views.report.content import InnerPage, Paragraph, Report, Section, typeset
-from kinetostat.views.report.html_page import html_page
-from kinetostat.views.report.method import Origin, method_section, record_section
-from kinetostat.views.report.pdf import check_typst, pdf_bytes
-from kinetostat.views.report.pictures import machine_pictures
-from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
-from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
+from kinetostat.views.report.content import InnerPage, Listing, Paragraph, Report, Section, Table, typeset
+from kinetostat.views.report.stiffness import load_section, method_section, stiffness_section, workspace_section
+from kinetostat.views.report.summary import (
+    data_section,
+    machine_pictures,
+    machine_section,
+    portrait,
+    summary_section,
+)
+from kinetostat.views.report.writers import check_typst, html_page, pdf_bytes
 
 SUFFIXES = (".html", ".pdf")
+LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
+"""Programs whose versions decide the digits and the pictures of a report."""
+AGAIN_TEXT = (
+    "The same command with the same input and the same versions makes this report again, byte for byte. The machine "
+    "with all digits (machine.toml) and the results (results.json) are inside this file."
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The sources of a report.
+
+    Attributes:
+        command: the command that makes it again.
+        inputs: name and text of each file, as written.
+        machine_file: the machine with all overrides, all digits.
+        results: the analysis as JSON.
+    """
+
+    command: str
+    inputs: tuple[tuple[str, str], ...]
+    machine_file: str
+    results: str
 
 
 @dataclass(frozen=True)
@@ -247,6 +275,26 @@ def moving_sections(analysis: Analysis) -> list[Section]:
     words = Paragraph("Sliders move the machine, and all numbers follow: they are computed here, by its own formulas.")
     page = page_of(page_functions(machine), "machine")
     return [Section("The machine to move", (words, InnerPage(f"{machine.name} to move", page)))]
+
+
+def record_section(origin: Origin, engine: Sequence[str]) -> Section:
+    """Write the section with the command, the versions and the input.
+
+    Args:
+        origin: the origin of the report.
+        engine: name and version of the independent engine; empty without one.
+    """
+    versions = [(name, version(name)) for name in LIBRARIES] + [("Python", platform.python_version())]
+    versions += [(engine[0], engine[1])] if engine else []
+    return Section(
+        "Record",
+        (
+            Paragraph(AGAIN_TEXT),
+            Listing("Command.", origin.command),
+            Table("Versions.", ("program", "version"), tuple(versions), (False, False)),
+            *(Listing(f"Input: {name}.", text) for name, text in origin.inputs),
+        ),
+    )
 
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:

@@ -1,14 +1,26 @@
-"""A report as one self-contained HTML page: pictures, data and the renderer are inside it, and it needs no server.
+"""The two writers of a report: one self-contained HTML page, or one PDF. The content is that of `content.Report`.
 
-The content comes from `content.Report`; only its form is decided here.
+A page has pictures, data and the renderer of scenes inside it, and needs no server. A PDF is laid out by a Typst
+template, which reads the content as JSON, so that no text of a name or a file is taken for a command.
 """
 
+import gzip
 import json
+import struct
 from base64 import b64encode
+from collections.abc import Mapping
+from dataclasses import asdict
 from html import escape
+from importlib import import_module
+from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
+
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.installation import extra_command
 from kinetostat.views.page import Markup, as_markup, whole_page
 from kinetostat.views.page import table as plain_table
 from kinetostat.views.report.content import (
@@ -23,19 +35,27 @@ from kinetostat.views.report.content import (
     Section,
     Table,
 )
-from kinetostat.views.report.pictures import live_html
+from kinetostat.views.scene import renderer_modules
+from kinetostat.views.scene.solids import looks_data
 
 REPORT_STYLE = Path(__file__).with_name("report.css").read_text("utf-8")
+LIVE_SCRIPT = Path(__file__).with_name("live.js")
+"""Script of a page that unpacks the renderer and the scene."""
 MEDIA_TYPES = {"json": "application/json", "toml": "text/plain"}
 """Media types of attachments, by the ending of their name."""
+TEMPLATE = Path(__file__).with_name("report.typ")
+INSTALL_TYPST = "A PDF needs Typst; install it with `{}`, or write an HTML page: -o report.html."
+FIRST_SYSTEM_CHARACTER = "\u2e80"
+"""From this character on, a text may need the fonts of the system. Without such characters the system's fonts are
+ignored, so that the bytes are the same on every computer."""
 
 
 def html_page(report: Report) -> str:
     """Write a report as an HTML page."""
-    return whole_page(f"{report.title}: {report.kind.lower()}", REPORT_STYLE, _Writer(report).body())
+    return whole_page(f"{report.title}: {report.kind.lower()}", REPORT_STYLE, _PageWriter(report).body())
 
 
-class _Writer:
+class _PageWriter:
     """Writer of the blocks, in order, which numbers figures, tables and formulas."""
 
     def __init__(self, report: Report) -> None:
@@ -104,7 +124,7 @@ class _Writer:
         picture = block.picture if isinstance(block.picture, str) else _png(block.picture, block.caption)
         stage = ""
         if block.live is not None:
-            self._live = live_html(block.live)
+            self._live = _live_html(block.live)
             stage = f'<div id="live" data-label="{escape(block.caption)} Drag, or use arrow keys, to turn it."></div>'
         caption = f"<b>Figure {next(self._figures)}.</b> {escape(block.caption)}"
         style = f"max-width:{100 * block.width:g}%;--share:{block.width:g}"
@@ -126,3 +146,94 @@ def _attachment(name: str, text: str) -> str:
     kind = MEDIA_TYPES[name.rpartition(".")[2]]
     data = text if kind == MEDIA_TYPES["json"] else json.dumps(text, ensure_ascii=False)
     return f'<script type="{kind}" id="{escape(name)}">{data.replace("<", chr(92) + "u003c")}</script>'
+
+
+def _live_html(scene: Mapping[str, Any]) -> str:
+    """Elements that unpack the renderer and show a scene in the element with the id "live"; empty without libraries.
+
+    Renderer and scene are compressed together, without a time stamp: the same scene gives the same bytes.
+    """
+    modules = renderer_modules()
+    if modules is None:
+        return ""
+    content = {"modules": modules, "looks": looks_data(), **scene}
+    data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
+    packed = b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    script = LIVE_SCRIPT.read_text("utf-8")
+    return f'<script type="text/plain" id="live-data">{packed}</script>\n<script>\n{script}</script>'
+
+
+def check_typst() -> None:
+    """Check that Typst is installed.
+
+    Raises:
+        InputError: it is not; the message says how to install it.
+    """
+    if find_spec("typst") is None:
+        raise InputError(INSTALL_TYPST.format(extra_command("report")))
+
+
+def pdf_bytes(report: Report) -> bytes:
+    """Write a report as a PDF; the same report gives the same bytes.
+
+    Raises:
+        InputError: Typst is not installed.
+    """
+    return bytes(_compile(report, format="pdf"))
+
+
+def page_pictures(report: Report, dots: float) -> list[bytes]:
+    """Draw every page as a PNG, with so many dots to an inch.
+
+    Raises:
+        InputError: Typst is not installed.
+    """
+    return list(_compile(report, format="png", ppi=dots))
+
+
+def _compile(report: Report, **form: Any) -> Any:
+    check_typst()
+    compiler: Any = import_module("typst")
+
+    files: dict[str, bytes] = {}
+    content = {
+        "kind": report.kind,
+        "title": report.title,
+        "facts": report.facts,
+        "sections": [_section_data(section, files) for section in report.sections],
+        "attachments": dict(report.attachments),
+    }
+    text = json.dumps(content, ensure_ascii=False)
+    sources: dict[str, Any] = {"main": TEMPLATE.read_bytes(), "report.json": text.encode(), **files}
+    fonts = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
+    plain = max(text) < FIRST_SYSTEM_CHARACTER
+    return compiler.compile(sources, font_paths=fonts, ignore_system_fonts=plain, **form)
+
+
+def _section_data(section: Section, files: dict[str, bytes]) -> dict[str, Any]:
+    return {
+        "kind": "section",
+        "title": section.title,
+        "blocks": [_block_data(block, files) for block in section.blocks],
+    }
+
+
+def _block_data(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
+    match block:
+        case Section():
+            return _section_data(block, files)
+        case Figure(caption, picture, width):
+            name = f"figure-{len(files) + 1}.svg"
+            files[name] = (picture if isinstance(picture, str) else _svg_around(picture)).encode()
+            return {"kind": "figure", "caption": caption, "file": name, "width": width}
+        case Formula(_, typst):
+            return {"kind": "formula", "typst": typst}
+    return {"kind": type(block).__name__.lower(), **asdict(block)}
+
+
+def _svg_around(png: bytes) -> str:
+    """Return a PNG inside an SVG element, because the files handed to Typst must be text."""
+    width, height = struct.unpack(">II", png[16:24])
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
+    data = b64encode(png).decode()
+    return f'{head}<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/></svg>'
