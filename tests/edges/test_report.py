@@ -11,7 +11,7 @@ from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, sm
 
 from kinetostat import report
 from kinetostat.cli import main
-from kinetostat.commands import report as report_command
+from kinetostat.commands import documents
 from kinetostat.commands.common import STOPPED
 from kinetostat.machine.loading import as_toml, bundled, load
 from kinetostat.machine.parameters import values
@@ -221,7 +221,7 @@ def test_every_bundled_machine_has_a_page(name):
 
 
 def test_the_command_leaves_out_what_can_be_left_out():
-    assert report_command.REPORT_PARTS == REPORT_PARTS
+    assert documents.REPORT_PARTS == REPORT_PARTS
 
 
 @pytest.mark.parametrize("setting", ["pose.z=3 m", "limits.longest_leg=10 cm"])
