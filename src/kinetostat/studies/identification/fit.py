@@ -66,7 +66,7 @@ class ResidualEquations(Protocol):
 
 @dataclass(frozen=True)
 class FitOptions:
-    """What is known of unknowns and measurements before a fit, and whether outliers are set aside.
+    """Options of a fit: what is known before of unknowns and measurements, and whether outliers are set aside.
 
     Attributes:
         sizes: plausible size of each unknown, SI [unknowns].
@@ -300,8 +300,8 @@ class _SeenCombinations:
     preference: Array
 
     @property
-    def known(self) -> Array:
-        """Rows of priors and preference, which stand beside those of the measured values [rows x unknowns]."""
+    def rows_beside_measured(self) -> Array:
+        """Rows of priors and preference, which count beside those of the measured values [rows x unknowns]."""
         return np.concatenate([self.prior, self.preference])
 
 
@@ -339,11 +339,11 @@ def _least_squares(
 
     def residuals(units: Array) -> Array:
         measured = equations.residuals(units * options.sizes)[kept]
-        return np.concatenate([measured, seen.known @ units, constant])
+        return np.concatenate([measured, seen.rows_beside_measured @ units, constant])
 
     def slopes(units: Array) -> Array:
         measured = -_rates_at(equations, units * options.sizes, options)[1][kept]
-        return np.concatenate([measured, seen.known, no_slope])
+        return np.concatenate([measured, seen.rows_beside_measured, no_slope])
 
     def loss(squares: Array) -> Array:
         """Cauchy's loss of measured values and the square of all other rows, with first and second derivatives."""
@@ -380,7 +380,7 @@ def _fit_result(before: Array, state: _Iterate, groups: Integers, options: FitOp
         rank=seen.rank,
         interval=interval,
         freedom=freedom,
-        predicted=_predicted_residuals(state, groups, seen.known),
+        predicted=_predicted_residuals(state, groups, seen.rows_beside_measured),
     )
 
 
