@@ -255,7 +255,7 @@ def test_rates_of_the_target_leave_the_twists_of_the_tool_as_they_are():
     model, data = on_a_line()
     unknowns = [place_unknown(path) for path in (*FRAME_UNKNOWNS, *TARGET_UNKNOWNS)]
     observed = observation(model, data, unknowns)
-    target = observed._target_of(np.zeros((len(data), 6)), np.zeros(len(unknowns)))
+    target = observed._target_at(np.zeros((len(data), 6)), np.zeros(len(unknowns)))
     twists = np.zeros((len(data), 6, len(unknowns)))
     rates = target.rates(twists, [unknown.path for unknown in unknowns])
     assert rates.any(axis=(0, 1)).all()
