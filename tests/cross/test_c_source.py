@@ -31,8 +31,8 @@ from printed_machines import MACHINES, entries_by_python, machine_of, poses_of, 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
 QUICKLY = "-O0"
 """Formulas have hundreds of thousands of characters, and compile eight times as fast without optimisation."""
-COMPILER = next((name for name in ("gcc", "clang") if shutil.which(name)), "cc")
-"""The C compiler of this machine, where one will do."""
+COMPILER = next((name for name in ("clang", "gcc") if shutil.which(name)), "cc")
+"""The C compiler of this machine, where one will do: clang takes half of the time of gcc without optimisation."""
 CHECKS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 LOADED = ["load.force=[2, -3, -10]"]
 NUMBERS = np.ctypeslib.ndpointer(dtype=float, flags="C_CONTIGUOUS")
