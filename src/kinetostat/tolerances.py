@@ -17,6 +17,11 @@ LIMIT_SLACK = 1e-9
 """Share of its scale by which a measure may pass a limit that still counts as kept: so that a pose that was computed to
 lie exactly at its limit is not refused by round-off, and yet far below what anyone can measure on a machine."""
 
+# Files
+
+ROUND_OFF_OF_INERTIA = 1e-4
+"""Share of its largest entry by which an inertia tensor may be impossible, because files give a few digits."""
+
 # Exchange with other programs
 
 ROUND_OFF_OF_COUPLING = 1e-14

@@ -19,22 +19,23 @@ from kinetostat.machine.machine import Chains, Configuration
 from kinetostat.machine.rods import rods
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
-AHEAD = 1e-4
-"""Motion of an actuator, m or rad, that shows its sense."""
+TRIAL_MOTION = 1e-4
+"""Motion of an actuator, m or rad, that shows its sense: far above round-off, too small to pass a turning point."""
 LENGTH, POSITION = "length of the leg", "position along its axis from the base origin"
 HEIGHT = "position along its rail from the foot of that"
 ELEVATION, BEARING = "angle of the crank above the x-y plane", "angle of the crank from x"
-TRAVEL, TURNED = "travel from the home pose", "turn from the home pose"
+TRAVEL, TURN = "travel from the home pose", "turn from the home pose"
+"""Meanings of the coordinates of actuators, for people."""
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """An actuator and where it stands.
+    """An actuator with its coordinate.
 
     Attributes:
         name: the name of the joint that it drives, e.g. "leg 1 actuator".
-        leg: name of its leg.
-        meaning: what its coordinate counts.
+        leg: the name of its leg.
+        meaning: the meaning of its coordinate, in words.
         coordinate: m, or rad.
         slides: whether it is linear.
     """
@@ -66,7 +67,7 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
         configuration: the configuration of a machine in closed form.
     """
     lengths = {rod.leg: rod.length for rod in rods(configuration.legs) if rod.telescopic}
-    result, end = [], configuration.platform.translation
+    actuators, end = [], configuration.platform.translation
     for leg in configuration.legs:
         for place, spring in enumerate(leg.chain):
             if not (isinstance(spring, Spring) and spring.actuated):
@@ -80,8 +81,10 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
                 coordinate = reached.dot(spring.joint.axis)
             else:
                 meaning, coordinate = _crank_angle(spring.joint, leg, place, end)
-            result.append(Actuator(name_of(spring), leg.name, meaning, coordinate, slides))
-    return result
+            actuators.append(
+                Actuator(name=name_of(spring), leg=leg.name, meaning=meaning, coordinate=coordinate, slides=slides)
+            )
+    return actuators
 
 
 def senses_of(configuration: Configuration) -> list[Scalar]:
@@ -93,14 +96,14 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
     senses: list[Scalar] = []
     for leg in configuration.legs:
         driven = [(place, part) for place, part in enumerate(leg.chain) if isinstance(part, Spring) and part.actuated]
-        # What an actuator of a leg measures depends on this leg and the platform alone.
-        here = actuators_of(replace(configuration, legs=(leg,))) if driven else []
+        # The coordinate of an actuator depends on its own leg and the platform alone.
+        before = actuators_of(replace(configuration, legs=(leg,))) if driven else []
         for number, (place, spring) in enumerate(driven):
-            ahead, motion = spring.moved(AHEAD)
-            behind = [element.displaced(motion) for element in leg.chain[place + 1 :]]
-            moved = replace(leg, chain=(*leg.chain[:place], ahead, *behind))
-            there = actuators_of(replace(configuration, platform=motion @ configuration.platform, legs=(moved,)))
-            senses.append(np.sign(np.asarray(there[number].coordinate, dtype=float) - here[number].coordinate))
+            moved_spring, motion = spring.moved(TRIAL_MOTION)
+            following = [element.displaced(motion) for element in leg.chain[place + 1 :]]
+            moved_leg = replace(leg, chain=(*leg.chain[:place], moved_spring, *following))
+            after = actuators_of(replace(configuration, platform=motion @ configuration.platform, legs=(moved_leg,)))
+            senses.append(np.sign(np.asarray(after[number].coordinate, dtype=float) - before[number].coordinate))
     return senses
 
 
@@ -109,21 +112,22 @@ def name_of(spring: Spring) -> str:
     return spring.joint.name or spring.of
 
 
-def _next_point(leg: Leg, place: int, end: Vector, away: Vector | None = None) -> Vector:
-    """The first point of a leg after an element that is not at another point; at the latest the platform's, its end."""
+def _next_point(leg: Leg, place: int, end: Vector, other: Vector | None = None) -> Vector:
+    """The first point of a leg after an element that does not coincide with another point; its end if there is none."""
     points = (point for element in leg.chain[place + 1 :] for point in element.path)
-    return next((point for point in points if away is None or not _coincide(point, away)), end)
+    return next((point for point in points if other is None or not _coincide(point, other)), end)
 
 
 def _coincide(first: Vector, second: Vector) -> bool:
     """Whether points are one, at every pose; traced points are if they are so by form."""
-    apart = first - second
-    if not all(isinstance(plain(c), float | np.ndarray) for c in apart.components()):
-        return all(is_zero(c) for c in apart.components())
-    return bool((np.asarray(apart.norm(), dtype=float) <= NO_LINK).all())
+    span = first - second
+    if not all(isinstance(plain(c), float | np.ndarray) for c in span.components()):
+        return all(is_zero(c) for c in span.components())
+    return bool((np.asarray(span.norm(), dtype=float) <= NO_LINK).all())
 
 
 def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, Scalar]:
+    """The meaning and the value, rad, of the coordinate of a driven revolute, as `actuators_of` describes it."""
     centre, axis = joint.point, joint.axis
     if centre is None:
         raise ValueError("a slide has no crank")
@@ -132,10 +136,10 @@ def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, 
         return BEARING, arctan2(crank.y, crank.x)
     level = np.hypot(axis.x, axis.y)
     outward = Vector(axis.y / level, -axis.x / level, 0.0)
-    radial = np.asarray(outward.dot(centre), dtype=float)
-    tangential = np.abs(radial) < NO_LINK
-    east = np.where(np.abs(outward.x) > NO_LINK, outward.x, outward.y)
-    outward = outward * np.where(np.where(tangential, east, radial) < 0.0, -1.0, 1.0)
+    radius = np.asarray(outward.dot(centre), dtype=float)
+    # Where neither horizontal direction points away from the z axis, the one towards +x (or +y) is taken.
+    towards_x = np.where(np.abs(outward.x) > NO_LINK, outward.x, outward.y)
+    outward = outward * np.where(np.where(np.abs(radius) < NO_LINK, towards_x, radius) < 0.0, -1.0, 1.0)
     upward = Vector(-axis.x * axis.z / level, -axis.y * axis.z / level, level)
     return ELEVATION, arctan2(crank.dot(upward), crank.dot(outward))
 
@@ -162,7 +166,8 @@ class JointActuator:
         """The actuator at given joint coordinates (m, and rad or turns)."""
         amount = joints[self.place]
         angle = arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
-        return Actuator(self.name, self.leg, self.meaning, self.offset + self.sign * angle, self.slides)
+        coordinate = self.offset + self.sign * angle
+        return Actuator(name=self.name, leg=self.leg, meaning=self.meaning, coordinate=coordinate, slides=self.slides)
 
     def joint_coordinate(self, coordinate: Scalar) -> Scalar:
         """The joint coordinate (m or rad from the home pose) at a coordinate of the actuator."""
@@ -176,7 +181,7 @@ def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]
         chains: its legs at the home pose; floats.
         names: the names of the legs.
     """
-    result, place = [], 0
+    actuators, place = [], 0
     for name, steps in zip(names, chains.legs, strict=True):
         leg = Leg(name, tuple(step.element for step in steps))
         rod = next((rod for rod in rods([leg]) if rod.telescopic), None)
@@ -185,15 +190,25 @@ def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]
                 continue
             if isinstance(step.element, Spring) and step.element.actuated:
                 slides = step.element.joint.point is None
-                offset, sign, meaning = 0.0, 1.0, TRAVEL if slides else TURNED
-                if slides and rod is not None and abs(_along(rod.span, step.element.joint.axis)) > 1.0 - PARALLEL_AXES:
-                    sign = float(np.sign(_along(rod.span, step.element.joint.axis)))
-                    offset, meaning = float(rod.length), LENGTH
-                result.append(JointActuator(name_of(step.element), name, meaning, slides, place, offset, sign))
+                offset, sign, meaning = 0.0, 1.0, TRAVEL if slides else TURN
+                along_rod = _cosine(rod.span, step.element.joint.axis) if slides and rod is not None else 0.0
+                if rod is not None and abs(along_rod) > 1.0 - PARALLEL_AXES:
+                    offset, sign, meaning = float(rod.length), float(np.sign(along_rod)), LENGTH
+                actuators.append(
+                    JointActuator(
+                        name=name_of(step.element),
+                        leg=name,
+                        meaning=meaning,
+                        slides=slides,
+                        place=place,
+                        offset=offset,
+                        sign=sign,
+                    )
+                )
             place += 1
-    return result
+    return actuators
 
 
-def _along(span: Vector, axis: Vector) -> float:
+def _cosine(span: Vector, axis: Vector) -> float:
     """The cosine between a span and a unit vector."""
     return float(span.dot(axis) / span.norm())

@@ -5,11 +5,24 @@ The table [limits] is in `limits`. The texts are those of help, forms and the JS
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Annotated, Any
 
 from kinetostat.machine.limits import Limits
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import LEAST_OF_KIND, Field, Quantity, made_table, quantities, table
+from kinetostat.tolerances import ROUND_OFF_OF_INERTIA
+
+Three = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
+NO_VECTOR = (0.0, 0.0, 0.0)
+NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+along_axes = partial(Quantity, count=3, apart=True)
+"""A quantity with a component along each of x, y and z."""
+inertia_tensor = partial(Quantity, "inertia", count=6, apart=True)
+"""Moments and products of inertia: xx, yy, zz, xy, xz, yz."""
+Moment = Annotated[Three, along_axes("moment", "moment about x, y, z")]
+Force = Annotated[Three, along_axes("force", "force along x, y, z")]
 
 
 @table
@@ -17,34 +30,20 @@ class Tool:
     """Table [tool], in any machine file: where on the platform loads act and motions are given."""
 
     offset: Annotated[
-        tuple[float, float, float],
-        Quantity(
-            "length",
-            "tool point T from P in platform axes: x, y, z; K, C and the load are given at T",
-            count=3,
-            apart=True,
-        ),
-    ] = (0.0, 0.0, 0.0)
+        Three, along_axes("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T")
+    ] = NO_VECTOR
     mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
-    centre_of_mass: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "centre of that mass from P in platform axes: x, y, z", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
+    centre_of_mass: Annotated[Three, along_axes("length", "centre of that mass from P in platform axes: x, y, z")] = (
+        NO_VECTOR
+    )
     payload: Annotated[float, Quantity("mass", "mass of what the tool carries; 0: nothing")] = 0.0
     payload_centre: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "centre of the payload from the tool point T in platform axes", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-    inertia: Annotated[
-        tuple[float, float, float, float, float, float],
-        Quantity(
-            "inertia", "of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz", count=6, apart=True
-        ),
-    ] = (0.0,) * 6
-    payload_inertia: Annotated[
-        tuple[float, float, float, float, float, float],
-        Quantity("inertia", "of the payload about its centre, in the same order", count=6, apart=True),
-    ] = (0.0,) * 6
+        Three, along_axes("length", "centre of the payload from the tool point T in platform axes")
+    ] = NO_VECTOR
+    inertia: Annotated[Six, inertia_tensor("of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz")] = (
+        NO_INERTIA
+    )
+    payload_inertia: Annotated[Six, inertia_tensor("of the payload about its centre, in the same order")] = NO_INERTIA
 
 
 @table
@@ -94,7 +93,11 @@ class ServoGains:
         float, Quantity("torsional damping", "torque of the rotor that the velocity loop asks for, per speed error")
     ] = 0.0
     integral_time: Annotated[
-        float, Quantity("duration", "in which the integral part of the velocity loop grows as large; 0: it has none")
+        float,
+        Quantity(
+            "duration",
+            "after which the integral part of a constant speed error equals the proportional part; 0: no integral part",
+        ),
     ] = 0.0
     position_at_load: Annotated[
         float,
@@ -121,40 +124,27 @@ class Damping:
     ] = 0.0
 
 
-Moment = Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)]
-Force = Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)]
-
-
 @table
 class Cutting:
     """Table [cutting], in any machine file: the force of the cut, for its stability."""
 
     pressure: Annotated[float, Quantity("cutting pressure", "cutting force per area of the chip")] = 0.0
     direction: Annotated[
-        tuple[float, float, float],
-        Quantity("direction", "across the cut, in which a vibration changes the chip; base axes", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
+        Three, along_axes("direction", "across the cut, in which a vibration changes the chip; base axes")
+    ] = NO_VECTOR
 
 
 @table
 class Load:
     """Table [load], in any machine file: a wrench on the platform at the tool point, and gravity; base axes."""
 
-    moment: Moment = (0.0, 0.0, 0.0)
-    force: Force = (0.0, 0.0, 0.0)
+    moment: Moment = NO_VECTOR
+    force: Force = NO_VECTOR
     gravity: Annotated[
-        tuple[float, float, float],
-        Quantity(
-            "acceleration",
-            "along x, y, z: pulls at the platform and, under load, at all links",
-            count=3,
-            apart=True,
-        ),
-    ] = (0.0, 0.0, 0.0)
+        Three, along_axes("acceleration", "along x, y, z: pulls at the platform and, under load, at all links")
+    ] = NO_VECTOR
     gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
-    gravity_axis: Annotated[
-        tuple[float, float, float], Quantity("direction", "axis of that turn, of any length", count=3, apart=True)
-    ] = (1.0, 0.0, 0.0)
+    gravity_axis: Annotated[Three, along_axes("direction", "axis of that turn, of any length")] = (1.0, 0.0, 0.0)
     min_tension: Annotated[
         float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
     ] = math.inf
@@ -174,17 +164,21 @@ class CableTable:
     exponent: Annotated[
         float,
         Quantity(
-            "ratio", "power of the distances from it whose sum is least, 2 to 50", positive=True, least=2.0, most=50.0
+            "ratio",
+            "power p, 2 to 50: tensions make the sum of |tension - level|^p least",
+            positive=True,
+            least=2.0,
+            most=50.0,
         ),
     ] = 2.0
     force_box: Annotated[
-        tuple[float, float, float],
-        Quantity("force", "by which forces x, y, z about the load must be held too, base axes", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
+        Three,
+        along_axes("force", "half sizes of the box of forces about the load that must be held as well, base axes"),
+    ] = NO_VECTOR
     moment_box: Annotated[
-        tuple[float, float, float],
-        Quantity("moment", "by which moments x, y, z about the load must be held too, base axes", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
+        Three,
+        along_axes("moment", "half sizes of the box of moments about the load that must be held as well, base axes"),
+    ] = NO_VECTOR
     linear_density: Annotated[
         float, Quantity("linear density", "of unstretched cable, which then sags; 0: cables are straight")
     ] = 0.0
@@ -198,12 +192,9 @@ class CableTable:
 class NamedLoad:
     """Table [load.NAME], in any machine file: another wrench on the platform, at a point of it; base axes."""
 
-    point: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "where it acts: from P, in platform axes: x, y, z", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-    moment: Moment = (0.0, 0.0, 0.0)
-    force: Force = (0.0, 0.0, 0.0)
+    point: Annotated[Three, along_axes("length", "where it acts: from P, in platform axes: x, y, z")] = NO_VECTOR
+    moment: Moment = NO_VECTOR
+    force: Force = NO_VECTOR
 
 
 STATES = {"free": False, "loaded": True}
@@ -219,25 +210,24 @@ COMMON = {
     "cables": CableTable,
     "limits": Limits,
 }
+"""The tables that any machine file may have, by name."""
 
 
 def table_of_one_drive(path: str, fields: Sequence[str]) -> type:
     """Make the class of the table of a single drive from the fields that are written in it.
 
     Args:
-        path: such as "servo.leg 1".
-        fields: of the table of all drives, "servo" here.
+        path: the path of the table, such as "servo.leg 1".
+        fields: names of the fields; the table of all drives, "servo" here, has them as well.
     """
     known = quantities(COMMON[path.partition(".")[0]])
-    return made_table("OwnNumbers", {field: Field(known[field]) for field in fields})
+    return made_table("DriveTable", {field: Field(known[field]) for field in fields})
 
 
 FRICTION_OF_JOINTS = ("damping.hinge_friction", "damping.slide_friction")
 """Paths of the Coulomb friction of passive joints."""
 VIBRATION_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
 """Beginnings of the paths of fields on which only vibrations depend."""
-ROUND_OFF_OF_TENSOR = 1e-4
-"""Share of its size by which an inertia tensor may be impossible, because files give a few digits."""
 
 
 def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
@@ -268,11 +258,11 @@ def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
 def is_tensor_of_body(tensor: Sequence[float]) -> bool:
     """Whether some body has this inertia: xx, yy, zz, xy, xz, yz about its centre of mass, kg·m².
 
-    With half its trace h, the matrix h 1 - I is the sum of m x x^T over a body, which no direction makes negative: its
-    pivots are positive, when what files round off is added to its diagonal.
+    With half its trace h, the matrix h 1 - I is the sum of m x x^T over a body, which is positive semidefinite. Its
+    pivots are tested, after the rounding of files has been added to its diagonal.
     """
     xx, yy, zz, xy, xz, yz = tensor
-    half = 0.5 * (xx + yy + zz) + ROUND_OFF_OF_TENSOR * max(abs(entry) for entry in tensor)
+    half = 0.5 * (xx + yy + zz) + ROUND_OFF_OF_INERTIA * max(abs(entry) for entry in tensor)
     if half == 0.0:
         return True
     first = half - xx

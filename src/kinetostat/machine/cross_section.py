@@ -48,30 +48,37 @@ MATERIALS = {
     material.name: material
     for material in (
         Material(
-            "steel",
-            210e9,
-            81e9,
-            7850.0,
-            12e-6,
-            "EN 1993-1-1:2005, 3.2.6; EN 1991-1-1 Table A.4 (density)",
-        ),
-        Material("aluminium", 70e9, 27e9, 2700.0, 23e-6, "EN 1999-1-1:2007, 3.2.5"),
-        Material(
-            "cast-iron",
-            110e9,
-            43.7e9,
-            7200.0,
-            11.7e-6,
-            "EN 1561:2011, annex A, EN-GJL-250: E 103 to 118 GPa, nu 0.26, expansion between 20 and 200 °C",
+            name="steel",
+            youngs_modulus=210e9,
+            shear_modulus=81e9,
+            density=7850.0,
+            expansion=12e-6,
+            source="EN 1993-1-1:2005, 3.2.6; EN 1991-1-1 Table A.4 (density)",
         ),
         Material(
-            "cfrp",
-            70e9,
-            5e9,
-            1600.0,
-            2.1e-6,
-            "woven standard-modulus carbon/epoxy 0/90, 50 % fibre: Performance Composites, mechanical properties of "
-            "carbon fibre composite materials",
+            name="aluminium",
+            youngs_modulus=70e9,
+            shear_modulus=27e9,
+            density=2700.0,
+            expansion=23e-6,
+            source="EN 1999-1-1:2007, 3.2.5",
+        ),
+        Material(
+            name="cast-iron",
+            youngs_modulus=110e9,
+            shear_modulus=43.7e9,
+            density=7200.0,
+            expansion=11.7e-6,
+            source="EN 1561:2011, annex A, EN-GJL-250: E 103 to 118 GPa, nu 0.26, expansion between 20 and 200 °C",
+        ),
+        Material(
+            name="cfrp",
+            youngs_modulus=70e9,
+            shear_modulus=5e9,
+            density=1600.0,
+            expansion=2.1e-6,
+            source="woven standard-modulus carbon/epoxy 0/90, 50 % fibre: Performance Composites, mechanical "
+            "properties of carbon fibre composite materials",
         ),
     )
 }
@@ -96,18 +103,22 @@ class CrossSection:
     shear_factor: Scalar = RIGID
 
 
+SHEAR_FACTOR = 5.0 / 6.0
+"""Shear factor of a solid rectangle, also of cross-sections of which a file gives moments and no shape."""
+
+
 def tube(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> CrossSection:
     """A round tube, or a round bar where `inner` is 0; diameters in m.
 
     Source of the shear factor: Cowper 1966, J. Appl. Mech. 33, 335.
     """
-    big, small = outer * outer, inner * inner
-    area = (math.pi / 4.0) * (big - small)
-    second = (math.pi / 64.0) * (big * big - small * small)
-    ratio = small * reciprocal(big)
-    thick = (1.0 + ratio) * (1.0 + ratio)
-    below = (7.0 + 6.0 * poisson) * thick + (20.0 + 12.0 * poisson) * ratio
-    return CrossSection(area, second, second, 2.0 * second, 6.0 * (1.0 + poisson) * thick / below)
+    outer_square, inner_square = outer * outer, inner * inner
+    area = (math.pi / 4.0) * (outer_square - inner_square)
+    second_moment = (math.pi / 64.0) * (outer_square * outer_square - inner_square * inner_square)
+    ratio = inner_square * reciprocal(outer_square)
+    ring = (1.0 + ratio) * (1.0 + ratio)
+    shear_factor = 6.0 * (1.0 + poisson) * ring / ((7.0 + 6.0 * poisson) * ring + (20.0 + 12.0 * poisson) * ratio)
+    return CrossSection(area, second_moment, second_moment, 2.0 * second_moment, shear_factor)
 
 
 def rectangle(width: Scalar, height: Scalar) -> CrossSection:
@@ -125,22 +136,22 @@ def rectangle(width: Scalar, height: Scalar) -> CrossSection:
         * short
         * (1.0 / 3.0 - 0.21 * slender * (1.0 - slender * slender * slender * slender / 12.0))
     )
-    second = width * height * (1.0 / 12.0)
-    return CrossSection(width * height, second * height * height, second * width * width, torsion, 5.0 / 6.0)
+    twelfth = width * height * (1.0 / 12.0)
+    return CrossSection(width * height, twelfth * height * height, twelfth * width * width, torsion, SHEAR_FACTOR)
 
 
-def rigidity(young: Scalar, slide: Scalar, profile: CrossSection, shear: bool = False) -> Rigidity:
+def rigidity(young: Scalar, shear_modulus: Scalar, profile: CrossSection, shear: bool = False) -> Rigidity:
     """EA, GJ, EI of a bar, and kappa GA where `shear` is asked for (Timoshenko).
 
     Args:
-        young, slide: elastic moduli E and G, Pa.
-        profile: its cross-section.
+        young, shear_modulus: elastic moduli E and G, Pa.
+        profile: the cross-section of the bar.
         shear: whether it deflects in shear as well.
     """
-    sheared = profile.shear_factor * slide * profile.area if shear else RIGID
+    sheared = profile.shear_factor * shear_modulus * profile.area if shear else RIGID
     return Rigidity(
         axial=young * profile.area,
-        torsion=slide * profile.torsion_constant,
+        torsion=shear_modulus * profile.torsion_constant,
         bending_y=young * profile.second_moment_y,
         bending_z=young * profile.second_moment_z,
         shear_y=sheared,
@@ -200,16 +211,16 @@ def _profile(shape: str, data: Any) -> CrossSection:
         return tube(data.outer_diameter, data.inner_diameter, poisson)
     if shape == "rectangle":
         return rectangle(data.width, data.height)
-    return CrossSection(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
+    return CrossSection(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, SHEAR_FACTOR)
 
 
-WHICH = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending rigidity": "bending_y"}
-"""Kinds of rigidity, and which of a cross-section's rigidities they are."""
+RIGIDITIES = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending rigidity": "bending_y"}
+"""Fields of `Rigidity` by the kind of quantity that they are."""
 MODULI = ("youngs_modulus", "shear_modulus")
 OF_MATTER = {"density": "density", "expansion": "thermal expansion"}
 """Other properties of a material, and their kind of quantity."""
-SAME = 1e-9
-"""Relative difference up to which two linear densities are one."""
+SAME_MATTER = 1e-9
+"""Relative difference up to which numbers of two cross-sections are one: units and decimals of a file round them."""
 
 Known: TypeAlias = Mapping[str, float | list[float]]
 """Properties of links from cross-sections, beside rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
@@ -229,9 +240,9 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
     if not isinstance(stiffness, dict):
         return document
     resolved = {
-        name: _numbers_in_place(stiffness[name], WHICH[quantity.kind], f'"{origin}": stiffness.{name}')
+        name: _numbers_in_place(stiffness[name], RIGIDITIES[quantity.kind], f'"{origin}": stiffness.{name}')
         for name, quantity in quantities(family.tables["stiffness"]).items()
-        if quantity.kind in WHICH and name in stiffness
+        if quantity.kind in RIGIDITIES and name in stiffness
     }
     result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in resolved.items()}}}
     for table in OF_CROSS_SECTIONS:
@@ -249,7 +260,7 @@ def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin:
         given = {name: resolved.get(name, {}).get(table, 0.0) for name in kind.rigidities}
         known = {name: number for name, number in given.items() if np.any(number)}
         for number in known.values():
-            if not np.allclose(number, numbers.setdefault(kind.name, number), rtol=SAME, atol=0.0):
+            if not np.allclose(number, numbers.setdefault(kind.name, number), rtol=SAME_MATTER, atol=0.0):
                 raise InputError(
                     f'"{origin}": stiffness.{" and stiffness.".join(known)} describe the same {kind.name}, but '
                     "their cross-sections differ in mass; give both the same cross-section, or one of them as a number."
@@ -257,16 +268,16 @@ def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin:
     return numbers
 
 
-def _numbers_in_place(value: object, which: str, where: str) -> tuple[object, Known]:
+def _numbers_in_place(value: object, rigidity_name: str, where: str) -> tuple[object, Known]:
     """A field as numbers, and what else the cross-sections say that stood there."""
     if not isinstance(value, list):
-        return _rigidity(value, which, where) if isinstance(value, dict) else (value, {})
-    entries = [_numbers_in_place(entry, which, f"{where}, entry {i}") for i, entry in enumerate(value)]
+        return _rigidity(value, rigidity_name, where) if isinstance(value, dict) else (value, {})
+    entries = [_numbers_in_place(entry, rigidity_name, f"{where}, entry {i}") for i, entry in enumerate(value)]
     known = {t: [float(np.max(each.get(t, 0.0))) for _, each in entries] for t in OF_CROSS_SECTIONS}
     return [number for number, _ in entries], known
 
 
-def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[float, Known]:
+def _rigidity(table: Mapping[str, object], rigidity_name: str, where: str) -> tuple[float, Known]:
     rest = dict(table)
     shape = choice(rest.pop("shape", None), SHAPES, f"{where}: shape")
     numbers = {
@@ -293,7 +304,7 @@ def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[floa
     data = SimpleNamespace(**numbers)
     known = map(float, (linear_density_of(shape, data), least_bending_of(shape, data), data.expansion))
     rigid = rigidity_of(shape, data, shear=False)
-    return float(getattr(rigid, which)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
+    return float(getattr(rigid, rigidity_name)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
 
 
 def _size(value: object, kind: str, where: str, may_be_zero: bool = False) -> float:

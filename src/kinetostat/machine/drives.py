@@ -5,9 +5,10 @@ machine with such tables gets a family of its own, whose files have them. Loads 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import compress
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
@@ -23,16 +24,16 @@ from kinetostat.spec.fields import quantities
 TABLES_OF_DRIVES = ("drives", "servo")
 """Tables of which a drive may have its own."""
 MOST_DRIVES = 64
-"""Drives with tables of their own: more is a mistake."""
+"""Drives that may have tables of their own: more than any machine has, so that more are a mistake."""
 
 
 def family_with_own_drives(family: Family, document: Document, origin: str) -> Family:
     """The family whose machine files have the tables of single drives that a document has; itself without any.
 
     Args:
-        family: of the machine.
-        document: what its file says.
-        origin: names it in messages.
+        family: the family of the machine.
+        document: the tables of its file.
+        origin: names the file in messages.
 
     Raises:
         InputError: a field that drives do not have, or too many tables.
@@ -41,13 +42,12 @@ def family_with_own_drives(family: Family, document: Document, origin: str) -> F
     for table in TABLES_OF_DRIVES:
         known, written = quantities(COMMON[table]), document.get(table)
         entries = written.items() if isinstance(written, dict) else ()
-        for name, given in entries:
-            if name in known or not isinstance(given, dict):
+        for name, fields in entries:
+            if name in known or not isinstance(fields, dict):
                 continue  # a field of the table itself, known or not
-            where = f"{table}.{toml_key(name)}"
-            for field in given:
-                choice(field, known, f'"{origin}": the field of {where}')
-            tables.append((f"{table}.{name}", tuple(field for field in known if field in given)))
+            for field in fields:
+                choice(field, known, f'"{origin}": the field of {table}.{toml_key(name)}')
+            tables.append((f"{table}.{name}", tuple(field for field in known if field in fields)))
     if len(tables) > len(TABLES_OF_DRIVES) * MOST_DRIVES:
         raise InputError(
             f'"{origin}" has {len(tables)} tables of single drives; at most {MOST_DRIVES} drives have any.'
@@ -64,9 +64,9 @@ def check_own_drives(family: Family, legs: Sequence[Leg], origin: str) -> None:
     """Refuse tables of drives that a machine does not have.
 
     Args:
-        family: whose files have these tables.
-        legs: of the machine.
-        origin: names it in messages.
+        family: the family of the machine, whose files have these tables.
+        legs: the legs of the machine.
+        origin: names its file in messages.
 
     Raises:
         InputError: names the table, and the drives that there are.
@@ -87,25 +87,18 @@ def numbers_of_drive(machine: Machine, table: str, spring: Spring) -> Any:
     A table of the drive comes before that of its leg.
 
     Args:
-        machine: with its tables.
+        machine: the machine with its tables.
         table: "drives" or "servo".
-        spring: of the actuator.
+        spring: the spring of the actuator.
     """
-    shared = machine.tables[table]
-    for path in _own_paths(machine, table, spring):
-        shared = replace(shared, **vars(machine.tables[path]))
-    return shared
-
-
-def _own_paths(machine: Machine, table: str, spring: Spring) -> Iterator[str]:
-    """Paths of the tables that a drive has of its own, that of its leg first."""
-    name, part = name_of(spring), spring.of
-    for level in (0, 1):
-        for path, _ in machine.family.own_drives:
-            of, _, title = path.partition(".")
-            leg = part.leg == title if isinstance(part, PartName) else part.startswith(f"{title} ")
-            if of == table and (leg, title == name)[level]:
-                yield path
+    numbers, part = machine.tables[table], spring.of
+    tables = [path for path, _ in machine.family.own_drives if path.startswith(f"{table}.")]
+    names = [path.removeprefix(f"{table}.") for path in tables]
+    of_leg = [part.leg == name if isinstance(part, PartName) else part.startswith(f"{name} ") for name in names]
+    of_drive = [name == name_of(spring) for name in names]
+    for path in (*compress(tables, of_leg), *compress(tables, of_drive)):
+        numbers = replace(numbers, **vars(machine.tables[path]))
+    return numbers
 
 
 def with_every_drive(machine: AnyMachine, changes: Mapping[str, float]) -> AnyMachine:
@@ -113,15 +106,10 @@ def with_every_drive(machine: AnyMachine, changes: Mapping[str, float]) -> AnyMa
 
     Args:
         machine: a machine.
-        changes: by path, such as "drives.lead", SI.
+        changes: new values by path, such as "drives.lead", SI.
     """
-    single = {
-        f"{path}.{field}": changes[f"{table}.{field}"]
-        for path, fields in machine.family.own_drives
-        for table in [path.partition(".")[0]]
-        for field in fields
-        if f"{table}.{field}" in changes
-    }
+    shared_paths = {f"{path}.{field}": f"{path.partition('.')[0]}.{field}" for path, field in _own_fields(machine)}
+    single = {path: changes[shared] for path, shared in shared_paths.items() if shared in changes}
     return with_values(machine, {**changes, **single})
 
 
@@ -130,11 +118,16 @@ def values_of_drives(machine: Machine, path: str) -> list[Any]:
 
     Args:
         machine: a machine.
-        path: of the field, such as "drives.lead".
+        path: the path of the field, such as "drives.lead".
     """
     table, _, field = path.partition(".")
-    single = [name for name, fields in machine.family.own_drives if field in fields and name.startswith(f"{table}.")]
+    single = [path for path, own_field in _own_fields(machine) if own_field == field and path.startswith(f"{table}.")]
     return [getattr(machine.tables[name], field) for name in (table, *single)]
+
+
+def _own_fields(machine: AnyMachine) -> list[tuple[str, str]]:
+    """Each field in a table of a single drive: the path of the table, and the name of the field."""
+    return [(path, field) for path, fields in machine.family.own_drives for field in fields]
 
 
 def rotor_turns(spring: Spring, drives: Any) -> Scalar:
@@ -148,8 +141,8 @@ def rotor_turns(spring: Spring, drives: Any) -> Scalar:
         InputError: rotors have an inertia or friction, but nothing says how far they turn.
     """
     slides = spring.joint.point is None
-    given = drives.lead if slides else drives.ratio
-    if is_zero(given):
+    transmission = drives.lead if slides else drives.ratio
+    if is_zero(transmission):
         if all(is_zero(number) for number in (drives.rotor_inertia, drives.rotor_damping, drives.rotor_friction)):
             return 0.0
         field, example, kind = ("lead", '"10 mm"', "linear") if slides else ("ratio", "50", "rotary")
@@ -158,4 +151,4 @@ def rotor_turns(spring: Spring, drives: Any) -> Scalar:
             f"and the actuators are {kind}: nothing says how far a rotor turns; write {field} = {example} in the "
             "table [drives]."
         )
-    return reciprocal(given) * (2.0 * math.pi) if slides else given
+    return reciprocal(transmission) * (2.0 * math.pi) if slides else transmission

@@ -27,7 +27,7 @@ class LegScrews:
     Attributes:
         passive: unit twists that span what the passive joints allow (J_p).
         elastic: unit twist of each spring (J_e).
-        compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
+        compliance: compliance of each spring, 0 if it is rigid and infinite if it is free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
         load_squares: the largest square that the load of each spring can have under a wrench of 1 N, moments over the
@@ -95,7 +95,7 @@ def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
 
 @dataclass(frozen=True)
 class TwoCentres:
-    """The axes of a leg's passive joints: a pair through one point, and three, a ball, through the other, as of U-P-S.
+    """The axes of a leg's passive joints: a pair through one point and three, a ball, through another, as in U-P-S.
 
     Such a leg carries a force along the line through both points and nothing else, whatever joints its axes belong to.
     How near its joints are to locking up follows in closed form; `reciprocal_wrenches` would triangularise the twists.
@@ -104,7 +104,7 @@ class TwoCentres:
         point: the one of both points that is nearer to the platform, m.
         along: unit vector of the line, from the other point to this one.
         ball: the point through which three axes pass, m.
-        distance: how far the ball lies along the line from the pair, m: negative if it is nearer to the base.
+        distance: coordinate of the ball along the line from the pair, m; negative if the ball is nearer to the base.
         pair_axes, ball_axes: unit vectors of the axes.
     """
 
@@ -137,27 +137,37 @@ class TwoCentres:
         Returns:
             The margin; 0 where the axes of the ball or the pair lock up, or the line is in the plane of the pair.
         """
-        shrink = reciprocal(length)
-        arm, line_moment = (reference - self.ball) * shrink, self.wrench(reference).rotational * shrink
+        arm = (reference - self.ball) * reciprocal(length)
+        inverse_squares = self._inverse_squares(arm, reference, length)
+        margin = float(PAIR + BALL) * reciprocal(sqrt(self._squares(arm, reciprocal(length)) * inverse_squares))
+        # NaN, where a distance is zero, compares as false: the margin is then 0.
+        return where(margin > 0.0, where(margin < 1.0, margin, 1.0), 0.0)
+
+    def _inverse_squares(self, arm: Vector, reference: Vector, length: Scalar) -> Scalar:
+        """|V+|^2: the sum of the squares of f_1, f_2 and the three m_i - (a_1 m_i) f_1 - (a_2 m_i) f_2.
+
+        Of all squares the share in the force along the line is left out. The products f_i f_j of all five rows together
+        are weighted by 1 (of i = j, the rows of the pair) + (a_i m)(a_j m).
+        """
+        line_moment = self.wrench(reference).rotational * reciprocal(length)
         inverse_line_square = reciprocal(self.square(reference, length))
-        f = self._pair_forces(shrink)
-        moments = [force.cross(arm) for force in f]
-        # The moments less their share in the force along the line.
-        rests = [moment - line_moment * (moment.dot(line_moment) * inverse_line_square) for moment in moments]
-        m, dual_square = _dual(self.ball_axes)
-        along_pair = [[dual.dot(axis) for dual in m] for axis in self.pair_axes]
-        # |V+|^2 is a sum over rows: f_i of the pair, and m_i - (a_1 m_i) f_1 - (a_2 m_i) f_2 of the ball. The products
-        # f_i f_j of all rows together are weighted by 1 (of i = j, the rows of the pair) + (a_i m)(a_j m).
-        first_pair, mixed_pair, second_pair = (
-            (moments[i].dot(rests[j]) + f[i].dot(f[j])) * (float(i == j) + _inner(along_pair[i], along_pair[j]))
+        forces = self._pair_forces(reciprocal(length))
+        moments = [force.cross(arm) for force in forces]
+        off_line = [moment - line_moment * (moment.dot(line_moment) * inverse_line_square) for moment in moments]
+        duals, dual_square = _dual(self.ball_axes)
+        along_pair = [[dual.dot(axis) for dual in duals] for axis in self.pair_axes]
+        first_force, both_forces, second_force = (
+            (moments[i].dot(off_line[j]) + forces[i].dot(forces[j]))
+            * (float(i == j) + _inner(along_pair[i], along_pair[j]))
             for i, j in ((0, 0), (0, 1), (1, 1))
         )
-        mixed = [_inner(row, [dual.dot(rest) for dual in m]) for row, rest in zip(along_pair, rests, strict=True)]
-        along_line = [dual.dot(line_moment) for dual in m]
-        of_ball = dual_square - inverse_line_square * _inner(along_line, along_line)
-        inverse_square = of_ball + first_pair + second_pair + 2.0 * (mixed_pair - total(mixed))
-        margin = float(PAIR + BALL) * reciprocal(sqrt(self._squares(arm, shrink) * inverse_square))
-        return where(margin > 0.0, where(margin < 1.0, margin, 1.0), 0.0)
+        duals_with_forces = [
+            _inner(shares, [dual.dot(moment) for dual in duals])
+            for shares, moment in zip(along_pair, off_line, strict=True)
+        ]
+        along_line = [dual.dot(line_moment) for dual in duals]
+        of_duals = dual_square - inverse_line_square * _inner(along_line, along_line)
+        return of_duals + first_force + second_force + 2.0 * (both_forces - total(duals_with_forces))
 
     def _pair_forces(self, shrink: Scalar) -> list[Vector]:
         """The forces f_1 and f_2, with distances times `shrink` (1/m)."""
@@ -198,6 +208,8 @@ def _dual(axes: Sequence[Vector]) -> tuple[list[Vector], Scalar]:
     shrink = reciprocal(second.dot(third.cross(first)))
     rows = [second.cross(third) * shrink, third.cross(first) * shrink, first.cross(second) * shrink]
     if is_zero(second.dot(first)) and is_zero(second.dot(third)):
+        # By form, as in most ball joints that files describe: `second` is then its own dual, and traced code stays
+        # small. The duals of the other two, unit vectors in a plane, both have the size 1 / sine of their angle.
         return [rows[0], second, rows[2]], 1.0 + 2.0 * (shrink * shrink)
     return rows, total([row.dot(row) for row in rows])
 

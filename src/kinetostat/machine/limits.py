@@ -78,8 +78,8 @@ def _squared_cosine(rod: Rod, normal: Vector) -> Scalar:
 def _clearances(parts: Parts) -> Measured:
     """Squares of the distances between the axes of any two straight legs."""
     for i, (first, other) in enumerate(combinations(parts.rods, 2)):
-        apart = squared_distance((first.start, first.end), (other.start, other.end))
-        yield i, f"{first.leg} and {other.leg}", apart
+        distance = squared_distance((first.start, first.end), (other.start, other.end))
+        yield i, f"{first.leg} and {other.leg}", distance
 
 
 def _loads(parts: Parts, sliding: bool) -> Measured:
@@ -104,16 +104,16 @@ class Limit:
 
     Attributes:
         name: the name in the table [limits].
-        about: what it is about.
-        quantity: what may be written, and what it means.
-        at_most: whether it is a greatest value, otherwise a least one.
-        measure: gives what the limit is compared with, from the parts of a machine.
-        needs: what a machine must have for the limit to mean something.
+        about: the subject of the limit.
+        quantity: the values that may be written, and their meaning.
+        at_most: whether it is a greatest value; otherwise it is a least one.
+        measure: gives the numbers that the limit is compared with, from the parts of a machine.
+        needs: the parts that a machine must have for the limit to mean something, in words.
         sentence: the sentence about a part that passes the limit, with its value in braces.
         phrase: says in a few words that it is passed.
         title: the title of the measure, where its range over many poses is shown; limits with one measure share it.
-        compared: from the limit as written (SI) to the number that the measure is compared with.
-        shown: from the measure to the value as written, SI.
+        compared: makes of the limit as written (SI) the number that the measure is compared with.
+        shown: makes of the measure the value as written, SI.
         falling: whether the measure falls where the value rises, as a cosine does.
         advice: what may be done besides changing the limit.
     """
@@ -166,55 +166,57 @@ LIMITS = {
     limit.name: limit
     for limit in (
         Limit(
-            "shortest_leg",
-            About.LENGTH,
-            _least("length", "least distance of the two joints of a leg with an actuated slide between them"),
-            False,
-            _leg_lengths,
+            name="shortest_leg",
+            about=About.LENGTH,
+            quantity=_least("length", "least distance of the two joints of a leg with an actuated slide between them"),
+            at_most=False,
+            measure=_leg_lengths,
             needs=_TELESCOPIC,
             sentence="is {} long",
             phrase="a leg is too short",
             title="length of the legs",
         ),
         Limit(
-            "longest_leg",
-            About.LENGTH,
-            _most("length", "greatest such distance"),
-            True,
-            _leg_lengths,
+            name="longest_leg",
+            about=About.LENGTH,
+            quantity=_most("length", "greatest such distance"),
+            at_most=True,
+            measure=_leg_lengths,
             needs=_TELESCOPIC,
             sentence="is {} long",
             phrase="a leg is too long",
             title="length of the legs",
         ),
         Limit(
-            "travel_from",
-            About.TRAVEL,
-            _least("length", "actuated slides of other legs, written leg by leg: least travel from the home pose"),
-            False,
-            _travels,
+            name="travel_from",
+            about=About.TRAVEL,
+            quantity=_least(
+                "length", "actuated slides of other legs, written leg by leg: least travel from the home pose"
+            ),
+            at_most=False,
+            measure=_travels,
             needs=_HOME,
             sentence="has travelled {} from the home pose",
             phrase="a slide at its lower end",
             title="travel of the slides",
         ),
         Limit(
-            "travel_to",
-            About.TRAVEL,
-            _most("length", "their greatest travel", positive=False),
-            True,
-            _travels,
+            name="travel_to",
+            about=About.TRAVEL,
+            quantity=_most("length", "their greatest travel", positive=False),
+            at_most=True,
+            measure=_travels,
             needs=_HOME,
             sentence="has travelled {} from the home pose",
             phrase="a slide at its upper end",
             title="travel of the slides",
         ),
         Limit(
-            "base_joint_angle",
-            About.ANGLE,
-            _most("angle", _TILT.format("base"), most=math.pi / 2),
-            True,
-            _base_tilts,
+            name="base_joint_angle",
+            about=About.ANGLE,
+            quantity=_most("angle", _TILT.format("base"), most=math.pi / 2),
+            at_most=True,
+            measure=_base_tilts,
             needs="a straight leg that tilts against the base's z axis",
             sentence="stands at {} to the base's z axis",
             phrase="a base joint turned too far",
@@ -224,11 +226,11 @@ LIMITS = {
             falling=True,
         ),
         Limit(
-            "platform_joint_angle",
-            About.ANGLE,
-            _most("angle", _TILT.format("platform"), most=math.pi / 2),
-            True,
-            _platform_tilts,
+            name="platform_joint_angle",
+            about=About.ANGLE,
+            quantity=_most("angle", _TILT.format("platform"), most=math.pi / 2),
+            at_most=True,
+            measure=_platform_tilts,
             needs="a straight leg that tilts against the platform's z axis",
             sentence="stands at {} to the platform's z axis",
             phrase="a platform joint turned too far",
@@ -238,11 +240,11 @@ LIMITS = {
             falling=True,
         ),
         Limit(
-            "actuator_force",
-            About.LOAD,
-            _most("force", "greatest force of an actuated slide under [load]"),
-            True,
-            partial(_loads, sliding=True),
+            name="actuator_force",
+            about=About.LOAD,
+            quantity=_most("force", "greatest force of an actuated slide under [load]"),
+            at_most=True,
+            measure=partial(_loads, sliding=True),
             needs="an actuated slide",
             sentence="carries {}",
             phrase="an actuator overloaded (force)",
@@ -250,11 +252,11 @@ LIMITS = {
             advice="lower the load",
         ),
         Limit(
-            "actuator_moment",
-            About.LOAD,
-            _most("moment", "greatest moment of an actuated revolute under [load]"),
-            True,
-            partial(_loads, sliding=False),
+            name="actuator_moment",
+            about=About.LOAD,
+            quantity=_most("moment", "greatest moment of an actuated revolute under [load]"),
+            at_most=True,
+            measure=partial(_loads, sliding=False),
             needs="an actuated revolute",
             sentence="carries {}",
             phrase="an actuator overloaded (moment)",
@@ -262,11 +264,13 @@ LIMITS = {
             advice="lower the load",
         ),
         Limit(
-            "leg_diameter",
-            About.CLEARANCE,
-            _least("length", "straight legs, as cylinders this thick between their joints, must not touch", True),
-            False,
-            _clearances,
+            name="leg_diameter",
+            about=About.CLEARANCE,
+            quantity=_least(
+                "length", "straight legs, as cylinders this thick between their joints, must not touch", True
+            ),
+            at_most=False,
+            measure=_clearances,
             needs="two straight legs",
             sentence="come within {} of each other",
             phrase="legs touch",
@@ -302,8 +306,8 @@ def unloaded_parts(
     Args:
         legs, normal, planar, slides: see `Parts`.
     """
-    carrying = [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
-    return Parts(legs, normal, planar, slides, carrying)
+    actuators = [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
+    return Parts(legs=legs, normal=normal, planar=planar, slides=slides, actuators=actuators)
 
 
 def limits_set(limits: object) -> list[Limit]:

@@ -18,10 +18,10 @@ from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.units import KINDS
 
 Ends = Callable[[], tuple[Station, ...]]
-Placed = tuple[str, str, Scalar, Ends]
-"""A link: its leg, empty if it belongs to none; its name; its length, m; and a function that gives the ends of its
-axis."""
-Lengths = Callable[[Sequence[Leg], Vector, Any], list[Placed]]
+"""Gives the ends of a link's axis; it is called where these are needed."""
+PlacedLink = tuple[str, str, Scalar, Ends]
+"""A link: its leg, empty if it belongs to none; its name; its length, m; and its ends."""
+LinksOf = Callable[[Sequence[Leg], Vector, Any], list[PlacedLink]]
 """From the legs at a pose, P (base frame, m) and the table `geometry` to each link."""
 
 
@@ -32,13 +32,13 @@ class LinkKind:
     Attributes:
         name: their field in the tables about links.
         rigidities: fields of [stiffness] in which their cross-section may be written.
-        lengths: function that gives the length and the place of each link.
+        placed_links: gives the links at a pose.
         count: number of entries of those fields; None where one entry is for all links.
     """
 
     name: str
     rigidities: tuple[str, ...]
-    lengths: Lengths
+    placed_links: LinksOf
     count: int | None = None
 
 
@@ -84,7 +84,7 @@ def growth_of(expansion: Scalar, rise: Scalar, links: str) -> Scalar:
     return expansion * rise
 
 
-def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Placed]:
+def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[PlacedLink]:
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
     ends = [(leg, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
     return [
@@ -115,49 +115,50 @@ def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> t
     return tuple((number, point) for (number, _), point in zip(piece, pair.bars[bar], strict=True))
 
 
-def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
+def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> LinksOf:
     """Links of the actuated legs, in pairs where `bars` is 2; a field of [geometry] has their length or lengths.
 
     Args:
-        what: name of the links.
-        field: the field with their length.
-        segment: number of their piece of the leg's path from the base, from 0.
+        what: the name of the links.
+        field: the field with their length, or with one for each leg.
+        segment: number of their piece of the leg's path, counted from 0 at the base.
         bars: number of links side by side.
     """
 
-    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
+    def placed_links(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[PlacedLink]:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
-        actuated, given = actuated_legs(legs), getattr(geometry, field)
-        of_each = isinstance(given, tuple)
-        sizes = [given[leg.number - 1] if of_each and leg.number else given for leg in actuated]
+        actuated, written = actuated_legs(legs), getattr(geometry, field)
+        lengths = [
+            written[leg.number - 1] if isinstance(written, tuple) and leg.number else written for leg in actuated
+        ]
         return [
-            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment, None if bars == 1 else place))
-            for leg, length in zip(actuated, sizes, strict=True)
-            for place, name in enumerate(names)
+            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment, None if bars == 1 else bar))
+            for leg, length in zip(actuated, lengths, strict=True)
+            for bar, name in enumerate(names)
         ]
 
-    return lengths
+    return placed_links
 
 
-def of_passive_leg(what: str, field: str) -> Lengths:
+def of_passive_leg(what: str, field: str) -> LinksOf:
     """Links whose lengths are the entries of a field of [geometry]: the path of the leg that has no actuator."""
 
-    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
+    def placed_links(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[PlacedLink]:
         passive = next(leg for leg in legs if leg.number is None)
-        sizes = enumerate(getattr(geometry, field))
-        return [("", f"{what} {i + 1}", length, partial(_stations, passive, i)) for i, length in sizes]
+        lengths = enumerate(getattr(geometry, field))
+        return [("", f"{what} {i + 1}", length, partial(_stations, passive, i)) for i, length in lengths]
 
-    return lengths
+    return placed_links
 
 
-def from_origin(what: str) -> Lengths:
+def from_origin(what: str) -> LinksOf:
     """One link from the origin of the base frame to P."""
 
-    def lengths(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[Placed]:
+    def placed_links(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[PlacedLink]:
         elements = next((len(leg.chain) for leg in legs if leg.name == what), 0)
         return [(what, what, tip.norm(), lambda: ((0, ZERO), (elements, tip)))]
 
-    return lengths
+    return placed_links
 
 
 def actuated_legs(legs: Sequence[Leg]) -> list[Leg]:

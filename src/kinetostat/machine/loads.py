@@ -99,19 +99,30 @@ def _known_mass(link: Member) -> Scalar | None:
 
 
 def _members(machine: Machine, configuration: Configuration) -> list[Member]:
+    """The links of a machine; those written leg by leg without their places."""
     family = machine.family
     if family.members is not None:
         return family.members(**machine.family_tables)
     members = []
     for kind in family.links:
-        given = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
-        placed = kind.lengths(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
+        columns = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
+        placed = kind.placed_links(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
         for i, (leg, name, length, ends) in enumerate(placed):
-            density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in given)
+            density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in columns)
             # Bars beside each other lengthen their leg as one of them does: each counts as its share of that.
             parallel = sum(other == leg for other, *_ in placed) if leg else 1
             growth = growth_of(expansion, rise, kind.name) * length * (1.0 / parallel)
-            members.append(Member(leg, name, length, density * length, bending, growth, ends))
+            members.append(
+                Member(
+                    leg=leg,
+                    name=name,
+                    length=length,
+                    mass=density * length,
+                    bending=bending,
+                    growth=growth,
+                    ends=ends,
+                )
+            )
     return members
 
 

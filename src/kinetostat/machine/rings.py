@@ -77,27 +77,33 @@ CRANK_LINKS = (
 
 
 def outward(base: Sequence[Vector], radius: Scalar, turns: Sequence[Scalar]) -> list[Vector]:
-    """Unit vectors of the x-y plane that the cranks' vertical planes hold: away from z, each turned about it.
+    """Horizontal unit vectors in the vertical planes of the cranks: away from the z axis, each turned about it.
 
     Args:
         base: base joints, on a ring about z, m.
         radius: the radius of the ring, m.
-        turns: rad.
+        turns: the turn of each plane about z, rad.
     """
     shrink = reciprocal(radius)
     radial = [Vector(point.x, point.y, 0.0) * shrink for point in base]
     return [rotation_z(cos(turn), sin(turn)).apply(v) for v, turn in zip(radial, turns, strict=True)]
 
 
-def place(name: str, base: Vector, tip: Vector, axis: Vector, links: CrankLinks) -> tuple[Vector, tuple[Closure, ...]]:
-    """The elbow of a crank about `axis` through `base` and a rod that ends at `tip` (base frame, m), and its limits.
+def place_elbow(
+    name: str, base: Vector, tip: Vector, axis: Vector, links: CrankLinks
+) -> tuple[Vector, tuple[Closure, ...]]:
+    """The elbow between a crank and its rod (base frame, m; NaN out of reach), and what the leg needs to close.
 
-    Seen along the axis, the elbow lies at +90 deg from the way from base to tip; it is NaN out of reach.
+    Args:
+        name: the name of the leg.
+        base, tip: the point through which the crank's axis goes, and the end of the rod, base frame, m.
+        axis: unit vector. Seen along it, the elbow lies at +90 deg from the way from base to tip.
+        links: crank and rod.
     """
-    near, far = crank_range(base, tip, axis, links.crank)
+    nearest, farthest = crank_range(base, tip, axis, links.crank)
     rod = f"rod of {name}"
-    limits = (Closure(rod, near, 0.0, links.rod), Closure(rod, far, links.rod, RIGID))
-    return crank_end(base, tip, axis, links.crank, links.rod), limits
+    closures = (Closure(rod, nearest, 0.0, links.rod), Closure(rod, farthest, links.rod, RIGID))
+    return crank_end(base, tip, axis, links.crank, links.rod), closures
 
 
 def crank_leg(name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Scalar, links: CrankLinks) -> PlacedLeg:
@@ -109,11 +115,11 @@ def crank_leg(name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Sca
     Args:
         name: the name of the leg.
         base, tip: centres of the actuated revolute and of the spherical joint, base frame, m.
-        axis: the axis of the revolute, unit vector; see `place` for its sign.
+        axis: the axis of the revolute, unit vector; see `place_elbow` for its sign.
         stiffness: the stiffness of the actuator, N·m/rad.
         links: crank and rod.
     """
-    elbow, limits = place(name, base, tip, axis, links)
+    elbow, closures = place_elbow(name, base, tip, axis, links)
     along, crank = (tip - elbow) * reciprocal(links.rod), (elbow - base) * reciprocal(links.crank)
     bending, part = per_length(links.bending, links.crank, 3.0), PartName(name, "crank")
     elements: tuple[Element, ...] = (
@@ -127,7 +133,7 @@ def crank_leg(name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Sca
         *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(links.axial, links.rod))),
         *revolutes(tip, AXES, f"{name} platform joint"),
     )
-    return Leg(name, elements, (Line(tip, along),)), limits
+    return Leg(name, elements, (Line(tip, along),)), closures
 
 
 def crank_legs(
@@ -136,7 +142,7 @@ def crank_legs(
     stiffness: Sequence[Scalar],
     links: CrankLinks,
 ) -> tuple[tuple[Leg, ...], tuple[Closure, ...]]:
-    """R-U-S legs "leg 1", "leg 2", ... whose cranks turn in vertical planes, and their limits.
+    """R-U-S legs "leg 1", "leg 2", ... whose cranks turn in vertical planes, and what they need to close.
 
     For a platform joint above its base joint the crank points to its side, else away from it.
 
@@ -144,7 +150,7 @@ def crank_legs(
         ends: base joints and platform joints in order, base frame, m.
         sides: horizontal unit vectors in the planes of the cranks, see `outward`.
         stiffness: the stiffness of the actuators, N·m/rad.
-        links: crank and rod, alike in all legs.
+        links: crank and rod, equal in all legs.
     """
     return legs_and_closures(
         crank_leg(f"leg {i}", base, tip, Z_AXIS.cross(side), k, links)
@@ -196,7 +202,7 @@ def ends(
     Args:
         rings: the radii.
         base_angles, platform_angles: the angles of the joints of both rings from x, rad.
-        platform: its placement.
+        platform: the placement of the platform.
         heights: z of the base ring in the base frame, and of the platform ring in the platform frame, m.
     """
     base = ring(rings.base_radius, base_angles, heights[0])
@@ -211,13 +217,13 @@ def four_joints(radius: Scalar, angle: Scalar) -> list[Vector]:
 
 @dataclass(frozen=True)
 class Placement:
-    """A platform at its pose, without its actuated legs; base frame, m.
+    """A machine at its pose without its actuated legs; base frame, m.
 
     Attributes:
-        platform: its placement; the translation is P.
+        platform: the placement of the platform; its translation is P.
         joints: base joints and platform joints of the actuated legs, in order.
-        passive: the passive legs that guide it.
-        closures: what these need to close.
+        passive: the passive legs that guide the platform.
+        closures: what the passive legs need to close.
     """
 
     platform: Displacement
@@ -225,17 +231,21 @@ class Placement:
     passive: tuple[Leg, ...] = ()
     closures: tuple[Closure, ...] = ()
 
-    def moved_by(self, legs: Sequence[Leg], size: Scalar, closures: Sequence[Closure] = ()) -> Configuration:
-        """The machine with its actuated legs, their closures, and its characteristic length (m)."""
+    def with_legs(self, legs: Sequence[Leg], size: Scalar, closures: Sequence[Closure] = ()) -> Configuration:
+        """The whole machine, with its actuated legs, their closures, and its characteristic length (m)."""
         return Configuration(self.platform, (*self.passive, *legs), (*self.closures, *closures), size)
 
 
-Place = Callable[[Any, Any, Any], Placement]
+PlatformOf = Callable[[Any, Any, Any], Placement]
 """From the tables geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
 
 
 def with_struts_or_cranks(
-    name: str, summaries: tuple[str, str], tables: Mapping[str, type], place: Place, links: Sequence[LinkKind] = ()
+    name: str,
+    summaries: tuple[str, str],
+    tables: Mapping[str, type],
+    platform_of: PlatformOf,
+    links: Sequence[LinkKind] = (),
 ) -> tuple[Family, Family]:
     """Two families of one platform: with U-P-S legs, struts, and as "NAME-rus" with R-U-S legs, cranks with rods.
 
@@ -244,23 +254,23 @@ def with_struts_or_cranks(
 
     Args:
         name: the name of the family with struts.
-        summaries: one line about each of them, for lists.
+        summaries: one line about each of the two, for lists.
         tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose of the family with struts.
-        place: the platform and what guides it.
-        links: those links with a mass that guide it.
+        platform_of: places the platform and what guides it.
+        links: the links with a mass that guide it.
     """
 
     def with_struts(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        placement = place(geometry, stiffness, pose)
+        placement = platform_of(geometry, stiffness, pose)
         legs = two_force_legs(*placement.joints, stiffness.actuator, stiffness.leg_axial)
-        return placement.moved_by(legs, geometry.size)
+        return placement.with_legs(legs, geometry.size)
 
     def with_cranks(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        placement = place(geometry, stiffness, pose)
+        placement = platform_of(geometry, stiffness, pose)
         sides = outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
         legs, limits = crank_legs(placement.joints, sides, stiffness.actuator, bars)
-        return placement.moved_by(legs, geometry.size, limits)
+        return placement.with_legs(legs, geometry.size, limits)
 
     struts = LinkKind("legs", ("leg_axial",), straight_legs)
     cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}

@@ -63,28 +63,27 @@ def rods(legs: Sequence[Leg], planar: bool = False) -> list[Rod]:
 
 
 def _rod(leg: Leg, planar: bool = False) -> Rod | None:
-    places: dict[str, list[tuple[int, Vector]]] = {}
-    for i, element in enumerate(leg.chain):
+    axes: dict[str, list[tuple[int, Vector]]] = {}  # number and point of each axis, by the name of its joint
+    for number, element in enumerate(leg.chain):
         if isinstance(element, Parallelogram):
             return None
         for joint in element.freedoms:
             if joint.point is not None:
-                places.setdefault(joint.name, []).append((i, joint.point))
-    if len(places) != 2:
+                axes.setdefault(joint.name, []).append((number, joint.point))
+    if len(axes) != 2:
         return None
-    first, last = places.values()
+    first, last = axes.values()
     between = leg.chain[first[-1][0] + 1 : last[0][0]]
-    slides = any(_is_slide(element) for element in between)
-    single = len(first) == 1, len(last) == 1
-    if not slides and single != (planar, planar):
+    has_one_axis = len(first) == 1, len(last) == 1
+    if not any(_is_slide(element) for element in between) and has_one_axis != (planar, planar):
         return None
     return Rod(
-        leg.name,
-        first[0][1],
-        last[0][1],
-        any(_is_driven_slide(element) for element in between),
-        not any(_moves(element) for element in leg.chain[: first[0][0]]),
-        not any(_moves(element) for element in leg.chain[last[-1][0] + 1 :]),
+        leg=leg.name,
+        start=first[0][1],
+        end=last[0][1],
+        telescopic=any(_is_driven_slide(element) for element in between),
+        on_base=not any(_moves(element) for element in leg.chain[: first[0][0]]),
+        on_platform=not any(_moves(element) for element in leg.chain[last[-1][0] + 1 :]),
     )
 
 
@@ -101,7 +100,7 @@ def _moves(element: Element) -> bool:
 
 
 def driven_slides(chain: Sequence[Element]) -> list[int]:
-    """Return which elements of a leg's chain are actuated slides whose travel is not the leg's length."""
+    """Return the numbers of the elements of a leg's chain that are actuated slides and do not set the leg's length."""
     rod = _rod(Leg("", tuple(chain)))
     if rod is not None and rod.telescopic:
         return []

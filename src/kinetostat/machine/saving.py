@@ -27,7 +27,8 @@ from kinetostat.spec.tolerance_table import tolerance_lines
 LONGEST_EDITED_TEXT = 1 << 17
 """Characters of a file that is edited: tomlkit needs a second for as many."""
 MOST_EDITS = 3
-"""Edits until the machine is the same: one as a rule, two where a link's cross-section becomes a number and a mass."""
+"""Edits until the machine is the same: one as a rule, two where a link's cross-section becomes a number and a mass. A
+machine that differs after three will not be the same after more; its file is then written afresh."""
 TABLES_WITH_NAMES = ("joints", "links")
 """Tables of a leg whose entries have names."""
 
@@ -52,13 +53,13 @@ def written_at(machine: Machine, paths: Iterable[str]) -> dict[str, Any]:
     return {path: _value_at(document, path.split(".")) for path in paths}
 
 
-def _value_at(at: Any, keys: list[str]) -> Any:
+def _value_at(value: Any, keys: list[str]) -> Any:
     try:
         for key in keys:
-            at = _inside(at, key) if isinstance(at, dict | list) else at
+            value = _inside(value, key) if isinstance(value, dict | list) else value
     except (LookupError, ValueError):
         return None
-    return at
+    return value
 
 
 def _edited_text(written: Written, machine: Machine) -> str | None:
@@ -69,9 +70,9 @@ def _edited_text(written: Written, machine: Machine) -> str | None:
         for setting in (text for text in written.settings if not text.startswith(TOLERANCES)):
             path, _, text = setting.partition("=")
             *table, key = path.strip().split(".")
-            home = _place(document, table)
-            if isinstance(home, dict | list):  # else one value stands for all entries, and one of them was set
-                _put(home, key, setting_value(text.strip()))
+            container = _table_at(document, table)
+            if isinstance(container, dict | list):  # else one value stands for all entries, and one of them was set
+                _put(container, key, setting_value(text.strip()))
         for _ in range(MOST_EDITS):
             text = tomlkit.dumps(document)
             present = build(text, machine.name)
@@ -84,15 +85,17 @@ def _edited_text(written: Written, machine: Machine) -> str | None:
 
 
 def _is_same(first: Machine, second: Machine) -> bool:
-    alike = first.name == second.name and first.family.literals == second.family.literals
-    alike = (
-        alike
+    """Whether two machines have equal files; tolerances also in their order, because later ones hold."""
+    return (
+        first.name == second.name
+        and first.family.name == second.family.name
+        and first.family.literals == second.family.literals
         and first.loaded == second.loaded
         and first.display == second.display
         and first.requirements == second.requirements
         and list(first.tolerances.items()) == list(second.tolerances.items())
+        and values(first) == values(second)
     )
-    return alike and first.family.name == second.family.name and values(first) == values(second)
 
 
 def _write_differences(document: Any, present: Machine, machine: Machine) -> None:
@@ -104,18 +107,18 @@ def _write_differences(document: Any, present: Machine, machine: Machine) -> Non
     if list(machine.tolerances.items()) != list(present.tolerances.items()):
         document.update(tomlkit.parse("\n".join(tolerance_lines(machine.tolerances))))
     if machine.loaded != present.loaded:
-        _put(_place(document, ["load"]), "state", machine.state)
+        _put(_table_at(document, ["load"]), "state", machine.state)
     for table, literals in machine.family.literals.items():
         known = present.family.literals.get(table, {})
         for key in (key for key, value in literals.items() if known.get(key) != value):
-            _put(_place(document, table.split(".") if table else []), key, literals[key])
+            _put(_table_at(document, table.split(".") if table else []), key, literals[key])
     if any(form in document.get("pose", {}) for form in FORMS) and machine.tables["pose"] != present.tables["pose"]:
         remove_replaced_form(document, [f"pose.{name}=" for name in ANGLES], ANGLES, machine.name)
     for table, name, quantity in _fields(machine):
         new = getattr(machine.tables[table], name)
         old = getattr(present.tables.get(table), name, None)
         if new != old:
-            _put(*_field(_place(document, table.split(".")), name, quantity, new, old))
+            _put_numbers(_table_at(document, table.split(".")), name, quantity, new, old)
 
 
 def _fields(machine: Machine) -> Iterator[tuple[str, str, Quantity]]:
@@ -123,54 +126,56 @@ def _fields(machine: Machine) -> Iterator[tuple[str, str, Quantity]]:
         yield from ((table, name, quantity) for name, quantity in quantities(fields).items())
 
 
-def _field(home: Any, name: str, quantity: Quantity, new: Any, old: Any) -> tuple[Any, str, Any]:
-    """Return the table, the key and the value that stand for the new numbers of a field."""
-    if isinstance(home, list):  # springs in series, each a text of its name and its stiffness
-        names = [str(text).partition(" ")[0] for text in home]
-        place = names.index(name)
-        return home, str(place), f"{name} {quantity.in_file(new, home[place].partition(' ')[2])}"
-    before = home.get(name)
+def _put_numbers(container: Any, name: str, quantity: Quantity, new: Any, old: Any) -> None:
+    """Put the new numbers of a field into its table, in the units in which the old ones are written."""
+    if isinstance(container, list):  # springs in series, each a text of its name and its stiffness
+        number = [str(text).partition(" ")[0] for text in container].index(name)
+        container[number] = f"{name} {quantity.in_file(new, container[number].partition(' ')[2])}"
+        return
+    before = container.get(name)
     if quantity.count is None:
-        return home, name, quantity.in_file(new, before)
-    if isinstance(before, list) and old is not None:
+        _put(container, name, quantity.in_file(new, before))
+    elif isinstance(before, list) and old is not None:
         for i, (value, former) in enumerate(zip(new, old, strict=True)):
             if value != former:
                 before[i] = quantity.in_file(value, before[i])
-        return home, name, before
-    alike = not quantity.apart and len(set(new)) == 1
-    return home, name, quantity.in_file(new[0], before) if alike else [quantity.in_file(v, before) for v in new]
+    elif not quantity.apart and len(set(new)) == 1:  # one value stands for all
+        _put(container, name, quantity.in_file(new[0], before))
+    else:
+        _put(container, name, [quantity.in_file(value, before) for value in new])
 
 
-def _place(document: Any, keys: list[str]) -> Any:
+def _table_at(document: Any, keys: list[str]) -> Any:
     """Return the table, or the list, at a path; legs, joints and links by their names. Missing tables are added."""
-    at = document
+    table = document
     for key in keys:
-        inner = _inside(at, key)
-        if inner is None:
-            at[key] = tomlkit.table()
-            inner = at[key]
-        at = inner
-    return at
+        if _inside(table, key) is None:
+            table[key] = tomlkit.table()
+        table = _inside(table, key)
+    return table
 
 
-def _inside(at: Any, key: str) -> Any:
-    if isinstance(at, list):
-        named = [entry for entry in at if isinstance(entry, dict) and entry.get("name") == key]
-        return named[0] if named else at[int(key)]
-    lists = (_inside(at[inner], key) for inner in TABLES_WITH_NAMES if inner in at and key not in at)
-    return at[key] if key in at else next((entry for entry in lists if entry is not None), None)
+def _inside(container: Any, key: str) -> Any:
+    """Return an entry of a table by its key, or of a list by its name or number; None of a table that lacks it."""
+    if isinstance(container, list):
+        named = [entry for entry in container if isinstance(entry, dict) and entry.get("name") == key]
+        return named[0] if named else container[int(key)]
+    if key in container:
+        return container[key]
+    entries = (_inside(container[name], key) for name in TABLES_WITH_NAMES if name in container)
+    return next((entry for entry in entries if entry is not None), None)
 
 
-def _put(home: Any, key: str, value: Any) -> None:
+def _put(container: Any, key: str, value: Any) -> None:
     """Put a value into a table or a list; a comment behind it stays in its column."""
-    if isinstance(home, list):
-        home[int(key)] = value
+    if isinstance(container, list):
+        container[int(key)] = value
         return
-    before = home.get(key)
+    before = container.get(key)
     if before is value:
         return
-    home[key] = value
-    after = home[key]
+    container[key] = value
+    after = container[key]
     if isinstance(before, Item) and isinstance(after, Item) and before.trivia.comment:
         room = len(before.trivia.comment_ws) + len(before.as_string()) - len(after.as_string())
         after.trivia.comment_ws = " " * max(1, room)

@@ -19,7 +19,7 @@ from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
-from kinetostat.machine.rings import CrankLinks, PlacedLeg, Rings, Three, legs_and_closures, of_three_legs, place
+from kinetostat.machine.rings import CrankLinks, PlacedLeg, Rings, Three, legs_and_closures, of_three_legs, place_elbow
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
@@ -85,7 +85,9 @@ def _arm_leg(
     stiffness: DeltaStiffness,
 ) -> PlacedLeg:
     """R - arm - pair of bars, side by side along the axis of the revolute."""
-    elbow, closures = place(name, base, platform_joint, axis, CrankLinks(geometry.arm_length, geometry.bar_length))
+    elbow, closures = place_elbow(
+        name, base, platform_joint, axis, CrankLinks(geometry.arm_length, geometry.bar_length)
+    )
     bars = BarPair(name, elbow, platform_joint, axis, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
     chain: tuple[Element, ...] = (
         Spring(PartName(name, "actuator"), Joint(axis, base), actuator, actuated=True),

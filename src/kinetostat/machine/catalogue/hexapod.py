@@ -49,7 +49,7 @@ class Pose:
     yaw: Annotated[float, Quantity("angle", "rotation about z, last")] = 0.0
 
 
-def placement(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
+def hexapod_platform(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform, and base and platform joints of its legs; every pose can be reached (SI, base frame)."""
     turn = rotation_z(cos(pose.yaw), sin(pose.yaw)) @ rotation_y(cos(pose.pitch), sin(pose.pitch))
     turn = turn @ rotation_x(cos(pose.roll), sin(pose.roll))
@@ -66,5 +66,5 @@ FAMILIES = with_struts_or_cranks(
         "6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw",
     ),
     {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    placement,
+    hexapod_platform,
 )

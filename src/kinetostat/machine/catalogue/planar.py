@@ -23,7 +23,7 @@ from kinetostat.machine.rings import (
     ends,
     legs_and_closures,
     of_three_legs,
-    place,
+    place_elbow,
 )
 from kinetostat.spec.fields import Quantity, table
 
@@ -122,7 +122,7 @@ def planar_3rrr(geometry: CrankGeometry, stiffness: CrankStiffness, pose: Pose) 
 
 def _crank_leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLinks) -> PlacedLeg:
     """R-R-R: a force along the distal link; the base revolute is two springs, actuator and 3 EI / length (Table I)."""
-    elbow, closures = place(name, base, tip, Z_AXIS, links)
+    elbow, closures = place_elbow(name, base, tip, Z_AXIS, links)
     along, pivot = (tip - elbow) * reciprocal(links.rod), Joint(Z_AXIS, base)
     chain: tuple[Element, ...] = (
         Spring(PartName(name, "actuator"), pivot, stiffness, actuated=True),

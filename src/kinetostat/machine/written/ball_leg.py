@@ -80,7 +80,7 @@ class BallLeg:
         leg = self._solve(movers[::-1], motion.inverse())
         # Seen from the base, what follows a joint is what comes before it as seen from the platform.
         amounts: list[Scalar | Turn] = []
-        following = motion  # of all links beyond this joint
+        following = motion  # of what follows this joint, seen from the base
         for amount, joint in zip(leg.amounts, movers[::-1], strict=True):
             opposite = _opposite(amount)
             if isinstance(amount, Turn) and isinstance(opposite, Turn) and amount.placement:
@@ -109,9 +109,9 @@ class BallLeg:
             fixed = pair[0].pivot
             start = centre - fixed
             square = _square(start)
-            undone, limits = to_distance(single, goal, centre, fixed, square)
-            end = single.moved(undone)[1].apply(goal) - fixed
-            amount = _opposite(undone)
+            backward_amount, limits = to_distance(single, goal, centre, fixed, square)
+            end = single.moved(backward_amount)[1].apply(goal) - fixed
+            amount = _opposite(backward_amount)
         size = reciprocal(sqrt(square))
         before = single.axis * self.aligned if self.aligned else start * size
         turns, gap = self._pair(pair, before, end * size, centre - fixed)
@@ -123,8 +123,8 @@ class BallLeg:
             turns = [_after(moved, turn) for turn in turns]
             arm = _place(turns[1]).motion
             amounts = [_with_placement(amount, single, moved, moved), *turns]
-        ball_turns, left = _ball_turns(ball, arm.rotation, goal, motion)
-        return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + left)
+        ball_turns, ball_gap = _ball_turns(ball, arm.rotation, goal, motion)
+        return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + ball_gap)
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
         """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.
@@ -135,11 +135,11 @@ class BallLeg:
             home: the arm at the home pose, m.
         """
         first, second = (joint.axis for joint in pair)
-        slant, low = (0.0, 0.0) if self.upright else (first.dot(second), start.dot(second))
-        axis, gap = axis_between(first, end, slant, low, first.cross(home).dot(second))
-        across = sqrt(1.0 - low * low)
+        slant, arm_slant = (0.0, 0.0) if self.upright else (first.dot(second), start.dot(second))
+        axis, gap = axis_between(first, end, slant, arm_slant, first.cross(home).dot(second))
+        across = sqrt(1.0 - arm_slant * arm_slant)
         shrink = reciprocal(across)
-        across_start, across_end = (second - start * low) * shrink, (axis - end * low) * shrink
+        across_start, across_end = (second - start * arm_slant) * shrink, (axis - end * arm_slant) * shrink
         rotation = TriadRotation(
             (start, across_start, start.cross(across_start)), (end, across_end, end.cross(across_end))
         )
@@ -148,10 +148,10 @@ class BallLeg:
             turn_about(axis, (first, end), second, (first, start)),
         ]
         point = pair[0].pivot
-        half = rotation_along(first, turns[0].cosine, turns[0].sine)
-        motions = [Displacement(turn, point - turn.apply(point)) for turn in (half, rotation)]
-        axes = first, Carried(axis.x, axis.y, axis.z, rotation, Vector(low, across, 0.0))
-        places = [RevolutePlace(way, point, there) for way, there in zip(axes, motions, strict=True)]
+        first_rotation = rotation_along(first, turns[0].cosine, turns[0].sine)
+        motions = [Displacement(turn, point - turn.apply(point)) for turn in (first_rotation, rotation)]
+        axes = first, Carried(axis.x, axis.y, axis.z, rotation, Vector(arm_slant, across, 0.0))
+        places = [RevolutePlace(direction, point, motion) for direction, motion in zip(axes, motions, strict=True)]
         return [replace(turn, placement=place) for turn, place in zip(turns, places, strict=True)], gap
 
 
@@ -187,7 +187,7 @@ def _ball_turns(
         rotation_along(end, turns[2].cosine, -turns[2].sine) @ motion.rotation,
     ]
     motions = [*(Displacement(turn, centre - turn.apply(home)) for turn in rotations), motion]
-    places = [RevolutePlace(way, centre, there) for way, there in zip((start, axis, end), motions, strict=True)]
+    places = [RevolutePlace(line, centre, turned) for line, turned in zip((start, axis, end), motions, strict=True)]
     return [replace(turn, placement=place) for turn, place in zip(turns, places, strict=True)], gap
 
 

@@ -1,6 +1,7 @@
 """Joint coordinates of legs with three parallel revolutes and at most one slide along them, in closed form.
 
-Where the platform turns out of the leg's plane, they do not close it: Newton's method does (`kinematics.closure`).
+Across their common axis such a leg is two links in a plane, and closing it is to find the apex of a triangle. Where the
+platform turns out of the leg's plane, these coordinates do not close it: Newton's method does (`kinematics.closure`).
 
 Source: theory (23). All is in the base frame at the home pose.
 """
@@ -22,10 +23,10 @@ class ParallelAxes:
     """A leg of three revolutes about parallel axes and at most one slide along them, in any order.
 
     Attributes:
-        leg: its name.
-        revolutes: which of its movable elements turn, from base to platform.
-        slide: which of them slides, or None.
-        signs: the signs of the axes against the first revolute's.
+        leg: the name of the leg.
+        revolutes: numbers of its movable elements that turn, from base to platform.
+        slide: number of the one that slides, or None.
+        signs: for each movable element 1 if its axis points as that of the first revolute does, otherwise -1.
         bend: side of the line from the first to the last revolute on which the middle one lies at the home pose.
     """
 
@@ -48,11 +49,12 @@ class ParallelAxes:
         goal = motion.apply(last)
         lower, upper, span = (v.across(axis) for v in (middle - first, last - middle, goal - first))
         bent, closure = self._triangle(axis, lower, upper, span)
-        lower_turn = turn_between(axis, lower, bent)
-        both = turn_between(axis, upper, span - bent)
-        all_three = turn_between(axis, lower, motion.rotation.apply(lower))
+        # Turns of both links and of the platform against the base; each revolute turns by the difference of two.
+        lower_turn = _turn_between(axis, lower, bent)
+        upper_turn = _turn_between(axis, upper, span - bent)
+        platform_turn = _turn_between(axis, lower, motion.rotation.apply(lower))
+        turns = (lower_turn, _difference(upper_turn, lower_turn), _difference(platform_turn, upper_turn))
         amounts: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, all_three))
         for i, turn in zip(self.revolutes, turns, strict=True):
             amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
@@ -60,18 +62,24 @@ class ParallelAxes:
         return ClosedLeg(amounts, closure)
 
     def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
-        """Direction of the lower link, and the condition for the two links to bridge the span."""
-        near, far, square = lower.dot(lower), upper.dot(upper), span.dot(span)
-        shrink = reciprocal(square)
-        along = 0.5 * (1.0 + (near - far) * shrink)
-        aside = sqrt(near * shrink - along * along)
-        sizes = sqrt(near), sqrt(far)
-        closure = Closure(self.leg, sqrt(square), abs(sizes[0] - sizes[1]), sizes[0] + sizes[1])
-        return span * along + axis.cross(span) * (self.bend * aside), closure
+        """The lower link as a vector, m, and the condition for both links to bridge the span; all across the axis."""
+        lower_square, upper_square, span_square = lower.dot(lower), upper.dot(upper), span.dot(span)
+        shrink = reciprocal(span_square)
+        along = 0.5 * (1.0 + (lower_square - upper_square) * shrink)
+        across = sqrt(lower_square * shrink - along * along)
+        lengths = sqrt(lower_square), sqrt(upper_square)
+        closure = Closure(self.leg, sqrt(span_square), abs(lengths[0] - lengths[1]), lengths[0] + lengths[1])
+        return span * along + axis.cross(span) * (self.bend * across), closure
 
 
-def _remaining_turn(first: Turn, whole: Turn) -> Turn:
-    """The rest of a turn after the first part of it."""
+def _turn_between(axis: Vector, old: Vector, new: Vector) -> Turn:
+    """The turn about an axis that takes one vector at right angles to it to another of the same length."""
+    shrink = reciprocal(old.dot(old))
+    return Turn(old.dot(new) * shrink, axis.dot(old.cross(new)) * shrink)
+
+
+def _difference(whole: Turn, first: Turn) -> Turn:
+    """The turn that is left of a whole one after its first part."""
     return Turn(
         whole.cosine * first.cosine + whole.sine * first.sine,
         whole.sine * first.cosine - whole.cosine * first.sine,
@@ -79,7 +87,7 @@ def _remaining_turn(first: Turn, whole: Turn) -> Turn:
 
 
 def parallel_axes(name: str, movers: Sequence[Joint]) -> ParallelAxes | None:
-    """Recognise such a leg by its joints at the home pose, whose numbers must be floats; None if it is another leg."""
+    """Recognise such a leg by its joints at the home pose; None if it is another leg. Their numbers must be floats."""
     turning = [i for i, joint in enumerate(movers) if joint.point is not None]
     sliding = [i for i, joint in enumerate(movers) if joint.point is None]
     if len(turning) != 3 or len(sliding) > 1 or any(joint.pitch for joint in movers):
@@ -96,9 +104,3 @@ def parallel_axes(name: str, movers: Sequence[Joint]) -> ParallelAxes | None:
     signs = tuple(float(np.sign(direction @ axis)) for direction in axes)
     first, middle, last = turning
     return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))
-
-
-def turn_between(axis: Vector, old: Vector, new: Vector) -> Turn:
-    """The turn about an axis that takes one vector at right angles to it to another of the same length."""
-    size = reciprocal(old.dot(old))
-    return Turn(old.dot(new) * size, axis.dot(old.cross(new)) * size)
