@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kinetostat import analyze, build, bundled, command, evaluate, forward, save, sensitivity, under_load
 from kinetostat.equilibrium.balance import balance, free_state, state_after
-from kinetostat.equilibrium.mechanism import FEW_POSES
+from kinetostat.equilibrium.elastic_legs import FEW_POSES
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of

@@ -17,7 +17,7 @@ import numpy as np
 
 from kinetostat.accuracy.rows import HomeRows, LegRow
 from kinetostat.arrays import Array, Mask
-from kinetostat.equilibrium.mechanism import FEW_POSES
+from kinetostat.equilibrium.elastic_legs import FEW_POSES
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain, PlacedChain
 from kinetostat.numerics.motions import Motions, cross

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.elastic_legs import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap

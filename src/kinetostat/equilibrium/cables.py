@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.equilibrium.catenary import Hanging, hanging_cables, leaving_points
-from kinetostat.equilibrium.chains import SIGNS
+from kinetostat.equilibrium.leg_reader import SIGNS
 from kinetostat.equilibrium.state import check_loads
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import platform_placement

@@ -15,8 +15,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import ElasticLeg
-from kinetostat.equilibrium.masses import masses_of_one_body
+from kinetostat.equilibrium.elastic_legs import NO_MASSES, ElasticLeg, RodEnds, masses_of_one_body
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
@@ -37,22 +36,20 @@ class ElasticRod:
     """A leg as a spring between two points; of its springs in a row, all carry the same.
 
     Attributes:
-        near, far: its ends in the free state, on the base and on the platform [1 x 3].
+        ends: its ends in the free state, on the base and on the platform [1 x 3].
         softness: sum of the compliances of its springs.
-        given: elongation that they would have without a load: what their preloads have stretched, less the rod's
-            growth.
+        natural_elongation: elongation without a load: what its preloads have stretched, less the rod's growth.
         sign: the sign of the loads that it can carry, 0 for both.
         driven: its springs that are actuators.
         rotor: inertia that its drive adds along it, as `ElasticLeg.rotors`.
     """
 
-    near: Array
-    far: Array
+    ends: RodEnds
     softness: Scalar
-    given: Scalar
+    natural_elongation: Scalar
     sign: float
-    driven: tuple[Spring, ...] = ()
-    rotor: Scalar = 0.0
+    driven: tuple[Spring, ...]
+    rotor: Scalar
 
 
 @dataclass(frozen=True)
@@ -75,17 +72,15 @@ class Cut:
 def cut(mechanism: Mechanism) -> Cut | None:
     """Cut the loops of a mechanism; None if its form does not allow it."""
     chains = [_without_spin(leg) for leg in mechanism.legs if leg.rod is None]
-    legs = chains if len(chains) > 1 else []
-    carrier = chains[0] if len(chains) == 1 else _free_motions(mechanism)
     if any(leg.sign.any() or leg.idle.any() for leg in chains) or any(leg.hinged.any() for leg in mechanism.legs):
         return None
     rods, masses = [], [mechanism.platform]
     for leg in mechanism.legs:
         if leg.rod is None:
             continue
-        twists = leg.chain.twists[0]
-        slides = [n for n in range(len(twists)) if all(is_zero(c) for c in twists[n, :3].tolist())]
-        springs = [leg.chain.coordinate[n] for n in slides if leg.chain.coordinate[n] >= 0]
+        twists, coordinate = leg.chain.twists[0], leg.chain.coordinate
+        slides = [n for n in range(len(twists)) if all(is_zero(part) for part in twists[n, :3].tolist())]
+        springs = [coordinate[n] for n in slides if coordinate[n] >= 0]
         if not springs:
             return None  # nothing of it deflects
         # What the rod carries beyond its slide goes with the platform.
@@ -94,30 +89,41 @@ def cut(mechanism: Mechanism) -> Cut | None:
         if all(leg.springs[number] is not None for number in springs):
             if len(springs) > 1 and not all(is_zero(rotor) for rotor in leg.rotors[0].tolist()):
                 return None  # a rotor between two springs has a motion of its own
-            rods.append(_elastic_rod(mechanism, leg, springs))
-    wrenches = len(rods) + sum(mechanism.ways.shape[1] - leg.springs.count(None) for leg in legs)
-    if legs and (
-        any(rod.sign for rod in rods)
-        or wrenches < mechanism.ways.shape[1]
-        or any(_is_loose(leg, mechanism) for leg in legs)
-    ):
+            rods.append(_elastic_rod(mechanism, leg, leg.rod, springs))
+    legs = chains if len(chains) > 1 else []
+    if legs and not _determine_platform(mechanism, legs, rods):
         return None
-    return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods), tuple(legs))
+    return Cut(
+        mechanism=replace(mechanism, platform=masses_of_one_body(masses)),
+        carrier=chains[0] if len(chains) == 1 else _free_motions(mechanism),
+        rods=tuple(rods),
+        legs=tuple(legs),
+    )
 
 
-def _elastic_rod(mechanism: Mechanism, leg: ElasticLeg, springs: Sequence[int]) -> ElasticRod:
+def _determine_platform(mechanism: Mechanism, legs: Sequence[ElasticLeg], rods: Sequence[ElasticRod]) -> bool:
+    """Tell whether the wrenches of legs and rods can hold the platform, and the platform tells how each leg moves."""
+    ways = mechanism.ways.shape[1]
+    passive = [leg.springs.count(None) for leg in legs]
+    wrenches = len(rods) + sum(ways - count for count in passive)
+    return wrenches >= ways and max(passive) <= ways and not any(rod.sign for rod in rods)
+
+
+def _elastic_rod(mechanism: Mechanism, leg: ElasticLeg, ends: RodEnds, springs: Sequence[int]) -> ElasticRod:
     """A leg that is a rod with its springs in a row as one; `springs` are the numbers of their coordinates."""
-    if leg.rod is None:
-        raise ValueError(f"{leg.name} is not a rod")
     softness = [1.0 / leg.stiffness[0, number] for number in springs]
-    given = [soft * leg.preload[0, number] for soft, number in zip(softness, springs, strict=True)]
+    elongations = [soft * leg.preload[0, number] for soft, number in zip(softness, springs, strict=True)]
     links = [number - len(mechanism.actuators) for number in leg.chain.given]
-    given += [-mechanism.growth[0, link] for link in links if link >= 0]
+    elongations += [-mechanism.growth[0, link] for link in links if link >= 0]
     signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
-    rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
-    driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
-    sign = signs[0] if signs else 0.0
-    return ElasticRod(*leg.rod, total(softness), total(given), sign, driven, total(rotors))
+    return ElasticRod(
+        ends=ends,
+        softness=total(softness),
+        natural_elongation=total(elongations),
+        sign=signs[0] if signs else 0.0,
+        driven=tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven)),
+        rotor=total([rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]),
+    )
 
 
 def _without_spin(leg: ElasticLeg) -> ElasticLeg:
@@ -127,7 +133,7 @@ def _without_spin(leg: ElasticLeg) -> ElasticLeg:
     """
     if leg.spin is None or np.count_nonzero(leg.idle.any(axis=(0, 1))) > 1:
         return leg
-    first, span = leg.spin
+    first, span = leg.spin.first, leg.spin.span
     left_out, chain = first + 2, leg.chain
     turns = [chain.coordinate.index(number) for number in range(first, first + 3)]
     motions = [k for k in range(len(chain.coordinate)) if k != turns[2]]
@@ -149,7 +155,7 @@ def _without_spin(leg: ElasticLeg) -> ElasticLeg:
         sign=leg.sign[kept],
         idle=np.zeros((len(leg.idle), len(kept), len(kept))),
         masses=replace(leg.masses, carried=carried),
-        ends=tuple(number - (number > turns[2]) for number in leg.ends),
+        motion_counts=tuple(number - (number > turns[2]) for number in leg.motion_counts),
         spin=None,
         **{name: getattr(leg, name)[:, kept] for name in ("stiffness", "preload", "rotors", "dampers")},
     )
@@ -171,27 +177,22 @@ def _across(span: Array) -> tuple[Array, Array]:
     return of_scalars(first, count), of_scalars((mixed, sign + y * y * share, -y), count)
 
 
-def _is_loose(leg: ElasticLeg, mechanism: Mechanism) -> bool:
-    """Whether the passive motions of a leg are more than those of the platform, which then does not tell them all."""
-    return leg.springs.count(None) > mechanism.ways.shape[1]
-
-
 def _free_motions(mechanism: Mechanism) -> ElasticLeg:
     """A chain without springs in all motions that there are: slides first, so that turns are about the tool point."""
     ways = mechanism.ways.T[::-1].astype(object)
     size = len(ways)
     nothing = np.zeros((1, size))
     return ElasticLeg(
-        "platform",
-        Chain(ways[None], tuple(range(size)), (-1,) * size, size),
-        (None,) * size,
-        nothing,
-        nothing,
-        nothing[0],
-        np.zeros((1, size, size)),
-        masses_of_one_body([]),
-        nothing,
-        nothing,
+        name="platform",
+        chain=Chain(ways[None], tuple(range(size)), (-1,) * size, size),
+        springs=(None,) * size,
+        stiffness=nothing,
+        preload=nothing,
+        sign=nothing[0],
+        idle=np.zeros((1, size, size)),
+        masses=NO_MASSES,
+        rotors=nothing,
+        dampers=nothing,
     )
 
 
@@ -214,7 +215,7 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
-    known = bool(machine_cut.legs) or all(
-        driven[n] in carrier.springs for n in carrier.chain.given if 0 <= n < len(driven)
-    )
-    return machine_cut if known else None  # no coordinate says what a rigid actuator carries
+    drives_of_carrier = [driven[n] for n in carrier.chain.given if 0 <= n < len(driven)]
+    if not machine_cut.legs and any(spring not in carrier.springs for spring in drives_of_carrier):
+        return None  # no coordinate says what a rigid actuator carries
+    return machine_cut

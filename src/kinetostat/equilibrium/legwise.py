@@ -15,8 +15,8 @@ from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Eliminated, Row, conjugate, definite, elimination, right_inverse, semidefinite_root
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
-from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.cut import Cut
+from kinetostat.equilibrium.elastic_legs import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.pulls import loads_of_rods, pull_of, wrench_of_rods
 from kinetostat.frozen import dataclass
@@ -354,7 +354,7 @@ class LegwiseTangent:
     def _platform_and_rods(self) -> tuple[Array, Array]:
         """The load on the platform that rods do not hold [ways], and the stiffness by its turning [ways x ways]."""
         ways = self._ways
-        densities = [-(pull.density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
+        densities = [-(pull.force_density * (1.0 / (pull.length * pull.length))) for pull in self.pulls]
         load, load_change = platform_load(self.mechanism, self.platform)
         rods_load, rods_change = wrench_of_rods(self.pulls, densities)
         return ways.T @ (load + rods_load)[0], ways.T @ (rods_change - load_change)[0] @ ways

@@ -20,8 +20,8 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import ElasticLeg, GivenMotions, Units, elastic_leg
-from kinetostat.equilibrium.masses import Masses, Weight
+from kinetostat.equilibrium.elastic_legs import ElasticLeg, LikeLegs, Masses, like_legs
+from kinetostat.equilibrium.leg_reader import GivenMotions, Units, Weight, elastic_leg
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.machine.drives import numbers_of_drive, rotor_turns
@@ -29,65 +29,6 @@ from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.numerics.motions import of_scalars
-
-FEW_POSES = 64
-"""Number of poses up to which legs of one form are evaluated together; more fill the processor's cache alone."""
-
-
-@dataclass(frozen=True)
-class LikeLegs:
-    """Legs of one form as a single leg: all poses of the first of them, then all of the second, and so on.
-
-    At a few poses, time goes into calls of NumPy more than into numbers: six legs take little longer than one.
-
-    Attributes:
-        numbers: numbers of the legs.
-        leg: the leg at all these poses; its given amounts are numbered by themselves.
-        given: number among the machine's given amounts of each of its own [legs x amounts].
-    """
-
-    numbers: tuple[int, ...]
-    leg: ElasticLeg
-    given: Integers
-
-
-def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
-    """Put the legs of one form together: those whose motions, coordinates, signs and places of masses are the same.
-
-    At many poses each leg is left by itself.
-    """
-    groups: dict[Any, list[int]] = {}
-    amounts = [tuple(dict.fromkeys(number for number in leg.chain.given if number >= 0)) for leg in legs]
-    for number, (leg, driven) in enumerate(zip(legs, amounts, strict=True)):
-        given = tuple(driven.index(amount) if amount >= 0 else amount for amount in leg.chain.given)
-        alone = number if len(leg.stiffness) > FEW_POSES else None
-        form = (alone, given, leg.chain.coordinate, leg.chain.twists.shape, leg.sign.tobytes(), leg.masses.carried)
-        groups.setdefault(form, []).append(number)
-    return [
-        LikeLegs(
-            tuple(numbers),
-            _side_by_side([legs[k] for k in numbers], form[1]),
-            np.array([amounts[k] for k in numbers], dtype=np.int64),
-        )
-        for form, numbers in groups.items()
-    ]
-
-
-def _side_by_side(legs: Sequence[ElasticLeg], given: tuple[int, ...]) -> ElasticLeg:
-    """The springs and masses of legs of one form with the poses of one leg after those of the other."""
-
-    def arrays(of: Sequence[Any], *names: str) -> dict[str, Any]:
-        return {name: np.concatenate([getattr(each, name) for each in of]) for name in names}
-
-    first, masses = legs[0], [leg.masses for leg in legs]
-    return replace(
-        first,
-        chain=replace(first.chain, given=given, **arrays([leg.chain for leg in legs], "twists")),
-        masses=replace(masses[0], **arrays(masses, "point", "mass", "uncoupled", "inertia")),
-        rod=None,
-        spin=None,
-        **arrays(legs, "stiffness", "preload", "idle", "rotors", "dampers"),
-    )
 
 
 @dataclass(frozen=True)
@@ -207,7 +148,7 @@ def mechanism_of(
     return Mechanism(
         legs=legs,
         driven=tuple(amounts.actuators),
-        growth=of_scalars(amounts.growth, count) * units.shrink,
+        growth=of_scalars(amounts.growth, count) * units.per_metre,
         platform=units.masses(weights),
         wrench=_sum_of_loads(machine, count) * (1.0 / _wrench_units(length, units.force)),
         pushed=units.points([platform.apply(point) for point, _ in named]),
@@ -350,7 +291,7 @@ def with_drives(leg: ElasticLeg, units: Units, machine: Machine) -> ElasticLeg:
 
 def _friction(leg: ElasticLeg, coordinate: int, units: Units, damping: Any) -> Array:
     """Friction of a passive coordinate; the bars of a parallelogram turn about both of their ends."""
-    result = units.nothing
+    result = units.zero
     for motion, follows in enumerate(leg.chain.coordinate):
         if follows != coordinate:
             continue

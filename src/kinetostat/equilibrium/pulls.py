@@ -26,79 +26,84 @@ class RodPull:
     """Pull of a rod from a point b of the base to a point a of the platform.
 
     Attributes:
-        near, at: b and a.
+        base_point, platform_point: b and a.
         moment: a x b.
         length: length of the rod, |a - b|.
         tension: the tension with which it pulls.
-        density: force density c, which is the tension over the length: the rod pulls a with c (b - a).
-        stretching, elastic: (k - c) and k over the square of the length, with the stiffness k of the rod: the weights
-            of the dyad of its line in the tangent stiffness, and in the elastic part of it.
+        force_density: c, the tension over the length: the rod pulls a with c (b - a).
+        tangent_weight, elastic_weight: weights of the dyad of the rod's line in the tangent stiffness, and in the
+            elastic part of it: (k - c) and k over the square of the length, with the stiffness k of the rod.
         slack: 1 where the rod carries nothing, else 0.
     """
 
-    near: Vector
-    at: Vector
+    base_point: Vector
+    platform_point: Vector
     moment: Vector
     length: Scalar
     tension: Scalar
-    density: Scalar
-    stretching: Scalar
-    elastic: Scalar
+    force_density: Scalar
+    tangent_weight: Scalar
+    elastic_weight: Scalar
     slack: Scalar
 
     @property
     def line(self) -> tuple[Scalar, ...]:
         """The gradient of half the square of its length by a twist of the platform."""
-        return (*(-self.moment).components(), *(self.at - self.near).components())
+        return (*(-self.moment).components(), *(self.platform_point - self.base_point).components())
 
 
 def pull_of(rod: ElasticRod, platform: Motions | None) -> RodPull:
     """Compute the pull of a rod at a place of the platform, or in the free state if `platform` is None."""
-    near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
-    moved = ZERO if platform is None else Vector(*platform.shift(rod.far)[0])
-    at, rest = far + moved, far - near
-    span = at - near
-    square, longer = span.dot(span), 0.0
+    base_point, free_point = Vector(*rod.ends.near[0]), Vector(*rod.ends.far[0])
+    shift = ZERO if platform is None else Vector(*platform.shift(rod.ends.far)[0])
+    platform_point, free_span = free_point + shift, free_point - base_point
+    span = platform_point - base_point
+    square = span.dot(span)
     length = sqrt(square)
-    if platform is not None:  # the difference of both lengths as a quotient, which does not cancel
-        longer = moved.dot(span + rest) * (1.0 / (length + rest.norm()))
-    stiffness = 1.0 / rod.softness
-    tension, slack = (longer + rod.given) * stiffness, 0.0
+    # The difference of both lengths is written as a quotient, which does not cancel.
+    elongation = 0.0 if platform is None else shift.dot(span + free_span) * (1.0 / (length + free_span.norm()))
+    stiffness, slack = 1.0 / rod.softness, 0.0
+    tension = (elongation + rod.natural_elongation) * stiffness
     if rod.sign:
         carries = rod.sign * tension >= 0.0
-        tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
-    density, shrink = tension * (1.0 / length), 1.0 / square
-    stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
+        tension, stiffness = where(carries, tension, 0.0), where(carries, stiffness, 0.0)
+        slack = where(carries, 0.0, 1.0)
+    force_density, inverse_square = tension * (1.0 / length), 1.0 / square
     return RodPull(
-        near=near,
-        at=at,
-        moment=at.cross(near),
+        base_point=base_point,
+        platform_point=platform_point,
+        moment=platform_point.cross(base_point),
         length=length,
         tension=tension,
-        density=density,
-        stretching=stretching,
-        elastic=elastic,
+        force_density=force_density,
+        tangent_weight=(stiffness - force_density) * inverse_square,
+        elastic_weight=stiffness * inverse_square,
         slack=slack,
     )
 
 
 def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array]:
-    """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6].
+    """The wrench of all rods at the origin [1 x 6], and the negative of its derivative by a twist [1 x 6 x 6].
 
     Args:
         pulls: the pulls of the rods.
-        weights: weight of the dyad of each line in the decrease: `stretching` of each pull for the tangent stiffness.
+        weights: weight of the dyad of each line in the derivative: `tangent_weight` of each pull for the tangent
+            stiffness.
     """
-    weighted_ends = [pull.at * pull.density for pull in pulls]
+    weighted_ends = [pull.platform_point * pull.force_density for pull in pulls]
     ends = _sum(weighted_ends)
-    starts = _sum([pull.near * pull.density for pull in pulls])
-    # The sum of c a b^T: its antisymmetric part is the moment, and the whole says how the moment turns.
+    starts = _sum([pull.base_point * pull.force_density for pull in pulls])
+    # S, the sum of c a b^T: its antisymmetric part is the moment, and the whole says how the moment turns.
     outer = [
-        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(weighted_ends, pulls, strict=True)]) for j in "xyz"]
+        [
+            total([getattr(a, i) * getattr(p.base_point, j) for a, p in zip(weighted_ends, pulls, strict=True)])
+            for j in "xyz"
+        ]
         for i in "xyz"
     ]
     moment = [outer[i][j] - outer[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
-    trace, density = outer[0][0] + outer[1][1] + outer[2][2], total([pull.density for pull in pulls])
+    trace, density = outer[0][0] + outer[1][1] + outer[2][2], total([pull.force_density for pull in pulls])
+    # The weighted dyads, and the geometric part [tr(S) 1 - S, [sum c b]x; -[sum c a]x, (sum c) 1].
     decrease = sum_of_dyads(pulls, weights)[None]
     for i in range(3):
         for j in range(3):
@@ -137,6 +142,6 @@ def loads_of_rods(
     loads = []
     for rod, pull in zip(rods, pulls, strict=True):
         along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
-        stretched = pull.tension + pull.elastic * pull.length * along
-        loads += [(spring, stretched * force) for spring in rod.driven]
+        tension = pull.tension + pull.elastic_weight * pull.length * along
+        loads += [(spring, tension * force) for spring in rod.driven]
     return loads

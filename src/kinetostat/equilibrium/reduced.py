@@ -70,13 +70,13 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
     pulls = [pull_of(rod, None if free else platform) for rod in machine.rods]
-    hold, fall = wrench_of_rods(pulls, [pull.stretching for pull in pulls])
+    hold, fall = wrench_of_rods(pulls, [pull.tangent_weight for pull in pulls])
     load, change = platform_load(mechanism, platform)
     terms = leg_terms(carrier, moved, load + hold, amounts, mechanism.gravity, placed)
     twists = terms.rates[0]
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
-    elastic = springs + twists.T @ sum_of_dyads(pulls, [pull.elastic for pull in pulls]) @ twists
+    elastic = springs + twists.T @ sum_of_dyads(pulls, [pull.elastic_weight for pull in pulls]) @ twists
     return Place(platform, tuple(pulls), terms, rates, elastic, total([pull.slack for pull in pulls]))
 
 

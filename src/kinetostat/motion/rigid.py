@@ -18,8 +18,7 @@ from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.solve import Row, right_inverse
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.chains import ElasticLeg
-from kinetostat.equilibrium.masses import Masses
+from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
@@ -314,7 +313,7 @@ def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: 
         constraints=tuple(constraints),
         masses=_mass_points(leg.masses, length),
         pairs=leg.masses.pairs,
-        ends=leg.ends,
+        ends=leg.motion_counts,
     )
 
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import ElasticLeg
-from kinetostat.equilibrium.masses import Masses
+from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.numerics.motions import Motions, cross, skew_of

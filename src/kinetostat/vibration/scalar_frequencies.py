@@ -177,7 +177,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
     for rod in machine.rods:
         if not is_zero(rod.rotor):
-            inertia = inertia + _stretch_dyad(rod, place.platform.point(rod.far)) * (rod.rotor * length[0])
+            inertia = inertia + _stretch_dyad(rod, place.platform.point(rod.ends.far)) * (rod.rotor * length[0])
     mass = twists.T @ inertia @ twists
     for _, matrix in energies(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
         mass = mass + matrix[0]
@@ -188,7 +188,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
 
 def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
     """The dyad of the unit line of a rod to the point `far`: its rate of stretching by a twist, squared [6 x 6]."""
-    span = (far - rod.near)[0]
+    span = (far - rod.ends.near)[0]
     size = sqrt(total([part * part for part in span]))
     unit = np.array([part * (1.0 / size) for part in span], dtype=object)
     moment = np.cross(far[0], unit)

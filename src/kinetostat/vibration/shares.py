@@ -17,9 +17,8 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.chains import ElasticLeg
+from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
 from kinetostat.equilibrium.links import loaded_links
-from kinetostat.equilibrium.masses import Masses
 from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.tolerances import LEAST_DIVISOR
