@@ -55,13 +55,13 @@ def source(body: Body, lanes: int) -> str:
     """Write a body as LLVM assembly; lanes are the points of a vector."""
     numbers = type_of(Traced, lanes)
     before, inside = [], []
-    for k, node in enumerate(body.fixed):
+    for k, argument in enumerate(body.fixed):
         before.append(f"%fixed{k} = getelementptr double, ptr %fixed, i64 {k}")
-        before.append(f"%v{node.number} = load double, ptr %fixed{k}")
-    for k, node in enumerate(body.columns):
+        before.append(f"%v{argument.number} = load double, ptr %fixed{k}")
+    for k, argument in enumerate(body.columns):
         before += _pointer("column", k)
         inside.append(f"%at.column{k} = getelementptr double, ptr %column{k}, i64 %i")
-        inside.append(f"%v{node.number} = load {numbers}, ptr %at.column{k}, align 8")
+        inside.append(f"%v{argument.number} = load {numbers}, ptr %at.column{k}, align 8")
     nodes = needed_nodes([*body.results, body.code])
     for node in freeing_first(nodes):
         if node.fixed and node.operation != "input":

@@ -220,17 +220,17 @@ def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
 def _side_by_side(legs: Sequence[ElasticLeg], given: tuple[int, ...]) -> ElasticLeg:
     """The springs and masses of legs of one form with the poses of one leg after those of the other."""
 
-    def joined(parts: Sequence[Any], *names: str) -> dict[str, Any]:
+    def join(parts: Sequence[Any], *names: str) -> dict[str, Any]:
         return {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
 
     first, masses = legs[0], [leg.masses for leg in legs]
     return replace(
         first,
-        chain=replace(first.chain, given=given, **joined([leg.chain for leg in legs], "twists")),
-        masses=replace(masses[0], **joined(masses, *_ARRAYS_OF_MASSES)),
+        chain=replace(first.chain, given=given, **join([leg.chain for leg in legs], "twists")),
+        masses=replace(masses[0], **join(masses, *_ARRAYS_OF_MASSES)),
         rod=None,
         spin=None,
-        **joined(legs, *_ARRAYS_OF_LEG),
+        **join(legs, *_ARRAYS_OF_LEG),
     )
 
 

@@ -88,12 +88,12 @@ class Units:
     def points(self, points: Sequence[Vector]) -> Array:
         """Points [n x m x 3]."""
         rows = [of_scalars((point - self.origin).components(), self.count) * self.per_metre for point in points]
-        return self._stacked(rows, 3)
+        return self._stack(rows, 3)
 
     def forces(self, forces: Sequence[Vector]) -> Array:
         """Forces [n x m x 3]."""
         rows = [of_scalars(force.components(), self.count) * (1.0 / self.force)[:, None] for force in forces]
-        return self._stacked(rows, 3)
+        return self._stack(rows, 3)
 
     def masses(self, weights: Sequence[Weight]) -> Masses:
         """Masses in units of force per m/s²."""
@@ -109,7 +109,7 @@ class Units:
             point=self.points([weight.point for weight in weights]),
             mass=mass,
             uncoupled=mass * uncoupled_shares,
-            inertia=self._stacked([tensor * (per_newton * self.per_metre * self.per_metre) for tensor in tensors], 6),
+            inertia=self._stack([tensor * (per_newton * self.per_metre * self.per_metre) for tensor in tensors], 6),
         )
 
     def inertia(self, number: Scalar, turns: bool) -> Array:
@@ -128,7 +128,7 @@ class Units:
         unit = self.force if spring.joint.point is None else self.force * self.length
         return of_scalars([load], self.count)[:, 0] * (1.0 / unit)
 
-    def _stacked(self, rows: Sequence[Array], width: int) -> Array:
+    def _stack(self, rows: Sequence[Array], width: int) -> Array:
         """Arrays [n x width] as one [n x m x width], also where there are none."""
         return np.stack(rows, axis=1) if rows else np.zeros((len(self.length), 0, width))
 

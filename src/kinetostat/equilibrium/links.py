@@ -41,7 +41,7 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     given = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
         placed = elastic.chain.place(coordinates, given).before
-        bodies = [placed[number] for number in elastic.ends]
+        bodies = [placed[number] for number in elastic.motion_counts]
         links += leg_links(leg, partial(_point_motion, bodies, origin, length))
     return tuple(links)
 
