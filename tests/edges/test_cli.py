@@ -81,6 +81,8 @@ REFUSED = [
         ],
     ),
     (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "compliance_x_ry"], ["did you mean compliance_ry_x?"]),
+    (["sweep", MACHINE, "--vary", "x=0:1:3", "-o", "out/a.png"], ["a.png is the name of a file", '"-o out/a"']),
+    (["drives", MACHINE, "-o", "first", "-o", "second"], ["given twice, as first and as second", "one folder"]),
 ]
 
 

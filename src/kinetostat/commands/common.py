@@ -144,7 +144,30 @@ def takes_ranges(command: Parser, meaning: str) -> None:
 
 def takes_output(command: Parser, what: str) -> None:
     """Give a command `--output`, a folder."""
-    command.add_argument("-o", "--output", type=Path, help=f"folder for {what}")
+    command.add_argument("-o", "--output", type=_folder, action=_Once, help=f"folder for {what}")
+
+
+FILE_SUFFIXES = {".csv", ".html", ".json", ".nc", ".pdf", ".png", ".svg", ".toml"}
+"""Suffixes by which `--output` means a file, although a folder may have any name."""
+
+
+def _folder(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() in FILE_SUFFIXES and not path.is_dir():
+        folder = path.with_suffix("")
+        raise argparse.ArgumentTypeError(
+            f'{text} is the name of a file, and this command writes a folder of files; give it as "-o {folder}"'
+        )
+    return path
+
+
+class _Once(argparse.Action):
+    """An option that may be given once: of two folders, one would be left out without a word."""
+
+    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option_string: Any = None) -> None:
+        if (before := getattr(namespace, self.dest)) is not self.default:
+            raise argparse.ArgumentError(self, f"given twice, as {before} and as {values}; give one folder")
+        setattr(namespace, self.dest, values)
 
 
 def takes_figures(command: Parser, what: str) -> None:
