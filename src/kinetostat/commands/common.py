@@ -164,7 +164,7 @@ def _folder(text: str) -> Path:
 class _Once(argparse.Action):
     """An option that may be given once: of two folders, one would be left out without a word."""
 
-    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option_string: Any = None) -> None:
+    def __call__(self, _parser: Any, namespace: argparse.Namespace, values: Any, _option: Any = None) -> None:
         if (before := getattr(namespace, self.dest)) is not self.default:
             raise argparse.ArgumentError(self, f"given twice, as {before} and as {values}; give one folder")
         setattr(namespace, self.dest, values)
