@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinetostat.accuracy.wrenches import LEAST_SEEN_RATIO, Screws, independent_columns
+from kinetostat.accuracy.closing import LEAST_SEEN_RATIO, Screws, independent_columns
 from kinetostat.numerics.motions import each_about, exponential
 
 

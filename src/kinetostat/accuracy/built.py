@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.accuracy.closing import coordinates_toward
+from kinetostat.accuracy.closing import coordinates_toward, in_lengths, independent_columns
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.accuracy.rows import LegRow
-from kinetostat.accuracy.wrenches import Errors, in_lengths, independent_columns
+from kinetostat.accuracy.rows import Errors, LegRow
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array

@@ -1,80 +1,337 @@
-"""Legs with small errors closed on the platform, at many poses, by Newton's method.
+"""Legs with small errors: the wrenches by which they hold the platform, and where they close on it, at many poses.
 
 An error displaces what follows it in its leg by a small screw motion. Actuators are held; passive joints take up what
-they can, and the wrenches that each leg can carry decide what the platform makes of the rest. Arrays have the poses
-first [n]; screws are at the base origin in base axes, SI, unless said otherwise.
+they can, and the wrenches that each leg can carry decide what the platform makes of the rest.
+
+Which freedoms of a leg are independent is a matter of its form. Where it is known, an orthogonal basis of these gives
+the wrenches, and with them the least steps follow from linear equations; places at which freedoms are nearly dependent
+are decomposed by their singular values. Arrays have the poses first [n]; screws are at the base origin in base axes,
+SI, unless said otherwise.
 
 Source: theory (45) to (48).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from kinetostat.accuracy.rows import HomeRows, LegRow, random_coordinates
-from kinetostat.accuracy.wrenches import (
-    Errors,
-    Screws,
-    at_points,
-    by_leg,
-    in_lengths,
-    independent_columns,
-    legs_in_place,
-    like_rows,
-)
+from kinetostat.accuracy.rows import Errors, HomeRows, LegRow, LikeRows, by_leg, like_rows, random_coordinates
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.chain import closing_gap
+from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.numerics.iteration import Steps, largest, newton, with_rows
-from kinetostat.numerics.motions import Motions, exponential, logarithm
+from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
+from kinetostat.tolerances import LEAST_DIVISOR, NEARLY_DEPENDENT, SEEN_BY_LEG
 
+LEAST_SEEN_RATIO = 1e-7
+"""Least ratio of a singular value of joint screws to the largest one, with lengths in units of the machine's: singular
+values of screws that depend on each other by form are round-off, some 1e-16, those near a singular place lie above."""
+SOFTEST_SHARE = 1e-9
+"""Share of the mean compliance of the legs that is added to that of each where they must share a misfit: rigid legs
+among compliant ones would leave the equations singular, and 1e-9 changes the other shares by no more."""
 CLOSED_STEP = 1e-8
 """Motion of the last step of Newton's method, rad or in units of the machine's length: the next one would be about its
 square, or a thousandth of it where legs share a misfit."""
 LONGEST_STAGE = 0.2
-"""Farthest way of a stage, rad or in units of the machine's length, where fewer than all stages do."""
+"""Farthest motion of a stage on the way from the home place to a pose, rad or in units of the machine's length, from
+which Newton's method converges; so near poses have fewer stages."""
 NEARLY_CLOSED_STEP = 1e-2
-"""The same on the way there, where the next stage starts from."""
+"""Motion of the last step of a stage before the last one: the next stage only starts from there."""
 MOST_CLOSING_STEPS = 40
 """Most steps of Newton's method: errors are small, so that a few suffice where there is a solution."""
+STEPS_OF_STAGE = 3
+"""Most steps of Newton's method in a stage before the last one."""
 MOST_STAGES = 8
-"""Steps on the way from the home place to a pose."""
+"""Most stages on the way from the home place to a pose; a way that is farther has longer stages."""
+
+
+def in_lengths(twists: Array, length: float, axis: int = -1) -> Array:
+    """Return twists with their translations in units of a length; `axis` has their six components."""
+    units = np.array([1.0, 1.0, 1.0] + [1.0 / length] * 3)
+    shape = [1] * twists.ndim
+    shape[axis] = 6
+    return twists * units.reshape(shape)
+
+
+def at_points(twists: Array, point: Array) -> Array:
+    """Return twists that are given at the base origin [n x ... x 6], at points [n x 3]."""
+    rotation, translation = twists[..., :3], twists[..., 3:]
+    points = np.broadcast_to(point.reshape(len(point), *([1] * (twists.ndim - 2)), 3), translation.shape)
+    return np.concatenate([rotation, translation + cross(rotation, points)], axis=-1)
+
+
+def independent_columns(screws: Array) -> tuple[int, ...]:
+    """Choose the screws of a leg that do not follow from those before them.
+
+    Args:
+        screws: at random places, where nothing is dependent but by form [n x 6 x k].
+    """
+    basis, independent = np.zeros((*screws.shape[:2], 0)), []
+    for place in range(screws.shape[2]):
+        column = screws[:, :, place, None]
+        remainder = column
+        for _ in range(2):  # the second time takes away what round-off has left of the first
+            remainder = remainder - basis @ (np.swapaxes(basis, 1, 2) @ remainder)
+        new_size, size = (np.linalg.norm(part, axis=1, keepdims=True) for part in (remainder, column))
+        if (new_size > SEEN_BY_LEG * size).any():
+            basis = np.concatenate([basis, remainder / np.maximum(new_size, LEAST_DIVISOR)], axis=2)
+            independent.append(place)
+    return tuple(independent)
+
+
+@dataclass(frozen=True)
+class Screws:
+    """Screws of the free motions of a leg at n places.
+
+    Attributes:
+        screws: the screws in units of the length [n x 6 x k]; results are NaN where they are not finite.
+        independent: numbers of those that are independent by form, r of them.
+    """
+
+    screws: Array
+    independent: tuple[int, ...]
+
+    @cached_property
+    def wrenches(self) -> Array:
+        """An orthonormal basis of the wrenches that the leg carries, without work on the screws [n x 6 x (6 - r)]."""
+        return self._wrenches_and_near_dependence[0]
+
+    def steps(self, twists: Array) -> Array:
+        """Return the least steps that come nearest to twists [n x 6] in units of the length [n x coordinates].
+
+        A^T (A A^T + W W^T)^-1 is the pseudo-inverse of A if the columns of W are a basis of what A does not reach.
+        """
+        wrenches, near_dependence = self._wrenches_and_near_dependence
+        transposed = np.swapaxes(self.screws, 1, 2)
+        whole = self.screws @ transposed + wrenches @ np.swapaxes(wrenches, 1, 2)
+        whole[near_dependence | ~np.isfinite(whole).all(axis=(1, 2))] = np.eye(6)
+        result = (transposed @ np.linalg.solve(whole, twists[:, :, None]))[:, :, 0]
+        if near_dependence.any():
+            backward = np.linalg.pinv(self.screws[near_dependence], rcond=LEAST_SEEN_RATIO)
+            result[near_dependence] = (backward @ twists[near_dependence, :, None])[:, :, 0]
+        return np.asarray(result)
+
+    @cached_property
+    def _wrenches_and_near_dependence(self) -> tuple[Array, Mask]:
+        """The wrenches, and where the independent screws are nearly dependent."""
+        rank, finite = len(self.independent), np.isfinite(self.screws).all(axis=(1, 2))
+        orthogonal, triangle = np.linalg.qr(self.screws[:, :, list(self.independent)], mode="complete")
+        wrenches = np.array(orthogonal[:, :, rank:])
+        pivots = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        ratio_holds = pivots.min(axis=1, initial=np.inf) > NEARLY_DEPENDENT * pivots.max(axis=1, initial=0.0)
+        near_dependence = np.asarray(finite & ~ratio_holds)
+        if near_dependence.any():
+            wrenches[near_dependence] = np.linalg.svd(self.screws[near_dependence])[0][:, :, rank:]
+        wrenches[~finite] = np.nan
+        return wrenches, near_dependence
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Wrenches by which the legs hold the platform at a state, theory (46).
+
+    Attributes:
+        wrenches: for each leg, a basis of what it carries at the tool point [n x 6 x m], moments over the length.
+        shares: for each leg, the twist of the tool per unit work of a misfit on each wrench [n x 6 x m], translations
+            over the length.
+    """
+
+    wrenches: tuple[Array, ...]
+    shares: tuple[Array, ...]
+
+    def twist(self, number: int, misfits: Array) -> Array:
+        """Return twists of the tool by displacements of a leg's end [n x k x 6], both at the tool, over the length."""
+        work = misfits @ self.wrenches[number]
+        return np.asarray(work @ np.swapaxes(self.shares[number], 1, 2))
+
+    def at_origin(self, number: int, tool: Array, length: float) -> Array:
+        """Return the wrenches of a leg, moments about the base origin over forces: work per rad and per m [n x 6 x m].
+
+        Args:
+            number: number of the leg.
+            tool: the tool point, m [n x 3].
+            length: the length over which moments are, m.
+        """
+        basis = np.swapaxes(self.wrenches[number], 1, 2)
+        forces = basis[..., 3:] / length
+        return np.swapaxes(np.concatenate([basis[..., :3] + cross(tool[:, None], forces), forces], axis=2), 1, 2)
+
+
+def free_screws(row: LegRow, rows: HomeRows, place: PlacedChain, points: Array) -> Array:
+    """Return the screws of what moves freely in a leg, at points, in units of the length [n x 6 x freedoms].
+
+    Args:
+        row: the leg.
+        rows: its machine; twists that a planar one does not have count as free.
+        place: the leg at its places.
+        points: the points, m [n x 3].
+    """
+    free = row.chain.rates(place)[:, :, list(row.free_coordinates)] * _free_units(row, rows.length)
+    absent = np.broadcast_to(rows.absent.T, (len(free), 6, len(rows.absent)))
+    screws = np.concatenate([free, absent], axis=2)
+    return in_lengths(at_points(np.swapaxes(screws, 1, 2), points), rows.length).swapaxes(1, 2)
+
+
+def _free_units(row: LegRow, length: float) -> Array:
+    """Return the units of its free coordinates, 1 rad or the machine's length, m."""
+    return np.array([length if row.slides[place] else 1.0 for place in row.free_coordinates])
+
+
+@dataclass(frozen=True)
+class LegsInPlace:
+    """Legs with their errors at n poses, and how they hold the platform there.
+
+    Attributes:
+        groups: legs that are alike.
+        places: where the legs of each group are [legs * n].
+        free: the screws of what moves freely in them, at the tool point [legs * n].
+        holding: the wrenches that all legs carry.
+    """
+
+    groups: Sequence[LikeRows]
+    places: Sequence[PlacedChain]
+    free: Sequence[Screws]
+    holding: Holding
+
+    def displacement(self, number: int, motions: int) -> Motions:
+        """Return the displacement of what the first motions of a leg carry [n].
+
+        Args:
+            number: number of the leg.
+            motions: number of its motions.
+        """
+        group, place = next(pair for pair in zip(self.groups, self.places, strict=True) if number in pair[0].numbers)
+        of_group = place.before[motions]
+        count = len(of_group.translation) // len(group.numbers)
+        first = group.numbers.index(number) * count
+        return of_group.at(np.arange(first, first + count))
+
+
+def legs_in_place(
+    rows: HomeRows,
+    groups: Sequence[LikeRows],
+    coordinates: Sequence[Array],
+    errors: Errors,
+    tool: Array,
+    soft: Sequence[Array],
+) -> LegsInPlace:
+    """Place the legs at n poses.
+
+    Args:
+        rows: the machine.
+        groups: its legs, those that are alike together.
+        coordinates: of the joints of each leg [n x coordinates].
+        errors: the errors of each leg.
+        tool: the tool point, m [n x 3].
+        soft: see `holding`.
+    """
+    places = [group.place(coordinates, errors) for group in groups]
+    free = [
+        Screws(free_screws(group.row, rows, place, np.tile(tool, (len(group.numbers), 1))), group.independent)
+        for group, place in zip(groups, places, strict=True)
+    ]
+    wrenches = by_leg(groups, [screws.wrenches for screws in free])
+    return LegsInPlace(groups, places, free, holding(rows, wrenches, tool, soft))
+
+
+def holding(rows: HomeRows, wrenches: Sequence[Array], tool: Array, soft: Sequence[Array]) -> Holding:
+    """Find how the legs share a misfit, theory (46) and (47).
+
+    Args:
+        rows: the machine.
+        wrenches: for each leg, a basis of what it carries at the tool point [n x 6 x m], moments over the length.
+        tool: the tool point, m [n x 3].
+        soft: compliance of each leg without its passive joints at the tool, in the length's units [n x 6 x 6].
+    """
+    whole = np.concatenate([*wrenches, _guide(rows, tool)], axis=2)
+    if whole.shape[2] == 6:
+        sharing = _solution(np.swapaxes(whole, 1, 2), np.broadcast_to(np.eye(6), whole.shape))
+    else:
+        sharing = _sharing_by_energy(whole, wrenches, soft)
+    ends = np.cumsum([basis.shape[2] for basis in wrenches])
+    return Holding(tuple(wrenches), tuple(np.split(sharing, ends, axis=2)[:-1]))
+
+
+def _guide(rows: HomeRows, tool: Array) -> Array:
+    """Return wrenches against the twists that a planar machine does not have [n x 6 x 3]; none of a spatial one."""
+    absent = np.broadcast_to(rows.absent, (len(tool), *rows.absent.shape))
+    if not len(rows.absent):
+        return np.zeros((len(tool), 6, 0))
+    return np.swapaxes(in_lengths(at_points(absent, tool), rows.length), 1, 2)
+
+
+def _sharing_by_energy(whole: Array, wrenches: Sequence[Array], soft: Sequence[Array]) -> Array:
+    """Return the shares of the misfits of a redundant machine [n x 6 x wrenches], of least energy, theory (47).
+
+    Args:
+        whole: the wrenches of all legs and of the guide [n x 6 x wrenches].
+        wrenches, soft: see `holding`.
+    """
+    count, size = whole.shape[0], whole.shape[2]
+    weights = np.zeros((count, size, size))
+    start = 0
+    for basis, compliance in zip(wrenches, soft, strict=True):
+        end = start + basis.shape[2]
+        weights[:, start:end, start:end] = np.swapaxes(basis, 1, 2) @ compliance @ basis
+        start = end
+    mean = np.trace(weights, axis1=1, axis2=2) / max(start, 1)
+    mean = np.where(np.isfinite(mean) & (mean > 0.0), mean, 1.0)
+    weights = weights / mean[:, None, None] + SOFTEST_SHARE * np.eye(size)
+    resistances = np.swapaxes(_solution(weights, np.swapaxes(whole, 1, 2)), 1, 2)
+    return _solution(resistances @ np.swapaxes(whole, 1, 2), resistances)
+
+
+def _solution(matrices: Array, right: Array) -> Array:
+    """Return solutions of linear equations; NaN where these are singular or not finite."""
+    result = np.full(np.broadcast_shapes(matrices.shape[:1], right.shape[:1]) + right.shape[1:], np.nan)
+    sound: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
+    sound[sound] = np.abs(np.linalg.det(matrices[sound])) > LEAST_DIVISOR
+    result[sound] = np.linalg.solve(matrices[sound], right[sound])
+    return result
 
 
 def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapping[int, Array] | None = None) -> Array:
-    """Coordinates with which a leg takes the platform to a displacement, or near it [n x coordinates], rad or m.
+    """Return coordinates with which a leg takes the platform to a target, or near it [n x coordinates], rad or m.
 
     All of its coordinates move, actuators too, by least-norm steps along a screw motion from the home place.
+
+    Args:
+        row: the leg at its home place.
+        target: displacement of the platform from the home place [n].
+        length: a characteristic length of the machine, m.
+        errors: screw motions of the leg's errors, by the number of motions before them; none if None.
     """
-    whole, chain, given = logarithm(target), row.chain, errors or {}
+    screw, chain, leg_errors = logarithm(target), row.chain, errors or {}
     units = np.where(row.slides, length, 1.0)
-    chosen = independent_columns(in_lengths(chain.rates(chain.place(random_coordinates(row, length))), length, axis=1))
-    far = float(np.abs(in_lengths(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
-    stages = min(max(int(np.ceil(far / LONGEST_STAGE)), 1), MOST_STAGES)
-    coordinates = np.zeros((len(whole), row.size))
+    random_rates = chain.rates(chain.place(random_coordinates(row, length)))
+    independent = independent_columns(in_lengths(random_rates, length, axis=1))
+    distance = float(np.abs(in_lengths(screw, length)).max(initial=0.0, where=np.isfinite(screw)))
+    stages = min(max(int(np.ceil(distance / LONGEST_STAGE)), 1), MOST_STAGES)
+    coordinates = np.zeros((len(screw), row.size))
     for stage in range(1, stages + 1):
-        goal, last = exponential(whole * (stage / stages)), stage == stages
+        goal, is_last = exponential(screw * (stage / stages)), stage == stages
 
         def equations(joints: Array, poses: Integers, goal: Motions = goal) -> tuple[Array, Steps]:
-            at = chain.place(joints, errors=errors_at(given, poses))
-            gap = in_lengths(closing_gap(goal.at(poses), at.end), length)
-            rates = in_lengths(chain.rates(at), length, axis=1) * units
-            return largest(gap), lambda going: Screws(rates, chosen).steps(gap)[going]
+            place = chain.place(joints, errors=errors_at(leg_errors, poses))
+            gap = in_lengths(closing_gap(goal.at(poses), place.end), length)
+            rates = in_lengths(chain.rates(place), length, axis=1) * units
+            return largest(gap), lambda unsolved: Screws(rates, independent).steps(gap)[unsolved]
 
         coordinates = newton(
             equations,
             coordinates,
-            len(whole),
+            len(screw),
             move=lambda joints, step: joints + step * units,
-            most_steps=MOST_CLOSING_STEPS if last else 3,
-            step_goal=CLOSED_STEP if last else NEARLY_CLOSED_STEP,
+            most_steps=MOST_CLOSING_STEPS if is_last else STEPS_OF_STAGE,
+            step_goal=CLOSED_STEP if is_last else NEARLY_CLOSED_STEP,
         ).value
     return coordinates
 
 
 def errors_at(errors: Mapping[int, Array], poses: Integers) -> dict[int, Array]:
-    """The errors of a leg at some poses; those that are the same everywhere stay as they are."""
+    """Return the errors of a leg at some poses; those that are the same everywhere stay as they are."""
     return {behind: error if len(error) == 1 else error[poses] for behind, error in errors.items()}
 
 
@@ -84,7 +341,7 @@ class ClosedLegs:
 
     Attributes:
         platform: displacement of the platform from its home place.
-        coordinates: of the joints of each leg [n x coordinates].
+        coordinates: coordinates of the joints of each leg [n x coordinates].
         settled: where Newton's method has arrived [n].
     """
 
@@ -93,11 +350,11 @@ class ClosedLegs:
     settled: Mask
 
     def at(self, poses: Integers) -> "ClosedLegs":
-        """The legs at some of the poses."""
+        """Return the legs at some of the poses."""
         return ClosedLegs(self.platform.at(poses), tuple(q[poses] for q in self.coordinates), self.settled[poses])
 
     def with_part(self, poses: Integers, part: "ClosedLegs") -> "ClosedLegs":
-        """The legs with those at some of the poses in their places."""
+        """Return the legs with others in the places of those at some of the poses."""
         pairs = zip(self.coordinates, part.coordinates, strict=True)
         coordinates = tuple(with_rows(q, poses, values) for q, values in pairs)
         return ClosedLegs(self.platform.with_part(poses, part.platform), coordinates, self.settled)
@@ -108,7 +365,7 @@ def closed_legs(
     start: ClosedLegs,
     errors: Errors,
     tool_home: Array,
-    chosen: Sequence[tuple[int, ...]],
+    independent: Sequence[tuple[int, ...]],
     soft: Sequence[Array],
 ) -> ClosedLegs:
     """Close the legs with their errors while their actuators stand still: Newton's method, theory (48).
@@ -118,48 +375,45 @@ def closed_legs(
         start: joint coordinates, with the actuators where they stand, and the platform nearby.
         errors: the errors of each leg.
         tool_home: the tool point at the home place, m [3].
-        chosen: see `like_rows`.
+        independent: see `like_rows`.
         soft: see `holding`.
     """
     length, legs, count = rows.length, rows.legs, len(start.settled)
-    groups = like_rows(rows, chosen, count)
+    groups = like_rows(rows, independent, count)
 
-    def equations(there: ClosedLegs, poses: Integers) -> tuple[Array, Steps]:
-        given = [errors_at(error, poses) for error in errors]
-        tool = _tool_at(there.platform, tool_home)
-        at = legs_in_place(rows, groups, there.coordinates, given, tool, [compliance[poses] for compliance in soft])
-        again = [np.tile(np.arange(len(poses)), len(group.numbers)) for group in groups]
+    def equations(state: ClosedLegs, poses: Integers) -> tuple[Array, Steps]:
+        tool = tool_at(state.platform, tool_home)
+        compliances = [compliance[poses] for compliance in soft]
+        leg_errors = [errors_at(error, poses) for error in errors]
+        placed = legs_in_place(rows, groups, state.coordinates, leg_errors, tool, compliances)
+        pose_of_row = [np.tile(np.arange(len(poses)), len(group.numbers)) for group in groups]
         gaps = [
-            -in_lengths(at_points(closing_gap(there.platform.at(pose), place.end), tool[pose]), length)
-            for pose, place in zip(again, at.places, strict=True)
+            -in_lengths(at_points(closing_gap(state.platform.at(pose), place.end), tool[pose]), length)
+            for pose, place in zip(pose_of_row, placed.places, strict=True)
         ]
         misfits = by_leg(groups, gaps)
-        parts = (at.holding.twist(i, misfit[:, None])[:, 0] for i, misfit in enumerate(misfits))
+        parts = (placed.holding.twist(i, misfit[:, None])[:, 0] for i, misfit in enumerate(misfits))
         twist = sum(parts, np.zeros((len(poses), 6)))
-        joints = [
+        joint_steps = [
             screws.steps(twist[pose] - gap)[:, : len(group.row.free_coordinates)]
-            for group, pose, screws, gap in zip(groups, again, at.free, gaps, strict=True)
+            for group, pose, screws, gap in zip(groups, pose_of_row, placed.free, gaps, strict=True)
         ]
-        step = np.concatenate([twist, *by_leg(groups, joints)], axis=1)
-        return largest(np.concatenate(misfits, axis=1)), lambda going: step[going]
+        step = np.concatenate([twist, *by_leg(groups, joint_steps)], axis=1)
+        return largest(np.concatenate(misfits, axis=1)), lambda unsolved: step[unsolved]
 
-    def move(there: ClosedLegs, step: Array) -> ClosedLegs:
-        twist, *joints = np.split(step, np.cumsum([6, *(len(row.free_coordinates) for row in legs[:-1])]), axis=1)
-        back = np.concatenate([twist[:, :3], twist[:, 3:] * length], axis=1)
-        platform = exponential(at_points(back, -_tool_at(there.platform, tool_home))) @ there.platform
-        coordinates = [q.copy() for q in there.coordinates]
-        for row, values, change in zip(legs, coordinates, joints, strict=True):
-            values[:, list(row.free_coordinates)] += change * _units(row, length)
-        return ClosedLegs(platform, tuple(coordinates), there.settled)
+    def move(state: ClosedLegs, step: Array) -> ClosedLegs:
+        twist, *joint_steps = np.split(step, np.cumsum([6, *(len(row.free_coordinates) for row in legs[:-1])]), axis=1)
+        in_metres = np.concatenate([twist[:, :3], twist[:, 3:] * length], axis=1)
+        platform = exponential(at_points(in_metres, -tool_at(state.platform, tool_home))) @ state.platform
+        coordinates = [q.copy() for q in state.coordinates]
+        for row, values, change in zip(legs, coordinates, joint_steps, strict=True):
+            values[:, list(row.free_coordinates)] += change * _free_units(row, length)
+        return ClosedLegs(platform, tuple(coordinates), state.settled)
 
     end = newton(equations, start, count, move=move, most_steps=MOST_CLOSING_STEPS, step_goal=CLOSED_STEP)
     return replace(end.value, settled=end.converged)
 
 
-def _units(row: LegRow, length: float) -> Array:
-    """The units of its free coordinates, 1 rad or the machine's length, m."""
-    return np.array([length if row.slides[place] else 1.0 for place in row.free_coordinates])
-
-
-def _tool_at(platform: Motions, tool_home: Array) -> Array:
+def tool_at(platform: Motions, tool_home: Array) -> Array:
+    """Return the tool point, m [n x 3], from displacements of the platform and the tool point at its home place [3]."""
     return platform.point(np.broadcast_to(tool_home, (len(platform.translation), 3)))

@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from kinetostat.accuracy.closing import Screws, at_points, free_screws, in_lengths, independent_columns
 from kinetostat.accuracy.rows import HomeRows, LegRow, Unit, home_rows, random_coordinates
-from kinetostat.accuracy.wrenches import Screws, at_points, free_screws, in_lengths, independent_columns
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass

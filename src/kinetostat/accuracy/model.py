@@ -16,10 +16,18 @@ from operator import itemgetter
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.closing import ClosedLegs, closed_legs, coordinates_toward
+from kinetostat.accuracy.closing import (
+    ClosedLegs,
+    closed_legs,
+    coordinates_toward,
+    free_screws,
+    in_lengths,
+    independent_columns,
+    legs_in_place,
+    tool_at,
+)
 from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_error_sources, shared_error_sources
-from kinetostat.accuracy.rows import HomeRows, LegRow, home_rows, random_coordinates
-from kinetostat.accuracy.wrenches import Errors, free_screws, in_lengths, independent_columns, legs_in_place, like_rows
+from kinetostat.accuracy.rows import Errors, HomeRows, LegRow, home_rows, like_rows, random_coordinates
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
@@ -247,7 +255,7 @@ class ErrorModel:
         """
         drawn, state = self.drawn, self.closed_state(values)
         motion = (state.platform @ drawn.state.platform.inverse()).amounts()
-        motion[:, 3:] = self._tool_at(state.platform) - drawn.tool
+        motion[:, 3:] = tool_at(state.platform, self.tool_home) - drawn.tool
         each = np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
         for number, spring in enumerate(drawn.springs, len(self.sources)):
             motion = motion + spring.deflection(drawn.load) * each[:, number, None]
@@ -273,11 +281,8 @@ class ErrorModel:
         parts = [spring.deflection(wrenches) for spring in self.drawn.springs]
         return np.stack(parts, axis=2) if parts else np.zeros((len(self), 6, 0))
 
-    def _tool_at(self, platform: Motions) -> Array:
-        return platform.point(np.broadcast_to(self.tool_home, (len(self), 3)))
-
     def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
-        tool, length = self._tool_at(state.platform), self.rows.length
+        tool, length = tool_at(state.platform, self.tool_home), self.rows.length
         every = self._errors_behind if wanted is None else [errors.among(wanted) for errors in self._errors_behind]
         by_leg: dict[int, list[ErrorsBehind]] = {}
         for of_motion in every:
@@ -369,7 +374,7 @@ def error_model(
     tool_home = rows.point + rows.rotation @ np.array(machine.tables["tool"].offset, dtype=float)
     if response.configuration.plane is not None:
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
-    tool = platform.point(np.broadcast_to(tool_home, (count, 3)))
+    tool = tool_at(platform, tool_home)
     state = ClosedLegs(platform, coordinates, np.ones(count, dtype=bool))
     wrench = stacked_columns(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
     wrench = np.asarray(wrench, dtype=float)
