@@ -9,7 +9,7 @@ from kinetostat.algebra.vector import Displacement, Vector, rotation_along
 from kinetostat.kinetostatics.response import respond
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.anatomy import proportions_of
-from kinetostat.views.scene.machine_scene import machine_scene
+from kinetostat.views.scene.machine_scene import machine_scene, rounded_hull
 from kinetostat.views.scene.mesh import (
     CHAMFER_STEPS,
     REVOLVED_SIDES,
@@ -19,7 +19,6 @@ from kinetostat.views.scene.mesh import (
     mesh_of,
     placed_mesh,
 )
-from kinetostat.views.scene.plates import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit
 from machines import every_machine
 

@@ -12,9 +12,8 @@ from kinetostat.kinetostatics.loading import deflected_links, deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import changed, load
 from kinetostat.views.scene.anatomy import anatomy, proportions_of
-from kinetostat.views.scene.machine_scene import machine_scene
+from kinetostat.views.scene.machine_scene import convex_hull, machine_scene, rounded_hull
 from kinetostat.views.scene.overlays import Deflection, compliance_overlays, deflection_overlays
-from kinetostat.views.scene.plates import convex_hull, rounded_hull
 from kinetostat.views.scene.shapes import shaft
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Turned, as_data
 from machines import every_machine

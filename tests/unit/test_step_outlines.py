@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.plates import rounded_hull
+from kinetostat.views.scene.machine_scene import rounded_hull
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from kinetostat.views.scene import shapes
+from kinetostat.views.scene.machine_scene import rounded_hull
 from kinetostat.views.scene.mesh import mesh_of
-from kinetostat.views.scene.plates import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Swept, Turned
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)

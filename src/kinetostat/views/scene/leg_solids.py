@@ -18,7 +18,6 @@ from kinetostat.views.scene.anatomy import (
     SpringPart,
     together,
 )
-from kinetostat.views.scene.plates import Plate
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit, upright
 
 RAIL_LENGTH = 0.55
@@ -39,8 +38,15 @@ JOINT_PER_WIDTH = 0.42
 """Radius from which joints are drawn, in widths of the thickest link of the leg."""
 
 
-def leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Proportions) -> list[Solid]:
-    """Build all parts of a leg between base and platform."""
+def leg_solids(leg: Anatomy, up: Vector | None, down: Vector, sizes: Proportions) -> list[Solid]:
+    """Build all parts of a leg between base and platform.
+
+    Args:
+        leg: the parts of the leg.
+        up: normal of the base plate, towards the joints; None where there is no such plate.
+        down: normal of the platform, towards the joints.
+        sizes: the proportions of the machine.
+    """
     material = "removed" if leg.removed else "actuated" if leg.actuated else "passive"
     radius = joint_radius(leg, sizes)
     solids: list[Solid] = []
@@ -48,7 +54,7 @@ def leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Proport
         span = sizes.spans.get(link.name, link.span.norm())
         solids += _link(link, radius, material, sizes.cross_sections.get(link.name), span)
     for joint in leg.joints:
-        solids += _joint(joint, _neighbours(joint, leg, base, platform), radius, material)
+        solids += _joint(joint, _neighbours(joint, leg, up, down), radius, material)
     for rail in leg.rails:
         solids += _rail(rail, sizes, radius, leg.second_point - rail.point)
     # A rigid spring does not deflect, so it is not drawn.
@@ -62,14 +68,14 @@ def joint_radius(leg: Anatomy, sizes: Proportions) -> float:
     return max([sizes.leg, *(JOINT_PER_WIDTH * profile.width for profile in profiles)])
 
 
-def _neighbours(joint: JointPart, leg: Anatomy, base: Plate | None, platform: Plate) -> tuple[Vector, Vector]:
+def _neighbours(joint: JointPart, leg: Anatomy, up: Vector | None, down: Vector) -> tuple[Vector, Vector]:
     """Return the vectors from a joint to the part before it and to the part after it in its leg: a link, or a plate."""
     before = next((link.start - joint.point for link in leg.links if together(link.end, joint.point)), None)
     after = next((link.end - joint.point for link in leg.links if together(link.start, joint.point)), None)
-    if before is None and base is not None and not leg.on_rail:
-        before = -base.normal
+    if before is None and up is not None and not leg.on_rail:
+        before = -up
     if after is None:
-        after = -platform.normal
+        after = -down
     return (before if before is not None else -after), after
 
 
