@@ -188,7 +188,7 @@ def _lines_over_time(panel: "Axes", answer: DriveLoads, values: Array, chosen: l
     for k, drive in enumerate(answer.drives):
         if chosen[k]:
             dash = "--" if k >= len(figures.COLOURS) else "-"
-            look = {"color": figures.colour_of(k), "linewidth": 1.1, "label": drive.name}
+            look: dict[str, Any] = {"color": figures.colour_of(k), "linewidth": 1.1, "label": drive.name}
             panel.plot(answer.motion.times, values[k], dash, **look)
 
 

@@ -1,20 +1,93 @@
-"""The workspace of a machine: the question, and the description of its answer. Nothing is computed here."""
+"""The workspace of a machine: the question, the description of its answer, and its figures.
+
+Figures are regions filled by verdict, cuts, and the solid. Verdicts come from `studies.workspace`; nothing is judged
+here.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import xarray as xr
+from scipy import ndimage
+
+from kinetostat.arrays import Array, Mask
+from kinetostat.kinetostatics.quantities import plain_name
+from kinetostat.late import LateModule
 from kinetostat.machine.limits import Limits, no_limits_sentence
 from kinetostat.machine.parameters import dimension, shown
 from kinetostat.studies.datasets import field_of
-from kinetostat.studies.workspace import FEWEST_CELLS, METHOD, Workspace, workspace
-from kinetostat.studies.workspace_verdicts import INSIDE, phrase
-from kinetostat.views.question import LOADS_LEFT_OUT, NAME, Description, Field, Lines, Option, Question, ranges_option
+from kinetostat.studies.workspace import (
+    BORDER_VARIABLES,
+    COLOURING_QUANTITY,
+    FEWEST_CELLS,
+    METHOD,
+    Workspace,
+    workspace,
+)
+from kinetostat.studies.workspace_verdicts import (
+    BEYOND,
+    CONDITION_VERDICT,
+    INSIDE,
+    LIMIT_VERDICT,
+    STATUS_VERDICTS,
+    PoseCondition,
+    depth,
+    phrase,
+    surface,
+)
+from kinetostat.views.question import (
+    LOADS_LEFT_OUT,
+    NAME,
+    Description,
+    Drawing,
+    Field,
+    Lines,
+    Option,
+    Question,
+    ranges_option,
+)
 from kinetostat.views.tables import FittedTable, numeric_table
+
+if TYPE_CHECKING:
+    from matplotlib import cm, colors, lines, patches
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d import art3d
+
+    from kinetostat.views import figures, grid, map_scales
+else:
+    cm = LateModule("matplotlib.cm")
+    colors = LateModule("matplotlib.colors")
+    lines = LateModule("matplotlib.lines")
+    patches = LateModule("matplotlib.patches")
+    art3d = LateModule("mpl_toolkits.mplot3d.art3d")
+    figures = LateModule("kinetostat.views.figures")
+    grid = LateModule("kinetostat.views.grid")
+    map_scales = LateModule("kinetostat.views.map_scales")
 
 SHOWN_ERRORS = 2
 """Standard errors that are printed: the truth lies within them 95 times of 100."""
+SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
+VERDICT_COLOURS = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))
+"""Colours of verdicts that need no limit and no condition."""
+LIMIT_COLOURS = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
+"""Colours of verdicts on limits: yellow to brown."""
+CONDITION_COLOURS = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
+"""Colours of verdicts on conditions: blue."""
+MOST_CUTS = 9
+"""Greatest number of cuts in a picture: three rows of three fit on a page."""
+OUTLINE_COLOUR = "#1d6b55"
+"""Colour of the outline of the inside."""
+MOST_NODES = 64
+"""Nodes along an axis that the picture of a solid shows at most: its triangles are then as small as dots."""
+LIGHT = np.array([-0.45, -0.7, 0.55])
+"""Direction towards the light: over the left shoulder of the reader, so that edges are seen."""
+SHADE = 0.24
+"""Share of the brightness that depends on how a surface faces the light: colours still tell the quantity."""
 
 
 def _lines(answer: Workspace) -> Lines:
@@ -99,6 +172,211 @@ def _tables(answer: Workspace, _full: bool) -> Iterator[FittedTable]:
         yield table
 
 
+def workspace_figures(answer: Workspace) -> dict[str, Drawing]:
+    """Return the figures of a workspace by name.
+
+    Over two coordinates there is a map of the region; over three, cuts along the third coordinate and the solid. With
+    more coordinates, the others stay at the values of the pose in the file.
+    """
+    dataset, title = answer.dataset, answer.machine.name
+    dims = [str(dim) for dim in dataset["verdict"].dims]
+    if len(dims) == 2:
+        region = partial(_sections, [dataset], answer, title=title)
+        return {"region": Drawing("The workspace.", region, file="workspace")}
+    fixed = {dim: float(dataset.attrs.get(field_of(dataset[dim]), dataset[dim].values.mean())) for dim in dims[3:]}
+    if fixed:
+        dataset = dataset.sel(fixed, method="nearest")
+        title = f"{title}, {', '.join(_coordinate_text(dataset, dim) for dim in fixed)}"
+    cuts = [dataset.isel({dims[2]: int(i)}) for i in _chosen_cuts(dataset, dims)]
+    quantity = next((condition.quantity for condition in answer.conditions), COLOURING_QUANTITY)
+    sections = partial(_sections, cuts, answer, along=dims[2], title=title)
+    solid = partial(_solid, dataset, dims[:3], quantity, title=title)
+    return {
+        "sections": Drawing("The workspace.", sections, file="workspace-sections"),
+        "solid": Drawing("The workspace.", solid, file="workspace-solid"),
+    }
+
+
+def _chosen_cuts(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
+    """Choose the cuts: equally spaced values of the third coordinate, at most a step beyond the workspace."""
+    reached = np.flatnonzero((dataset["verdict"] == 0).any(dims[:2]).values)
+    last = dataset.sizes[dims[2]] - 1
+    first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
+    span = final - first
+    finest = max(1, -(-span // (MOST_CUTS - 1)))
+    step = next((candidate for candidate in range(finest, 2 * finest) if span % candidate == 0), finest)
+    return np.arange(first + span % step // 2, final + 1, step)
+
+
+def _coordinate_text(dataset: xr.Dataset, dim: str) -> str:
+    """Write a coordinate and its value, for titles."""
+    coordinate = dataset[dim]
+    value = grid.display_of(dataset).show(float(coordinate), coordinate.attrs["units"])
+    return f"{dim.removeprefix('pose.')} = {value}"
+
+
+def _colours(labels: Sequence[str]) -> list[str]:
+    limits, unmet = iter(LIMIT_COLOURS), iter(CONDITION_COLOURS * 6)
+    return [
+        VERDICT_COLOURS.get(label) or next(limits if label.startswith(LIMIT_VERDICT) else unmet) for label in labels
+    ]
+
+
+def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: str = "") -> "Figure":
+    """Draw a panel for each cut, filled by verdict, with the contours of the conditions.
+
+    Args:
+        cuts: the answer's dataset at values of a coordinate; a single one fills the figure.
+        answer: the answer, which has the verdicts and the conditions.
+        title: over the figure.
+        along: the coordinate whose value is the title of each panel; none if empty.
+    """
+    labels, conditions = answer.verdicts, answer.conditions
+    columns = min(3, len(cuts))
+    rows = -(-len(cuts) // columns)
+    wide = 4.6 if len(cuts) == 1 else 2.6
+    with figures.new_figure((wide * columns + 0.3, 0.9 * wide * rows + 0.9), title) as figure:
+        panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+        borders: set[PoseCondition] = set()
+        for panel, cut in zip(panels, cuts, strict=False):
+            borders |= _fill(panel, cut, labels, conditions)
+            if along and len(cuts) > 1:
+                panel.set_title(_coordinate_text(cut, along))
+        for panel in panels[len(cuts) :]:
+            panel.remove()
+        map_scales.trim_height(figure, panels[0], 0.85 * wide * rows)
+        frame = cuts[0].attrs.get("frame", "") if conditions else ""
+        figure.legend(
+            handles=[*_patches(cuts, labels), *_border_legend(conditions, borders)],
+            loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=6.5,
+        )  # fmt: skip
+    return figure
+
+
+def _fill(
+    panel: "Axes", cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition]
+) -> set[PoseCondition]:
+    """Fill a panel by verdict and draw the border of each condition; return the conditions that have one."""
+    across, up = (str(dim) for dim in cut["verdict"].dims)
+    (x, x_label), (y, y_label) = grid.axis_values(cut, across), grid.axis_values(cut, up)
+    verdict = cut["verdict"].transpose(up, across).values
+    figures.fill_regions(panel, x, y, verdict, np.ones_like(verdict, dtype=bool), _colours(labels))
+    shares = [cut[f"{BORDER_VARIABLES}{dim}"].transpose(up, across).values for dim in (up, across)]
+    for code in sorted(np.unique(verdict), reverse=True):
+        within = depth(verdict == code, shares)
+        if within.min() < 0.0 < within.max():
+            panel.contourf(x, y, within, levels=[0.0, 2.0], colors=[_colours(labels)[code]])
+            if code == 0:
+                panel.contour(x, y, within, levels=[0.0], colors=OUTLINE_COLOUR, linewidths=0.9)
+    elsewhere = ~np.isin(
+        verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(CONDITION_VERDICT)]
+    )
+    edges = set()
+    for condition, colour in zip(conditions, figures.COLOURS, strict=False):
+        values = np.ma.masked_where(elsewhere, cut[condition.quantity].transpose(up, across).values)
+        if values.count() and values.min() < condition.value < values.max():
+            panel.contour(x, y, values, levels=[condition.value], colors=colour, linewidths=1.2, linestyles="--")
+            edges.add(condition)
+    panel.set(xlabel=x_label, ylabel=y_label, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    map_scales.set_axis_scales(panel, cut, across, up)
+    panel.label_outer()
+    return edges
+
+
+def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list["patches.Patch"]:
+    """Return the legend of the colours that occur."""
+    present = {int(code) for cut in cuts for code in np.unique(cut["verdict"].values)}
+    return [
+        patches.Patch(facecolor=colour, edgecolor="#888888", linewidth=0.4, label=phrase(label))
+        for code, (label, colour) in enumerate(zip(labels, _colours(labels), strict=True))
+        if code in present
+    ]
+
+
+def _border_legend(conditions: Sequence[PoseCondition], drawn: set[PoseCondition]) -> list["lines.Line2D"]:
+    """Return the legend of the borders of conditions that are drawn."""
+    texts = {condition: condition.text.replace(condition.comparison, "=", 1) for condition in conditions}
+    return [
+        lines.Line2D([], [], color=colour, linestyle="--", linewidth=1.2, label=texts[condition])
+        for condition, colour in zip(conditions, figures.COLOURS, strict=False)
+        if condition in drawn
+    ]
+
+
+def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> "Figure":
+    """Draw the inside as a lit solid in a box with scales, coloured by a quantity on its surface."""
+    triangles, values = _coloured_surface(dataset, dims, quantity)
+    axes = [grid.axis_values(dataset, dim) for dim in dims]
+    scale = grid.display_of(dataset).scale(dataset[quantity].attrs["units"])
+    values = scale.factor * values
+    with figures.new_figure((5.2, 4.8), title) as figure:
+        panel = figure.add_subplot(projection="3d")
+        norm = _norm_of(values)
+        low, high = norm.vmin or 0.0, norm.vmax or 1.0
+        colouring = cm.ScalarMappable(norm, "viridis")
+        colours = _brightness(triangles) * colouring.to_rgba(values)[:, :3]
+        solid = art3d.Poly3DCollection(
+            triangles, facecolors=colours, edgecolors=colours, linewidths=0.2, rasterized=True
+        )
+        panel.add_collection3d(solid)
+        panel.set(xlabel=axes[0][1], ylabel=axes[1][1], zlabel=axes[2][1])
+        panel.set(**{f"{axis}lim": (ends[0], ends[-1]) for axis, (ends, _) in zip("xyz", axes, strict=True)})
+        lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
+        panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
+        bar = figure.colorbar(
+            colouring, ax=panel, shrink=0.6, pad=0.12, label=scale.label(plain_name(quantity)),
+            extend=map_scales.exceeded_ends(values, low, high),
+        )  # fmt: skip
+        figures.slim_bar(bar)
+    return figure
+
+
+def _coloured_surface(dataset: xr.Dataset, dims: Sequence[str], quantity: str) -> tuple[Array, Array]:
+    """Return the triangles of the border of the inside [n x 3 x 3], and a quantity on each, SI.
+
+    A large grid is thinned to `MOST_NODES`.
+    """
+    thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // MOST_NODES)) for dim in dims})
+    axes = [grid.axis_values(thin, dim)[0] for dim in dims]
+    inside = thin["verdict"].transpose(*dims).values == 0
+    if thin.sizes == dataset.sizes:
+        shares = [dataset[f"{BORDER_VARIABLES}{dim}"].transpose(*dims).values for dim in dims]
+    else:  # borders hold for steps of the whole grid; those of a thinned one are taken half-way between its nodes
+        shares = [np.full(inside.shape, 0.5)] * inside.ndim
+    triangles = surface(depth(inside, shares), axes)
+    return triangles, _surface_values(triangles, thin[quantity].transpose(*dims).values, inside, axes)
+
+
+def _norm_of(values: Array) -> "colors.Normalize":
+    """Return a colour scale over the usual values on a surface, logarithmic where these span decades."""
+    low, high = map_scales.usual_range(values) if np.isfinite(values).any() else (0.0, 1.0)
+    return (
+        colors.LogNorm(low, high) if low > 0.0 and high > map_scales.WIDE_RATIO * low else colors.Normalize(low, high)
+    )
+
+
+def _surface_values(triangles: Array, values: Array, inside: Mask, axes: Sequence[Array]) -> Array:
+    """Interpolate values of nodes at the middle of each triangle; nodes outside have that of the nearest one inside."""
+    if not len(triangles):
+        return np.zeros(0)
+    has_value = inside & np.isfinite(values)
+    nearest = ndimage.distance_transform_edt(~has_value, return_distances=False, return_indices=True)
+    steps = [(triangles[:, :, k].mean(axis=1) - axis[0]) / (axis[1] - axis[0]) for k, axis in enumerate(axes)]
+    return np.asarray(ndimage.map_coordinates(values[tuple(nearest)], steps, order=1, mode="nearest"))
+
+
+def _brightness(triangles: Array) -> Array:
+    """Compute the brightness of each triangle by how it faces the light, scales made equal [n x 1]."""
+    if not len(triangles):
+        return np.zeros((0, 1))
+    spread = np.ptp(triangles.reshape(-1, 3), axis=0)
+    scaled = triangles / np.where(spread > 0.0, spread, 1.0)
+    normals = np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    facing = (normals / np.where(sizes > 0.0, sizes, 1.0)) @ (LIGHT / np.linalg.norm(LIGHT))
+    return np.asarray(1.0 - SHADE + SHADE * facing)[:, None]
+
+
 def _coordinates(answer: Workspace) -> dict[str, Any]:
     dataset = answer.dataset
     return {
@@ -142,7 +420,7 @@ WORKSPACE = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.workspace_figures.workspace_figures",
+    figures=workspace_figures,
     makers={"nc": attrgetter("dataset")},
     state=lambda _answer: "",
     answered=lambda answer: answer.exists,
