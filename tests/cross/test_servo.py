@@ -120,13 +120,13 @@ def test_modes_say_what_closed_loops_lack():
 
 def test_static_stiffness_with_an_integral_part_is_that_of_the_transmission():
     answer = servo(hexapod("servo.integral_time=0.02"))
-    np.testing.assert_allclose(answer.static, answer.standing, rtol=1e-9)
+    np.testing.assert_allclose(answer.static, answer.motors_still, rtol=1e-9)
     proportional = servo(hexapod())
     loop = proportional.loops.loops[0]
     motor = loop.velocity_gain * loop.position_gain
     assert loop.static_stiffness == pytest.approx(1.0 / (1.0 / motor + 1.0 / loop.transmission))
     share = loop.static_stiffness / loop.transmission
-    np.testing.assert_allclose(proportional.static, np.array(proportional.standing) * share, rtol=1e-9)
+    np.testing.assert_allclose(proportional.static, np.array(proportional.motors_still) * share, rtol=1e-9)
 
 
 def test_a_scale_at_the_load_with_an_integral_part_is_rigid_at_rest():

@@ -79,7 +79,7 @@ def test_an_answer_has_every_surface(machine, name, tmp_path, monkeypatch):
         assert (tmp_path / f"answer.{form}").stat().st_size > 0
 
 
-PAIRS = {"bounds", "extents", "best", "slowest", "direction", "poses"}
+PAIRS = {"bounds", "extents", "best", "least_damped", "direction", "poses"}
 """Two numbers of different meaning, and directions as they were given, empty where none was."""
 INDEXED = {"legs", "errors", "points", "springs"}
 """Counts, and places in other lists."""

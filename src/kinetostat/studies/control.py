@@ -22,6 +22,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis_parts import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
@@ -31,11 +32,15 @@ from kinetostat.vibration.receptance import state_space as equations_of
 from kinetostat.vibration.servo import ClosedLoops, slowest_decay
 
 CURVE_RANGE = (0.001, 5.0)
-"""Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still."""
+"""Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still: from
+where the slowest integral gain still acts to where masses alone answer."""
+LAST_MODE_OF_CURVES = 6
+"""Number of the mode up to which curves reach, of a machine that has so many: a rigid platform has six."""
 CURVE_POINTS = 1200
-"""Number of points of each curve."""
+"""Points of each curve: some 300 in a decade, so that five lie within the width of a peak of 2 % damping."""
 
 
+@former_names(standing="motors_still", slowest="least_damped")
 @dataclass(frozen=True, eq=False)
 class Servo(AnswerInState):
     """The tool of a machine with its servo loops closed.
@@ -45,13 +50,13 @@ class Servo(AnswerInState):
         status: the status of the pose.
         message: the answer in a sentence or two.
         loops: the machine with its servo loops; None without an answer.
-        standing: free stiffness with motors that stand still, by component, N/m or N·m/rad.
+        motors_still: free stiffness with motors that stand still, by component, N/m or N·m/rad.
         static: free stiffness at 0 Hz with the loops closed, by component, N/m or N·m/rad.
         least: for each component, the least free stiffness over the frequencies of the response, and its frequency,
             Hz [n x 2].
         poles: poles of the closed loops, rad/s.
         stable: whether all poles decay.
-        slowest: frequency (Hz) and damping ratio of the least damped pole; None if none oscillates.
+        least_damped: frequency (Hz) and damping ratio of the least damped pole; None if none oscillates.
         assumed: whether the file says nothing of the machine's own damping, so that a usual one is assumed.
         direction: direction in which the tool is pushed for the response; empty for x, y and z.
     """
@@ -60,12 +65,12 @@ class Servo(AnswerInState):
     status: Status
     message: str
     loops: ClosedLoops | None = None
-    standing: Array = field(default_factory=lambda: np.zeros(0))
+    motors_still: Array = field(default_factory=lambda: np.zeros(0))
     static: Array = field(default_factory=lambda: np.zeros(0))
     least: Array = field(default_factory=lambda: np.zeros(0))
     poles: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
     stable: bool = True
-    slowest: tuple[float, float] | None = None
+    least_damped: tuple[float, float] | None = None
     assumed: bool = False
     direction: tuple[float, ...] = ()
 
@@ -82,8 +87,8 @@ class Servo(AnswerInState):
         """Frequencies for curves, Hz."""
         if self.loops is None:
             return np.zeros(0)
-        known = self.loops.modes.frequencies
-        return np.geomspace(CURVE_RANGE[0] * known[0], CURVE_RANGE[1] * known[min(5, len(known) - 1)], CURVE_POINTS)
+        natural = self.loops.modes.frequencies[:LAST_MODE_OF_CURVES]
+        return np.geomspace(CURVE_RANGE[0] * natural[0], CURVE_RANGE[1] * natural[-1], CURVE_POINTS)
 
     @checked
     def receptance(self, frequencies: Sequence[float]) -> Complex:
@@ -97,10 +102,10 @@ class Servo(AnswerInState):
         """
         if self.loops is None:
             raise InputError(f"{self.machine.name} has no servo response at this pose: {self.message}")
-        given = np.asarray(frequencies, dtype=float).reshape(-1)
-        if not (np.abs(given) <= HIGHEST).all():
+        row = np.asarray(frequencies, dtype=float).reshape(-1)
+        if not (np.abs(row) <= HIGHEST).all():
             raise InputError(f"frequencies must be numbers in Hz, up to {HIGHEST:g}.")
-        return self.loops.receptance(given)
+        return self.loops.receptance(row)
 
 
 @checked
@@ -120,45 +125,44 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
     vibration = modes(state, closed_loops=True)
     if vibration.loops is None:
         return Servo(state, vibration.status, vibration.message)
-    return replace(_answer(vibration, vibration.loops), direction=direction)
+    return replace(_with_loops(vibration, vibration.loops), direction=direction)
 
 
-def _answer(vibration: Vibration, closed: ClosedLoops) -> Servo:
+def _with_loops(vibration: Vibration, closed: ClosedLoops) -> Servo:
     """The answer for a machine whose modes with motors that stand still are known."""
     parts = list(vibration.machine.family.components)
-    still = closed.modes.tool @ closed.modes.tool.T
-    poles = closed.poles()
+    compliance_motors_still = closed.modes.tool @ closed.modes.tool.T
     answer = Servo(
-        vibration.state,
-        Status.OK,
-        "",
-        closed,
-        _free_stiffness(still, still, parts),
-        _free_stiffness(closed.receptance(np.zeros(1))[0].real, still, parts),
-        poles=poles,
+        state=vibration.state,
+        status=Status.OK,
+        message="",
+        loops=closed,
+        motors_still=_free_stiffness(compliance_motors_still, compliance_motors_still, parts),
+        static=_free_stiffness(closed.receptance(np.zeros(1))[0].real, compliance_motors_still, parts),
+        poles=closed.poles(),
         stable=closed.stable,
         assumed=vibration.assumed,
     )
-    given = answer.frequencies
-    slowest = slowest_decay(poles, (0.0, float(given[-1])))
-    sizes = np.abs(closed.receptance(given))[:, parts, parts]
-    unmoved = [UNFELT * float(still[i, i]) for i in parts]
-    least = np.array(
-        [
-            (math.inf if row.max() <= small else 1.0 / row.max(), given[row.argmax()])
-            for row, small in zip(sizes.T, unmoved, strict=True)
-        ]
+    frequencies = answer.frequencies
+    sizes = np.abs(closed.receptance(frequencies))[:, parts, parts]
+    round_off = UNFELT * np.diag(compliance_motors_still)[parts]
+    least = [
+        (math.inf if row.max() <= limit else 1.0 / row.max(), frequencies[row.argmax()])
+        for row, limit in zip(sizes.T, round_off, strict=True)
+    ]
+    answer = replace(
+        answer, least=np.array(least), least_damped=slowest_decay(answer.poles, (0.0, float(frequencies[-1])))
     )
-    return replace(answer, least=least, slowest=slowest, message=_message(answer, slowest))
+    return replace(answer, message=_message(answer))
 
 
-def _free_stiffness(compliance: Array, still: Array, parts: Sequence[int]) -> Array:
+def _free_stiffness(compliance: Array, compliance_motors_still: Array, parts: Sequence[int]) -> Array:
     """Reciprocals of a diagonal [6 x 6]; infinite if it is round-off beside that with motors that stand still."""
-    pairs = [(float(compliance[i, i]), float(still[i, i])) for i in parts]
-    return np.array([math.inf if abs(soft) <= UNFELT * least else 1.0 / soft for soft, least in pairs])
+    pairs = [(float(compliance[i, i]), float(compliance_motors_still[i, i])) for i in parts]
+    return np.array([math.inf if abs(entry) <= UNFELT * still else 1.0 / entry for entry, still in pairs])
 
 
-def _message(answer: Servo, slowest: tuple[float, float] | None) -> str:
+def _message(answer: Servo) -> str:
     show = answer.machine.display.show
     if not answer.stable:
         growing = max(answer.poles.tolist(), key=lambda pole: float(pole.real))
@@ -166,9 +170,9 @@ def _message(answer: Servo, slowest: tuple[float, float] | None) -> str:
             f"The loops are unstable: a motion of {show(abs(growing) / (2.0 * math.pi), 'Hz')} grows; lower "
             "servo.velocity_gain or servo.position_gain, or measure more of the position at the motor."
         )
-    if slowest is None:
+    if answer.least_damped is None:
         return "The loops are stable, and nothing swings."
-    frequency, ratio = slowest
+    frequency, ratio = answer.least_damped
     damping = f"{100.0 * ratio:.3g} % of critical damping"
     return f"The loops are stable; the least damped motion has {show(frequency, 'Hz')} and {damping}."
 
@@ -182,8 +186,8 @@ class Port:
     """An input or an output.
 
     Attributes:
-        name: "fx", or the name of an actuator.
-        unit: SI.
+        name: "fx" for instance, or the name of an actuator.
+        unit: its SI unit.
     """
 
     name: str
@@ -249,22 +253,30 @@ def state_space(
     output_ports, output_modes = _ports(solution, motions, ("rad", "m"), "output", outputs)
     kept = solution.ringing if count is None else min(count, solution.ringing)
     return StateSpace(
-        machine,
-        equations_of(solution, damping, input_modes, output_modes, kept),
-        input_ports,
-        output_ports,
-        tuple(solution.frequencies[:kept].tolist()),
-        tuple(damping.ratios(solution)[:kept].tolist()),
-        vibration.assumed,
+        machine=machine,
+        equations=equations_of(solution, damping, input_modes, output_modes, kept),
+        inputs=input_ports,
+        outputs=output_ports,
+        frequencies=tuple(solution.frequencies[:kept].tolist()),
+        ratios=tuple(damping.ratios(solution)[:kept].tolist()),
+        assumed=vibration.assumed,
     )
 
 
 def _ports(
     solution: Modes, tool: Mapping[str, str], units: tuple[str, str], what: str, wanted: Sequence[str] | None
 ) -> tuple[tuple[Port, ...], Array]:
-    """The chosen inputs or outputs, and how each moves in all modes; units are those of turning and of sliding."""
-    rows = {name: COMPONENTS.index(part) for name, part in tool.items()}
+    """The chosen inputs or outputs, and how each moves in all modes [ports x modes].
+
+    Args:
+        solution: the modes.
+        tool: names of the ports at the tool point, with the component of each.
+        units: units of ports that turn and of those that slide.
+        what: "input" or "output", for messages.
+        wanted: names of the ports that are chosen; those at the tool point if None.
+    """
     turning, sliding = units
+    rows = {name: COMPONENTS.index(part) for name, part in tool.items()}
     known = {name: (turning if row < 3 else sliding, solution.tool[row]) for name, row in rows.items()}
     known |= {drive.name: (turning if drive.turning else sliding, drive.motion) for drive in solution.drives}
     names = [choice(name, known, what) for name in (tool if wanted is None else wanted)]

@@ -12,6 +12,7 @@ law is exact, and polynomials of ever higher degree are fitted until one is good
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
+from typing import TypeAlias
 
 import numpy as np
 
@@ -39,14 +40,19 @@ from kinetostat.tolerances import EXACT_LAW
 
 GRAVITY_ANGLE = "load.gravity_angle"
 """Path of the field over which laws are harmonic."""
-MOST_HARMONICS, MOST_DEGREE, MOST_TERMS = 3, 8, 500
-
-Term = tuple[tuple[str, int], ...]
-"""For each axis which function of it: ("power", k), ("cos", k) or ("sin", k)."""
+MOST_HARMONICS = 3
+"""Greatest multiple of the angle of gravity in a law: corrections by gravity to first, second and third order."""
+MOST_DEGREE = 8
+"""Greatest sum of the powers of a term: beyond it, powers on a range from -1 to 1 are hardly told apart."""
+MOST_TERMS = 500
+"""Most terms of a law: with as many at all points of the largest table, least squares take 0.8 GB."""
 MOST_TABLE_POINTS = 200_000
 """Points of a table: an hour or less."""
 GOOD_ENOUGH = 1e-3
 """Share of the error without corrections that a law may leave, if no tolerance is given."""
+
+Term: TypeAlias = tuple[tuple[str, int], ...]
+"""For each axis the function of it: ("power", k), ("cos", k) or ("sin", k)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +60,10 @@ class Law(ImmutableAnswer):
     """Corrections as sums of terms.
 
     Attributes:
-        paths: of the fields.
-        middles, halves: of the range of each; powers are those of (value - middle) / half, from -1 to 1.
-        terms: each a product over the axes.
-        coefficients: of each term in each correction, m or rad [terms x actuators].
+        paths: paths of the fields.
+        middles, halves: middle and half width of the range of each; powers are those of (value - middle) / half.
+        terms: each term, a product over the axes.
+        coefficients: factor of each term in each correction, m or rad [terms x actuators].
     """
 
     paths: tuple[str, ...]
@@ -91,11 +97,12 @@ def shortest_law(
     """Fit laws of ever more terms until the error of one is within the tolerance; else return the best of them.
 
     Args:
-        paths: of the fields.
+        paths: paths of the fields.
         axes: values along each.
-        corrections: at all points of the grid, the last axis fastest, NaN where there are none [n x actuators].
-        error: of a law.
-        tolerance: of it, in the same unit.
+        corrections: corrections at all points of the grid, the last axis fastest, NaN where there are none
+            [n x actuators].
+        error: a function from a law to its error.
+        tolerance: error that is good enough, in the same unit.
 
     Returns:
         The law and its error.
@@ -109,9 +116,9 @@ def shortest_law(
         functions = _functions(terms, [axis[known] for axis in points], middles, halves)
         coefficients: Array = np.linalg.lstsq(functions, corrections[known], rcond=None)[0].astype(float)
         law = _without_round_off(Law(tuple(paths), middles, halves, terms, coefficients))
-        here = error(law)
-        if best is None or here < best[1]:
-            best = law, here
+        law_error = error(law)
+        if best is None or law_error < best[1]:
+            best = law, law_error
         if best[1] <= tolerance:
             break
     if best is None:
@@ -130,18 +137,20 @@ def _without_round_off(law: Law) -> Law:
 
 
 def _candidates(paths: Sequence[str], counts: Sequence[int], known: int) -> Iterator[tuple[Term, ...]]:
-    """Rows of terms, the shortest first and harmonics before powers; each with fewer terms than points."""
-    rows: list[tuple[bool, tuple[Term, ...]]] = []
+    """Lists of terms, the shortest first and harmonics before powers; each with fewer terms than points."""
+    with_powers: list[tuple[Term, ...]] = []
+    with_harmonics: list[tuple[Term, ...]] = []
     turning = paths.index(GRAVITY_ANGLE) if GRAVITY_ANGLE in paths else None
-    others = [i for i in range(len(paths)) if i != turning]
+    others = [axis for axis in range(len(paths)) if axis != turning]
     for degree in range(MOST_DEGREE + 1):
-        rows.append((False, _powers(counts, range(len(paths)), degree)))
+        with_powers.append(_powers(counts, range(len(paths)), degree))
         if turning is not None:
             plain = _powers(counts, others, degree)
             most = min(MOST_HARMONICS, (counts[turning] - 1) // 2)
-            rows += [(True, _with_harmonics(plain, turning, harmonics)) for harmonics in range(1, most + 1)]
-    rows = [row for row in rows if len(row[1]) <= min(known, MOST_TERMS)]
-    yield from dict.fromkeys(terms for _, terms in sorted(rows, key=lambda row: (len(row[1]), not row[0])))
+            with_harmonics += [_with_harmonics(plain, turning, harmonics) for harmonics in range(1, most + 1)]
+    # Sorting keeps the order of lists of one length: harmonics stand first.
+    candidates = sorted(with_harmonics + with_powers, key=len)
+    yield from dict.fromkeys(terms for terms in candidates if len(terms) <= min(known, MOST_TERMS))
 
 
 def _powers(counts: Sequence[int], axes: Sequence[int], degree: int) -> tuple[Term, ...]:
@@ -167,7 +176,7 @@ class CorrectionTable(ImmutableAnswer):
 
     Attributes:
         command: coordinates with and without loads at each point, the last axis fastest.
-        fields: of the axes.
+        fields: fields of the axes.
         axes: values along each, SI.
         before: the largest error of the tool point without corrections, at points and middles of cells, m.
         left: the largest error that exact commands leave, m: what no actuator of the machine can change.
@@ -177,7 +186,7 @@ class CorrectionTable(ImmutableAnswer):
         law_error: its largest error at points and middles of cells, m.
         tolerance: greatest error of the law, m.
         exact: whether that error is only round-off.
-        message: what is the case, in sentences.
+        message: the answer in sentences.
     """
 
     command: Command
@@ -222,7 +231,7 @@ def correction_table(
     with powers.
 
     Args:
-        machine: with its loads.
+        machine: the machine with its loads.
         over: one axis each, "FIELD=from:to:count[:log]", as for `evaluate_grid`; for instance
             "gravity_angle=0 deg:90 deg:7".
         tolerance: greatest error of the law at the tool, m or text with a unit; a thousandth of the error without
@@ -245,8 +254,8 @@ def correction_table(
     wanted = None if tolerance is None else positive(tolerance, "length", "tolerance")
     middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
     # Together, so that a table whose cells have no place is still a table.
-    every = middles.columns(0, middles.size)
-    columns = {path: np.concatenate([values, every[path]]) for path, values in grid.columns(0, grid.size).items()}
+    of_cells = middles.columns(0, middles.size)
+    columns = {path: np.concatenate([values, of_cells[path]]) for path, values in grid.columns(0, grid.size).items()}
     answers = actuator_targets(machine, columns, grid.size + middles.size, progress)
     fields = tuple(parameter for _, parameter in pairs)
     return _table_of(machine, fields, grid, middles, answers.split(grid.size), wanted)
@@ -282,9 +291,19 @@ def _table_of(
     lost = tally(np.concatenate([nodes.status, cells.status]))
     missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})."
     message = _message(machine, before, left, largest, missing if unknown else "")
-    is_exact = law_error <= EXACT_LAW * before
     return CorrectionTable(
-        command, fields, axes, before, left, largest, unknown, law, law_error, tolerance, is_exact, message
+        command=command,
+        fields=fields,
+        axes=axes,
+        before=before,
+        left=left,
+        error=largest,
+        unknown=unknown,
+        law=law,
+        law_error=law_error,
+        tolerance=tolerance,
+        exact=law_error <= EXACT_LAW * before,
+        message=message,
     )
 
 
@@ -298,7 +317,7 @@ def _at_middles(values: Array, shape: Sequence[int]) -> Array:
     """Values at the points of a grid, interpolated linearly at the middles of its cells [n x k] -> [cells x k]."""
     table = values.reshape(*shape, -1)
     for axis in range(len(shape)):
-        ahead, behind = (np.take(table, range(a, shape[axis] - 1 + a), axis) for a in (1, 0))
+        ahead, behind = (np.take(table, range(first, shape[axis] - 1 + first), axis) for first in (1, 0))
         table = 0.5 * (ahead + behind)
     return table.reshape(-1, values.shape[1])
 

@@ -7,7 +7,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.studies.optimisation.log import ROWS
 from kinetostat.studies.result_file import RowFile, frame_is_whole
 from kinetostat.studies.storage import LIST, differing, is_damaged, read_list
-from kinetostat.studies.stored_grid import LAYOUT, damaged_chunks
+from kinetostat.studies.stored_grid import LAYOUT, damaged_chunks, partial_of
 from kinetostat.studies.study_folder import (
     DATA,
     HISTORY,
@@ -116,37 +116,52 @@ def check_folder(folder: Path) -> FolderCheck:
     Raises:
         InputError: its question and the copy of it cannot be read.
     """
-    steps = _steps(folder) if holds_study(folder) else None
+    steps = _check_of_study(folder) if holds_study(folder) else None
     changed = [LIST] if is_damaged(folder) else differing(folder)
     changed += [name for name in (damaged_questions(folder) if steps else ()) if name not in changed]
-    sums = read_list(folder)
-    return FolderCheck(steps, None if sums is None else len(sums), tuple(changed))
+    listed = read_list(folder)
+    return FolderCheck(steps, None if listed is None else len(listed), tuple(changed))
 
 
-def _steps(folder: Path) -> StepsCheck:
-    """Compare the steps or chunks of a long study with what was noted about them."""
+def _check_of_study(folder: Path) -> StepsCheck:
+    """Compare the steps of a search, or the chunks of a grid, with what was noted about them."""
     question = read_question(folder)
     records = {record["chunk"]: record for record in read_history(folder)[0]}
-    text = (folder / HISTORY).read_bytes() if (folder / HISTORY).exists() else b""
-    torn = bool(text) and not text.endswith(b"\n") and not in_use(folder)
-    broken = text.count(b"\n") + torn - len(records)
-    if "optimisation" in question:
-        total = max((record.get("of", 0) for record in records.values()), default=0)
-        damaged = _damaged_steps(folder, question, records)
-        return _steps_check(
-            "steps", len(records) - damaged, damaged + broken, total, (folder / RESULT_FILE).exists(), question
-        )
+    history = (folder / HISTORY).read_bytes() if (folder / HISTORY).exists() else b""
+    cut_short = bool(history) and not history.endswith(b"\n") and not in_use(folder)
+    broken = history.count(b"\n") + cut_short - len(records)
+    check = _check_of_search if "optimisation" in question else _check_of_grid
+    return check(folder, question, records, broken)
+
+
+def _check_of_search(folder: Path, question: Record, records: dict[int, Record], broken: int) -> StepsCheck:
+    """The check of the steps of a search, of whose history so many lines are broken."""
+    total = max((record.get("of", 0) for record in records.values()), default=0)
+    damaged = _damaged_steps(folder, question, records)
+    intact, finished = len(records) - damaged, (folder / RESULT_FILE).exists()
+    return _steps_check("steps", intact, damaged + broken, total, finished, question)
+
+
+def _check_of_grid(folder: Path, question: Record, records: dict[int, Record], broken: int) -> StepsCheck:
+    """The check of the chunks of a grid, of whose history so many lines are broken."""
+    if LAYOUT not in question:  # begun by a version without checksums of the file
+        return StepsCheck(parts="chunks", intact=len(records), damaged=broken, missing=0, frame=True, checked=False)
     final = folder / str(question.get("file"))
-    path = final if final.exists() else final.with_suffix(f".partial{final.suffix}")
-    if LAYOUT not in question:
-        return StepsCheck("chunks", len(records), broken, 0, True, False)
-    layout, chunk = question[LAYOUT], question["chunk"]
+    path = final if final.exists() else partial_of(final)
     if not path.exists():
-        return StepsCheck("chunks", 0, len(records) + broken, 0, False, True, removed=True)
-    damaged = len(damaged_chunks(path, layout, records, chunk))
-    total = ceil(layout["points"] / chunk)
-    frame = frame_is_whole(path, layout)
-    return _steps_check("chunks", len(records) - damaged, damaged + broken, total, final.exists(), question, frame)
+        return StepsCheck(
+            parts="chunks",
+            intact=0,
+            damaged=len(records) + broken,
+            missing=0,
+            frame=False,
+            checked=True,
+            removed=True,
+        )
+    layout, chunk = question[LAYOUT], question["chunk"]
+    damaged, total = len(damaged_chunks(path, layout, records, chunk)), ceil(layout["points"] / chunk)
+    intact, frame = len(records) - damaged, frame_is_whole(path, layout)
+    return _steps_check("chunks", intact, damaged + broken, total, final.exists(), question, frame)
 
 
 def _steps_check(
@@ -155,7 +170,14 @@ def _steps_check(
     """The check of parts of which some are known to be damaged: of a finished study, those that lack are lost."""
     lacking = max(total - intact - damaged, 0)
     lost, missing = (lacking, 0) if finished else (0, lacking)
-    return StepsCheck(parts, intact, damaged + lost, missing, frame, has_checksums(question))
+    return StepsCheck(
+        parts=parts,
+        intact=intact,
+        damaged=damaged + lost,
+        missing=missing,
+        frame=frame,
+        checked=has_checksums(question),
+    )
 
 
 def _damaged_steps(folder: Path, question: Record, records: dict[int, Record]) -> int:

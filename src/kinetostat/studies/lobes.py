@@ -31,18 +31,22 @@ from kinetostat.units import UnitError
 from kinetostat.vibration.cutting import Borders, Engagement, borders, milling, turning
 from kinetostat.vibration.receptance import FreeTool
 
-SPEEDS = 1200
-"""Speeds of the curve."""
+CURVE_SPEEDS = 1200
+"""Speeds of the curve: more than a page has dots, so that no lobe of the usual range falls between two of them."""
 SLOWEST_SHARE = 0.08
-"""Slowest speed of the curve as a share of the fastest, if none is given."""
+"""Slowest speed of the curve as a share of the fastest, if none is given: there, eight periods of
+the chatter pass from edge to edge, and lobes run into one."""
 FASTEST = 1.6
-"""Fastest speed of the curve, in turns in which an edge passes once per period of the chatter, if none is given."""
+"""Fastest speed of the curve, in turns in which an edge passes once per period of the chatter, if none is given: the
+last lobe ends at 1."""
 MOST_POSES = 2000
 """Poses of a range: each takes some milliseconds, as a machine of its own."""
-STRAIGHT = 1e-6
-"""Sine of the angle by which the feed may miss being at right angles to the spindle."""
-MOST_TEETH, MOST_RADIAL = 100, 10.0
-"""Edges of a cutter, and radial force over the tangential one: more is a slip of the pen."""
+MOST_OBLIQUE = 1e-6
+"""Sine of the angle by which the feed may miss being at right angles to the spindle: directions in six digits."""
+MOST_TEETH = 100
+"""Edges of a cutter: more is a slip of the pen."""
+MOST_RADIAL = 10.0
+"""Radial force over the tangential one: more is a slip of the pen."""
 ROUND_OFF_OF_DEGREES = 1e-12
 """Share by which 180 degrees may come out as more than pi when a text is converted."""
 
@@ -55,7 +59,7 @@ class Lobes(AnswerInState):
         state: the state of the machine at its pose.
         status: status of the pose.
         message: why there is no answer; empty where there is one.
-        teeth: edges that pass in a turn; 1 for one that stays in the cut.
+        teeth: number of edges that pass in a turn; 1 for one that stays in the cut.
         pressure: cutting force per area of the chip, N/m².
         speeds: speeds of the spindle, turns per second [n].
         widths: width of cut up to which each is stable at every pose, m; infinite where every width is [n].
@@ -65,7 +69,7 @@ class Lobes(AnswerInState):
         assumed: whether nothing is said of the machine's damping, so that it is a usual one.
         poses: number of poses with an answer.
         worst: coordinates of the pose that allows least, by leaf path; empty for one pose.
-        tool: coupled to the machine; None where there is none.
+        tool: a tool that is coupled to the machine; None without one.
     """
 
     state: MachineState
@@ -179,13 +183,13 @@ def _engagement_of(
 ) -> Engagement:
     """The engagement of turning or milling by the arguments of `lobes`, each of which is checked."""
     cutting = machine.tables["cutting"]
-    given = cutting.pressure or None if cutting_pressure is None else cutting_pressure
-    if given is None:
+    written = cutting.pressure or None if cutting_pressure is None else cutting_pressure
+    if written is None:
         raise InputError(
             f'Nothing says the cutting pressure of {machine.name}; write pressure = "2000 N/mm**2" under [cutting], or '
             "give cutting_pressure."
         )
-    pressure = positive(given, "cutting pressure", "cutting_pressure")
+    pressure = positive(written, "cutting pressure", "cutting_pressure")
     if teeth is None:
         if not any(cutting.direction):
             raise InputError(
@@ -198,11 +202,11 @@ def _engagement_of(
     if not 0.0 <= radial <= MOST_RADIAL:
         raise InputError(f"radial is {radial:g}; a share of the tangential force from 0 to {MOST_RADIAL:g} is allowed.")
     start, end = _entry_and_leaving(entry, leaving)
-    along = np.array(unit_direction(feed or (1.0, 0.0, 0.0), "feed"))
+    feed_direction = np.array(unit_direction(feed or (1.0, 0.0, 0.0), "feed"))
     axis = np.array(unit_direction(spindle or (0.0, 0.0, 1.0), "spindle"))
-    if abs(along @ axis) > STRAIGHT:
+    if abs(feed_direction @ axis) > MOST_OBLIQUE:
         raise InputError("The feed is not at right angles to the spindle; change feed or spindle.")
-    return milling(pressure, radial, teeth, start, end, along, axis)
+    return milling(pressure, radial, teeth, start, end, feed_direction, axis)
 
 
 def _entry_and_leaving(entry: float | str | None, leaving: float | str | None) -> tuple[float, float]:
@@ -231,8 +235,8 @@ def _lobes_of(
     ends: tuple[float | None, float | None],
 ) -> Lobes:
     """The widths that are stable at all poses with vibrations: at each speed the least of theirs."""
-    known = [(row.borders(engagement), row) for row in vibrations]
-    pairs = [(border, row) for border, row in known if border is not None]
+    every = [(at_pose.borders(engagement), at_pose) for at_pose in vibrations]
+    pairs = [(border, at_pose) for border, at_pose in every if border is not None]
     if not pairs:
         first, nothing = vibrations[0].vibration, np.zeros(0)
         message = first.message if len(vibrations) == 1 else "At none of these poses does the machine have vibrations."
@@ -254,7 +258,7 @@ def _lobes_of(
         least=least,
         frequency=frequency,
         best=(float(speeds[widest]), float(widths[widest])) if widths[widest] > least else None,
-        assumed=any(row.vibration.assumed for _, row in pairs),
+        assumed=any(at_pose.vibration.assumed for _, at_pose in pairs),
         poses=len(pairs),
         worst=worst.pose,
         tool=pairs[0][1].vibration.tool,
@@ -270,7 +274,7 @@ def _speeds(chatter: float, teeth: int, ends: tuple[float | None, float | None])
         ends: slowest and fastest speed, as they are given.
     """
     fastest = ends[1] or FASTEST * chatter / teeth
-    speeds = np.linspace(ends[0] or SLOWEST_SHARE * fastest, fastest, SPEEDS)
+    speeds = np.linspace(ends[0] or SLOWEST_SHARE * fastest, fastest, CURVE_SPEEDS)
     if speeds[0] >= speeds[-1]:
         raise InputError(
             f"lowest is above the range that is shown, up to {60.0 * fastest:.4g} 1/min; give highest too."

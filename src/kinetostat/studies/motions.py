@@ -32,28 +32,30 @@ from kinetostat.studies.moves import along_profile, moves_between, profile
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns, unit_doubt
 
 TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
+"""Names of columns that are no fields of the machine."""
 QUANTITIES = {
     TIME: Quantity("duration", "when the pose is reached"),
     FEED: Quantity("speed", "greatest speed of the move", positive=True),
     ACCELERATION: Quantity("acceleration", "greatest acceleration along the path", positive=True),
     JERK: Quantity("jerk", "greatest jerk along the path", positive=True),
 }
+"""The quantities of those columns that are numbers."""
 SHAPES = ("line", "through", "arc")
 """Words of the column `shape`: a straight line to the pose, a point through which the next arc leads, an arc to it."""
-SMOOTH = 5
-"""Degree of the spline through poses at times: with it, accelerations have no corner."""
+SPLINE_DEGREE = 5
+"""Degree of the spline through poses at times: the least odd one with which accelerations have no corner."""
 _LOAD = re.compile(r"load\.(.+\.)?(force|moment)\.\d")
 """Paths of components of forces and moments on the platform, those of named loads among them."""
 SAME_POSE = 1e-12
 """Difference of a coordinate of the first and the last pose, SI, up to which the motion is a closed one."""
 WHOLE_PERIODS = 1e-9
 """Difference from a whole number of periods of the slowest sine up to which a sine has come back to its start."""
-AROUND = 32
-"""Directions of the speed, beside those in which a drive is fastest."""
-AROUND_SINES = 256
-"""Points in a period of the fastest sine, at least."""
+DIRECTIONS_OF_SPEED = 32
+"""Directions of the speed, beside those in which a drive is fastest: in space they are some 35 degrees apart."""
+POINTS_PER_PERIOD = 256
+"""Least number of points in a period of the fastest sine: its greatest value is missed by less than 1e-4."""
 MOST_PERIODS = 200
-"""Periods of the fastest sine in a motion of sines."""
+"""Most periods of the fastest sine in a motion of sines, so that this has 51,200 points at most by that."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,12 @@ class Motion:
     """A motion of a machine.
 
     Attributes:
-        kind: what it is, in a few words.
-        times: of its points, s [n]; a point stands twice where the acceleration jumps.
+        kind: the sort of motion, in a few words.
+        times: times of its points, s [n]; a point stands twice where the acceleration jumps.
         path: coordinates of the pose with their rates and accelerations.
         periodic: whether it closes and goes on for ever.
         timeless: whether its points are no time apart, but speeds and accelerations in many directions at one pose.
-        unit_doubt: as of `PoseColumns`, where the motion comes from a file.
+        unit_doubt: doubt about the units of its file, see `PoseColumns`; empty where there is none.
     """
 
     kind: str
@@ -78,7 +80,7 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """From its first point to its last, s."""
+        """Time from its first point to its last, s."""
         return float(self.times[-1] - self.times[0])
 
     @property
@@ -96,8 +98,8 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     evenly over all directions, and by rest.
 
     Args:
-        form: of the machine, at its pose.
-        speed, acceleration: of the platform point, m/s and m/s².
+        form: form of the machine's equations, at its pose.
+        speed, acceleration: speed and acceleration of the platform point, m/s and m/s².
 
     Raises:
         InputError: no coordinate of the pose is x, y or z.
@@ -106,13 +108,16 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     moving = [name for name in here if name in POINT]
     if not moving:
         raise InputError(f"no coordinate of the pose of {form.machine.name} is x, y or z; give a motion instead.")
-    ways, rest = np.eye(len(moving)), np.zeros((len(moving), len(moving)))
-    unit = forces_on_path(form, _at_pose(here, moving, np.concatenate([ways, rest]), np.concatenate([rest, ways])))
-    inertia = NUMBERS_OF_DRIVE.index("inertia")
-    fastest, hardest = unit.drives[:, 0, : len(moving)], unit.drives[:, inertia, len(moving) :]
-    speeds = np.concatenate([np.zeros((1, len(moving))), *_both_ways(fastest), _spread(len(moving))]) * speed
-    gains = np.concatenate(_both_ways(hardest)) * acceleration
-    pairs = np.repeat(speeds, len(gains), axis=0), np.tile(gains, (len(speeds), 1))
+    count = len(moving)
+    units, zeros = np.eye(count), np.zeros((count, count))
+    # Unit speeds at rest of all else, then unit accelerations: their numbers are the columns of J and of J^-T M.
+    answer = forces_on_path(
+        form, _at_pose(here, moving, np.concatenate([units, zeros]), np.concatenate([zeros, units]))
+    ).drives
+    fastest, hardest = answer[:, 0, :count], answer[:, NUMBERS_OF_DRIVE.index("inertia"), count:]
+    speeds = np.concatenate([np.zeros((1, count)), *_both_ways(fastest), _spread(count)]) * speed
+    accelerations = np.concatenate(_both_ways(hardest)) * acceleration
+    pairs = np.repeat(speeds, len(accelerations), axis=0), np.tile(accelerations, (len(speeds), 1))
     return Motion(
         f"every direction at {speed:.4g} m/s and {acceleration:.4g} m/s²",
         np.zeros(len(pairs[0])),
@@ -121,12 +126,12 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     )
 
 
-def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, gains: Array) -> MovedPath:
+def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, accelerations: Array) -> MovedPath:
     """Rates and accelerations of some coordinates [n x moving], all at one pose."""
     count = len(rates)
     parts = [
         {name: part[:, moving.index(name)] if name in moving else np.zeros(count) for name in here}
-        for part in (rates, gains)
+        for part in (rates, accelerations)
     ]
     return MovedPath({name: np.full(count, value) for name, value in here.items()}, *parts)
 
@@ -140,12 +145,13 @@ def _both_ways(rows: Array) -> list[Array]:
 
 def _spread(size: int) -> Array:
     """Directions spread evenly over a sphere, a circle or a line [n x size]."""
-    turns = np.arange(AROUND) + 0.5
     if size == 1:
         return np.array([[1.0], [-1.0]])
+    shares = (np.arange(DIRECTIONS_OF_SPEED) + 0.5) / DIRECTIONS_OF_SPEED
     if size == 2:
-        return np.column_stack([np.cos(2.0 * np.pi * turns / AROUND), np.sin(2.0 * np.pi * turns / AROUND)])
-    height, angle = 1.0 - 2.0 * turns / AROUND, np.pi * (1.0 + np.sqrt(5.0)) * turns
+        return np.column_stack([np.cos(2.0 * np.pi * shares), np.sin(2.0 * np.pi * shares)])
+    # Fibonacci's lattice: even steps of height, and turns by the golden angle.
+    height, angle = 1.0 - 2.0 * shares, np.pi * (1.0 + np.sqrt(5.0)) * DIRECTIONS_OF_SPEED * shares
     across = np.sqrt(1.0 - height**2)
     return np.column_stack([across * np.cos(angle), across * np.sin(angle), height])
 
@@ -162,20 +168,20 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
     - `field`, `amplitude`, `frequency`, `phase` instead: a line for each coordinate that swings about its pose.
 
     Args:
-        machine: whose pose moves; what no column names stays as it is.
-        path: of the file.
-        points: at which a motion is looked at, about.
-        text: of the file, where it is known; the path then only names it in messages.
+        machine: the machine whose pose moves; coordinates that no column names stay as they are.
+        path: path of the file.
+        points: number of points at which a motion is looked at, about.
+        text: text of the file, where it is known; the path then only names it in messages.
 
     Raises:
         InputError: the file cannot be read, or is not a motion.
     """
     columns, numbers = columns_of(path, text=text)
-    given = {column.name: column for column in columns}
+    by_name = {column.name: column for column in columns}
     try:
-        if FIELD in given:
-            return _sines(machine, given, points)
-        special = {name: given.pop(name) for name in (*QUANTITIES, SHAPE) if name in given}
+        if FIELD in by_name:
+            return _sines(machine, by_name, points)
+        special = {name: by_name.pop(name) for name in (*QUANTITIES, SHAPE) if name in by_name}
 
         def where(name: str, row: int) -> str:
             return f"line {numbers[row]}, column {name}"
@@ -183,9 +189,9 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
         amounts = {
             name: column_values(column, QUANTITIES[name], where) for name, column in special.items() if name != SHAPE
         }
-        coordinates, loads = _coordinates_and_loads(machine, list(given.values()), where)
+        coordinates, loads = _coordinates_and_loads(machine, list(by_name.values()), where)
         if TIME in amounts:
-            _refuse(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
+            _refuse_columns(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
             motion = _through_poses(coordinates, loads, amounts[TIME], points)
             return replace(motion, unit_doubt=unit_doubt(machine, columns))
         if FEED not in amounts:
@@ -242,9 +248,9 @@ def check_lines(part: str, given: str) -> None:
         )
 
 
-def _refuse(given: Mapping[str, GivenColumn], names: Sequence[str], what: str) -> None:
+def _refuse_columns(columns: Mapping[str, GivenColumn], names: Sequence[str], what: str) -> None:
     for name in names:
-        if name in given:
+        if name in columns:
             raise InputError(f"{what} has no column {name}; remove it.")
 
 
@@ -259,7 +265,7 @@ def _coordinates_and_loads(
             raise InputError(
                 f"{path} does not move; a motion has coordinates of the pose, and forces and moments such as force.x."
             )
-    here = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
+    of_pose = {path: float(value) for path, value in values(machine).items() if path.startswith(POSE)}
     if any(part_of(column.name)[0] for column in columns):  # angles of quaternions and matrices may jump by a turn
         leaves = {
             path: np.unwrap(rows) if path.removeprefix(POSE) in ANGLES else rows for path, rows in poses.leaves.items()
@@ -267,7 +273,7 @@ def _coordinates_and_loads(
         poses = replace(poses, values=tuple(leaves[field.leaves[0]] for field in poses.fields))
     coordinates = {
         path.removeprefix(POSE): np.array(poses.leaves.get(path, np.full(poses.count, value)), dtype=float)
-        for path, value in here.items()
+        for path, value in of_pose.items()
     }
     return coordinates, loads
 
@@ -278,24 +284,23 @@ def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array],
     if len(times) < 2 or late.size:
         after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
         raise InputError(f"times must grow from line to line, but {after}; put the poses in their order.")
-    unwound = {name: np.array(rows) for name, rows in coordinates.items()}
-    closed = len(times) > SMOOTH + 1 and all(abs(rows[0] - rows[-1]) < SAME_POSE for rows in unwound.values())
-    degree = min(SMOOTH, len(times) - 1)
-    stacked = np.stack(list(unwound.values()), axis=1)
+    table = np.stack(list(coordinates.values()), axis=1)
+    closed = len(times) > SPLINE_DEGREE + 1 and bool((np.abs(table[0] - table[-1]) < SAME_POSE).all())
     if closed:
-        stacked[-1] = stacked[0]
-    spline = make_interp_spline(times, stacked, k=degree, bc_type="periodic" if closed else None)
+        table[-1] = table[0]
+    degree = min(SPLINE_DEGREE, len(times) - 1)
+    spline = make_interp_spline(times, table, k=degree, bc_type="periodic" if closed else None)
     fine = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], points + 1)]))
     rows = [np.asarray(spline(fine, nu=order)) for order in range(3)]
     kind = f"{len(times)} poses over {times[-1] - times[0]:.4g} s"
-    path = _path(list(unwound), rows, {name: np.interp(fine, times, column) for name, column in loads.items()})
+    path = _path(list(coordinates), rows, {name: np.interp(fine, times, column) for name, column in loads.items()})
     return Motion(kind, fine, path, closed and all(column[0] == column[-1] for column in loads.values()))
 
 
 def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array]) -> MovedPath:
     """Coordinates, rates and accelerations [n x coordinates] by name, with loads."""
-    pose, rates, gains = (dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows)
-    return MovedPath(pose, rates, gains, loads)
+    pose, rates, accelerations = (dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows)
+    return MovedPath(pose, rates, accelerations, loads)
 
 
 def _shapes(column: GivenColumn | None, count: int) -> list[str]:
@@ -354,10 +359,10 @@ class _Sine:
     """A line of a file of sines: how a coordinate of the pose, or a component of a load, swings about its value.
 
     Attributes:
-        path: of what swings.
-        amplitude: SI.
+        path: path of what swings.
+        amplitude: greatest displacement, SI.
         rate: 2 pi times the frequency, rad/s.
-        phase: at the time 0, rad.
+        phase: phase at the time 0, rad.
     """
 
     path: str
@@ -372,58 +377,58 @@ class _Sine:
         return displacement, self.amplitude * self.rate * np.cos(angle), -self.amplitude * self.rate**2 * np.sin(angle)
 
 
-def _sines(machine: Machine, given: Mapping[str, GivenColumn], points: int) -> Motion:
+def _sines(machine: Machine, columns: Mapping[str, GivenColumn], points: int) -> Motion:
     """Sines about the pose of the machine and about its loads: of shakers and flight simulators, theory (96)."""
-    sines = _sines_of_lines(machine, given)
+    sines = _sines_of_lines(machine, columns)
     fastest, slowest = max(sine.rate for sine in sines), min(sine.rate for sine in sines)
     if fastest > MOST_PERIODS * slowest:
         raise InputError(
             f"the fastest sine swings more than {MOST_PERIODS} times in a period of the slowest; part them."
         )
-    count = max(points, int(np.ceil(AROUND_SINES * fastest / slowest)))
+    count = max(points, int(np.ceil(POINTS_PER_PERIOD * fastest / slowest)))
     times = np.linspace(0.0, 2.0 * np.pi / slowest, count + 1)
     swinging = {sine.path for sine in sines}
     starts = {path: float(v) for path, v in values(machine).items() if path.startswith(POSE) or path in swinging}
-    columns = {path: (np.full(times.shape, v), *np.zeros((2, *times.shape))) for path, v in starts.items()}
+    curves = {path: (np.full(times.shape, v), *np.zeros((2, *times.shape))) for path, v in starts.items()}
     for sine in sines:
-        changes = zip(columns[sine.path], sine.at(times), strict=True)
-        columns[sine.path] = tuple(column + change for column, change in changes)
-    coordinates, rates, gains = (
-        {path.removeprefix(POSE): parts[order] for path, parts in columns.items() if path.startswith(POSE)}
+        changes = zip(curves[sine.path], sine.at(times), strict=True)
+        curves[sine.path] = tuple(curve + change for curve, change in changes)
+    coordinates, rates, accelerations = (
+        {path.removeprefix(POSE): parts[order] for path, parts in curves.items() if path.startswith(POSE)}
         for order in range(3)
     )
-    loads = {path: parts[0] for path, parts in columns.items() if not path.startswith(POSE)}
+    loads = {path: parts[0] for path, parts in curves.items() if not path.startswith(POSE)}
     periods = [sine.rate / slowest for sine in sines]
     closes = all(abs(number - round(number)) < WHOLE_PERIODS for number in periods)
     kind = f"{_number_of(len(sines), 'sine')}, {times[-1]:.4g} s"
-    return Motion(kind, times, MovedPath(coordinates, rates, gains, loads), closes)
+    return Motion(kind, times, MovedPath(coordinates, rates, accelerations, loads), closes)
 
 
-def _sines_of_lines(machine: Machine, given: Mapping[str, GivenColumn]) -> list[_Sine]:
+def _sines_of_lines(machine: Machine, columns: Mapping[str, GivenColumn]) -> list[_Sine]:
     """The sines of the lines of a file, whose amplitudes have the units of what swings."""
-    for name in given:
+    for name in columns:
         if name not in (FIELD, "amplitude", "frequency", "phase"):
             raise InputError(
                 f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase. What "
                 "swings, a coordinate of the pose or a force, stands in the column field of its line."
             )
     for name in ("amplitude", "frequency"):
-        if name not in given:
+        if name not in columns:
             raise InputError(f"a motion of sines has no column {name}; add one, e.g. amplitude, frequency [Hz].")
     sines = []
-    for number, entry in enumerate(given[FIELD].entries):
+    for number, entry in enumerate(columns[FIELD].entries):
         word = str(entry).strip()
-        path = _swinging(machine, word)
-        of_line = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in given.items()}
-        field = GivenColumn(word, of_line["amplitude"].entries, given["amplitude"].unit)
+        path = _path_of_swing(machine, word)
+        cell = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in columns.items()}
+        field = GivenColumn(word, cell["amplitude"].entries, columns["amplitude"].unit)
         amplitude = read_columns(machine, [field], lambda name, _: f"amplitude of {name}").values[0][0]
-        frequency = column_values(of_line["frequency"], Quantity("frequency", "", positive=True), _place)[0]
-        phase = column_values(of_line["phase"], Quantity("angle", ""), _place)[0] if "phase" in given else 0.0
+        frequency = column_values(cell["frequency"], Quantity("frequency", "", positive=True), _words_of_column)[0]
+        phase = column_values(cell["phase"], Quantity("angle", ""), _words_of_column)[0] if "phase" in cell else 0.0
         sines.append(_Sine(path, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
     return sines
 
 
-def _swinging(machine: Machine, word: str) -> str:
+def _path_of_swing(machine: Machine, word: str) -> str:
     """The path of what swings: a coordinate of the pose, or a component of a force or moment on the platform."""
     field = find(machine.family, word)
     if not (field.path.startswith(POSE) or _LOAD.fullmatch(field.path)):
@@ -438,5 +443,5 @@ def _number_of(number: int, what: str) -> str:
     return f"{number} {what}" + ("s" if number > 1 else "")
 
 
-def _place(name: str, _row: int) -> str:
+def _words_of_column(name: str, _row: int) -> str:
     return f"column {name}"

@@ -7,6 +7,7 @@ Source: theory (97) and (98).
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -16,13 +17,38 @@ from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 
-Phases = list[tuple[float, float, float]]
-"""Phases of a move: duration, s, and the acceleration at the begin and at the end of each, m/s²."""
+Phase: TypeAlias = tuple[float, float, float]
+"""A part of a move whose acceleration changes evenly: its duration, s, and its first and last acceleration, m/s²."""
+Phases: TypeAlias = list[Phase]
 
 STRAIGHT = 1e-9
-"""Sine of the angle between two chords of an arc below which it is a straight line."""
+"""Sine of the angle between two chords of an arc below which it is a straight line: with eight digits of a chord, the
+circle through its points has none."""
 ROUND_OFF_OF_TIME = 1e-15
 """Error of the time at which a point is passed, s: the round-off of a move of some seconds."""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A part of a circle: centre + cos a first + sin a second, for a from 0 to its angle.
+
+    Attributes:
+        centre: the centre.
+        first, second: two vectors at right angles, each as long as the radius; `first` leads to the beginning.
+        angle: angle of the end, rad.
+        middle: angle of the point through which the arc leads, rad.
+    """
+
+    centre: Array
+    first: Array
+    second: Array
+    angle: float
+    middle: float
+
+    @property
+    def radius(self) -> float:
+        """The radius, m."""
+        return float(np.linalg.norm(self.first))
 
 
 @dataclass(frozen=True)
@@ -32,18 +58,15 @@ class Curve:
     Attributes:
         start, end: values of all coordinates.
         length: length of the path of P or, of turns alone, of a point at the machine's length from their axis, m.
-        arc: centre, two vectors of the size of its radius, and its angle, of the coordinates at `places`; None of a
-            line.
-        places: which coordinates are those of P.
-        middle: length at which an arc passes the point through which it leads; None of a line.
+        places: numbers of the coordinates of P.
+        arc: the arc in the coordinates of P; None of a line.
     """
 
     start: Array
     end: Array
     length: float
     places: tuple[int, ...]
-    arc: tuple[Array, Array, Array, float] | None = None
-    middle: float | None = None
+    arc: Arc | None = None
 
     def at(self, lengths: Array) -> tuple[Array, Array, Array]:
         """Coordinates with their first and second derivatives by the length [n x coordinates]."""
@@ -51,17 +74,12 @@ class Curve:
         slope = np.broadcast_to((self.end - self.start) / self.length, (len(lengths), len(self.start))).copy()
         place, bend = self.start + (self.end - self.start) * share, np.zeros_like(slope)
         if self.arc is not None:
-            centre, first, second, angle = self.arc
-            turned, rate = share * angle, angle / self.length
-            at, across = (
-                np.cos(turned) * first + np.sin(turned) * second,
-                np.cos(turned) * second - np.sin(turned) * first,
-            )
-            place[:, self.places], slope[:, self.places], bend[:, self.places] = (
-                centre + at,
-                across * rate,
-                -at * rate**2,
-            )
+            angle, rate = share * self.arc.angle, self.arc.angle / self.length
+            outward = np.cos(angle) * self.arc.first + np.sin(angle) * self.arc.second
+            onward = np.cos(angle) * self.arc.second - np.sin(angle) * self.arc.first
+            place[:, self.places] = self.arc.centre + outward
+            slope[:, self.places] = onward * rate
+            bend[:, self.places] = -outward * rate**2
         return place, slope, bend
 
     def in_time(self, lengths: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array, Array]:
@@ -92,12 +110,12 @@ class Move:
         duration = sum(time for time, _, _ in phases if time > 0.0)
         if self.end - self.start == 1:
             return [0.0, duration]
-        if self.curve.middle is None:
+        if self.curve.arc is None:
             raise InputError(
                 "the point through which an arc leads is in line with its ends, so that no moment belongs to the "
                 "forces there; write that arc as a line."
             )
-        return [0.0, moment_at(phases, self.curve.middle), duration]
+        return [0.0, moment_at(phases, self.curve.arc.radius * self.curve.arc.middle), duration]
 
 
 def moves_between(table: Array, shapes: Sequence[str], places: Sequence[int], size: float) -> list[Move]:
@@ -105,8 +123,9 @@ def moves_between(table: Array, shapes: Sequence[str], places: Sequence[int], si
 
     Args:
         table: coordinates of the poses [n x coordinates].
-        shapes: of each row: "line" or "arc" leads to it, "through" is a point of the next arc.
-        places, size: see `curve_between`.
+        shapes: shape of each row: "line" or "arc" leads to it, "through" is a point of the next arc.
+        places: numbers of the coordinates of P.
+        size: the machine's length, m, at which turns alone have a path.
 
     Raises:
         InputError: there is only one pose, or nothing moves.
@@ -117,52 +136,41 @@ def moves_between(table: Array, shapes: Sequence[str], places: Sequence[int], si
     pairs = [(start, end) for start, end in pairwise(ends) if np.abs(table[end] - table[start]).max() > 0.0]
     if not pairs:
         raise InputError("all of its poses are alike, so that nothing moves; change a coordinate from line to line.")
-    return [
-        Move(start, end, curve_between(table, start, end, places, size, shapes[end] == "arc")) for start, end in pairs
-    ]
+    moves = []
+    for start, end in pairs:
+        first, last = table[start], table[end]
+        arc = _arc(first[places], table[end - 1][places], last[places]) if shapes[end] == "arc" else None
+        moves.append(Move(start, end, _curve(first, last, places, size, arc)))
+    return moves
 
 
-def curve_between(table: Array, start: int, end: int, places: Sequence[int], size: float, round_: bool) -> Curve:
-    """The line from a pose of a table to another one, or the arc through the pose before the other one.
-
-    Args:
-        table: coordinates of the poses [n x coordinates].
-        start, end: rows of the table.
-        places: which coordinates are those of P.
-        size: the machine's length, m.
-        round_: whether it is an arc; where the three points are in a line, it is that line.
-    """
-    first, last = table[start], table[end]
-    chord = last[places] - first[places]
-    length = float(np.linalg.norm(chord))
-    arc, middle = None, None
-    if round_ and (circle := _arc(first[places], table[end - 1][places], last[places])):
-        arc, turned_at_middle = circle
-        radius = float(np.linalg.norm(arc[1]))
-        length, middle = radius * arc[3], radius * turned_at_middle
+def _curve(first: Array, last: Array, places: Sequence[int], size: float, arc: Arc | None) -> Curve:
+    """The line from a pose to another one, or the arc if there is one; arguments as of `moves_between`."""
+    length = float(np.linalg.norm(last[places] - first[places])) if arc is None else arc.radius * arc.angle
     turned = float(np.linalg.norm(np.delete(last - first, places)))
-    return Curve(first, last, length or turned * size, tuple(places), arc, middle)
+    return Curve(first, last, length or turned * size, tuple(places), arc)
 
 
-def _arc(start: Array, middle: Array, end: Array) -> tuple[tuple[Array, Array, Array, float], float] | None:
-    """The circle through three points from the first to the last, and the angle of the second; None where straight."""
-    along, across = middle - start, end - start
-    sizes = along @ along, across @ across
-    both = along @ across
-    square = sizes[0] * sizes[1] - both * both
-    if square <= STRAIGHT**2 * sizes[0] * sizes[1]:
+def _arc(start: Array, middle: Array, end: Array) -> Arc | None:
+    """The circle through three points from the first to the last; None where they are in a line."""
+    to_middle, to_end = middle - start, end - start
+    middle_square, end_square, product = to_middle @ to_middle, to_end @ to_end, to_middle @ to_end
+    # Gram's determinant is the square of twice the area of the triangle.
+    gram = middle_square * end_square - product * product
+    if gram <= STRAIGHT**2 * middle_square * end_square:
         return None
     centre = start + (
-        (sizes[0] * sizes[1] - sizes[1] * both) * along + (sizes[0] * sizes[1] - sizes[0] * both) * across
-    ) / (2.0 * square)
+        (middle_square * end_square - end_square * product) * to_middle
+        + (middle_square * end_square - middle_square * product) * to_end
+    ) / (2.0 * gram)
     first = start - centre
     radius = np.linalg.norm(first)
-    side = along - (along @ first) / radius**2 * first
+    side = to_middle - (to_middle @ first) / radius**2 * first
     second = side / np.linalg.norm(side) * radius
-    turns = [np.arctan2((p - centre) @ second, (p - centre) @ first) % (2.0 * np.pi) for p in (middle, end)]
-    if turns[0] > turns[1]:
-        second, turns = -second, [2.0 * np.pi - turn for turn in turns]
-    return (centre, first, second, float(turns[1])), float(turns[0])
+    angles = [np.arctan2((p - centre) @ second, (p - centre) @ first) % (2.0 * np.pi) for p in (middle, end)]
+    if angles[0] > angles[1]:
+        second, angles = -second, [2.0 * np.pi - angle for angle in angles]
+    return Arc(centre, first, second, angle=float(angles[1]), middle=float(angles[0]))
 
 
 def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> Phases:
@@ -177,8 +185,10 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
     """
     if np.isinf(jerk):
         speed = min(feed, np.sqrt(length * acceleration))
-        rise, cruise = speed / acceleration, length / speed - speed / acceleration
-        return [(rise, acceleration, acceleration), (cruise, 0.0, 0.0), (rise, -acceleration, -acceleration)]
+        rise_time, cruise_time = speed / acceleration, length / speed - speed / acceleration
+        braking = (rise_time, -acceleration, -acceleration)
+        return [(rise_time, acceleration, acceleration), (cruise_time, 0.0, 0.0), braking]
+    # The speed that the jerk alone allows on this length, or, where the acceleration comes to its limit, that with it.
     speed = np.cbrt(length**2 * jerk / 4.0)
     if speed * jerk > acceleration**2:
         lag = acceleration**2 / jerk
@@ -187,26 +197,27 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
     growing = acceleration / jerk if speed * jerk > acceleration**2 else float(np.sqrt(speed / jerk))
     peak = jerk * growing
     holding = max(speed / peak - growing, 0.0)
-    cruise = max(length / speed - (2.0 * growing + holding), 0.0)
+    cruising = max(length / speed - (2.0 * growing + holding), 0.0)
     rise = [(growing, 0.0, peak), (holding, peak, peak), (growing, peak, 0.0)]
-    return [*rise, (cruise, 0.0, 0.0), *((time, -a, -b) for time, a, b in rise)]
+    return [*rise, (cruising, 0.0, 0.0), *((time, -first, -last) for time, first, last in rise)]
 
 
 def along_profile(phases: Phases, points: int) -> tuple[Array, tuple[Array, Array, Array]]:
     """Times (s) in all phases, so many in each with both of its ends, and length, speed and acceleration then."""
-    times, lengths, speeds, gains = [], [], [], []
-    clock = at = speed = 0.0
+    times, lengths, speeds, accelerations = [], [], [], []
+    end_time = end_length = end_speed = 0.0
     for duration, first, last in phases:
         if duration <= 0.0:
             continue
         time = np.linspace(0.0, duration, points)
         jerk = (last - first) / duration
-        gains.append(first + jerk * time)
-        speeds.append(speed + first * time + jerk * time**2 / 2.0)
-        lengths.append(at + speed * time + first * time**2 / 2.0 + jerk * time**3 / 6.0)
-        times.append(clock + time)
-        clock, at, speed = clock + duration, float(lengths[-1][-1]), float(speeds[-1][-1])
-    return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(gains))
+        accelerations.append(first + jerk * time)
+        speeds.append(end_speed + first * time + jerk * time**2 / 2.0)
+        lengths.append(end_length + end_speed * time + first * time**2 / 2.0 + jerk * time**3 / 6.0)
+        times.append(end_time + time)
+        end_time += duration
+        end_length, end_speed = float(lengths[-1][-1]), float(speeds[-1][-1])
+    return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(accelerations))
 
 
 def moment_at(phases: Phases, length: float) -> float:
@@ -216,13 +227,13 @@ def moment_at(phases: Phases, length: float) -> float:
         phases: phases of the move, see `profile`.
         length: between 0 and that of its path, m.
     """
-    clock = at = speed = 0.0
+    clock = passed = speed = 0.0
     for duration, first, last in phases:
         if duration <= 0.0:
             continue
-        remaining = Polynomial([at - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
-        if remaining(duration) >= 0.0:
-            return clock + float(brentq(remaining, 0.0, duration, xtol=ROUND_OFF_OF_TIME))
-        at, speed = float(remaining(duration)) + length, float(remaining.deriv()(duration))
+        beyond = Polynomial([passed - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
+        if beyond(duration) >= 0.0:
+            return clock + float(brentq(beyond, 0.0, duration, xtol=ROUND_OFF_OF_TIME))
+        passed, speed = float(beyond(duration)) + length, float(beyond.deriv()(duration))
         clock += duration
     return clock

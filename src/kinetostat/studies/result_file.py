@@ -1,8 +1,8 @@
-"""A NetCDF file larger than memory, filled run by run. Which runs are done is known elsewhere.
+"""A NetCDF file larger than memory, filled run by run, and a file of rows. Which runs are done is known elsewhere.
 
 Every variable is one contiguous block, reserved when the file is made; later only numbers are written into it. An
 interruption therefore breaks no structure, no second copy has to be assembled, and the file does not depend on the runs
-that wrote it, nor on their order.
+that wrote it, nor on their order. The status of a point is written last, so that a point that has one is complete.
 """
 
 import os
@@ -27,12 +27,13 @@ from kinetostat.studies.study_folder import checksum
 ROW_NUMBER = np.dtype("<f8")
 """Numbers in a file of rows: float64, little-endian."""
 SPARE_BYTES = 1 << 30
-"""Bytes that are left free on a disk."""
+"""Bytes that are left free on a disk, 1 GiB: other programs fail on one that is full to the last byte."""
 BYTES_AT_A_TIME = 1 << 24
-"""Bytes written at a time."""
+"""Bytes that are filled at a time: little memory, and so many that the time of a call does not count."""
 VALUES_OF_A_FIGURE = 400
-"""Values of an axis that a figure can show."""
+"""Values of an axis that a figure can show: one for every two or three of its pixels."""
 STATUS = "status"
+"""Name of the variable that says of each point whether and how it is answered, int8; all others are float64."""
 UNKNOWN = -1
 """Status of points that are not computed yet."""
 
@@ -44,7 +45,8 @@ def check_space(folder: Path, points: int, quantities: int) -> None:
         InputError: it does not.
     """
     place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
-    needed, free = points * (8 * quantities + 1), shutil.disk_usage(place).free
+    needed = points * (ROW_NUMBER.itemsize * quantities + _width(STATUS))
+    free = shutil.disk_usage(place).free
     if needed + SPARE_BYTES > free:
         raise InputError(
             f'"{folder}" has room for {free / 1e9:,.1f} GB, but {points:,} points of {quantities} quantities and a '
@@ -53,31 +55,38 @@ def check_space(folder: Path, points: int, quantities: int) -> None:
 
 
 def create(
-    path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mapping[str, Mapping[str, Any]]
+    path: Path,
+    labels: xr.Dataset,
+    dims: Sequence[str],
+    quantities: Mapping[str, Mapping[str, Any]],
+    about_status: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Make a file in which no point is computed yet.
 
     Returns:
         Its layout, as plain data for `frame_is_whole` and `run_checksum`: points, size, where the block of each
-        variable starts, and the checksum of all that is in no block.
+        variable starts (the status last), and the checksum of all that is in no block.
 
     Args:
-        path: of the file; one that is there is replaced.
+        path: path of the file; one that is there is replaced.
         labels: coordinates and attributes.
-        dims: of all variables.
-        variables: attributes of each by name; `status` is one of them, int8, the others are float64.
+        dims: dimensions of all variables.
+        quantities: attributes of each quantity by name.
+        about_status: attributes of the status.
 
     Raises:
         InputError: the folder cannot be written, or the disk is full.
     """
     points = prod(labels.sizes[dim] for dim in dims)
+    variables = {**quantities, STATUS: about_status}
     with writing(path):
-        _try_space(path, points * (8 * len(variables) - 7) + labels.nbytes + BYTES_AT_A_TIME)
+        _try_space(path, points * sum(map(_width, variables)) + labels.nbytes + BYTES_AT_A_TIME)
         labels.to_netcdf(path, engine="h5netcdf")
         with h5netcdf.File(path, "a") as file:
             for name, attributes in variables.items():
-                kind = "i1" if name == STATUS else "f8"
-                variable = file.create_variable(name, tuple(dims), kind, dcpl=_reserved_block())
+                variable = file.create_variable(
+                    name, tuple(dims), "i1" if name == STATUS else "f8", dcpl=_reserved_block()
+                )
                 for key, value in attributes.items():
                     variable.attrs[key] = value
         with path.open("r+b") as stream:
@@ -141,7 +150,7 @@ def _frame_checksum(stream: BinaryIO, layout: Mapping[str, Any]) -> str:
 
 
 def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str:
-    """Return the checksum of a run of points in a file: each variable in the order of its layout, the status last."""
+    """Return the checksum of a run of points in a file: of each variable in the order of its layout."""
     result = "0"
     for name, offset in layout["offsets"].items():
         stream.seek(offset + run.start * _width(name))
@@ -150,17 +159,17 @@ def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str
 
 
 def copy_run(
-    source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, layout_there: Mapping[str, Any], run: range
+    source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, target_layout: Mapping[str, Any], run: range
 ) -> None:
     """Copy a run of points from a file to another one, each with its layout."""
     for name, offset in layout["offsets"].items():
         source.seek(offset + run.start * _width(name))
-        target.seek(layout_there["offsets"][name] + run.start * _width(name))
+        target.seek(target_layout["offsets"][name] + run.start * _width(name))
         target.write(source.read(len(run) * _width(name)))
 
 
 def _width(name: str) -> int:
-    """Bytes of a value."""
+    """Bytes of a value of a variable."""
     return 1 if name == STATUS else ROW_NUMBER.itemsize
 
 
@@ -168,6 +177,7 @@ class ResultFile:
     """An open file, to be filled."""
 
     def __init__(self, path: Path, names: Iterable[str]) -> None:
+        """Open a file that `create` has made, with the quantities of these names."""
         self._offsets = _offsets(path, (*names, STATUS))
         self._path = path
         self._stream = path.open("r+b")
@@ -175,15 +185,13 @@ class ResultFile:
     def write(self, start: int, values: Mapping[str, AnyArray], status: AnyArray) -> str:
         """Write a run of points; when this returns it is on the disk.
 
-        The status comes last, so that a point that has one is complete.
-
         Args:
             start: number of its first point.
-            values: of each quantity [points].
-            status: codes [points].
+            values: values of each quantity [points].
+            status: `Status` codes [points].
 
         Returns:
-            The checksum of what was written, as `run_checksum`.
+            The checksum of what was written, as `run_checksum` computes it.
 
         Raises:
             InputError: the disk is full or failing.

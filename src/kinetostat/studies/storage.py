@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 PREFIX = ".kinetostat-"
 """Beginning of the names of temporary folders."""
 ABANDONED = 24 * 3600.0
-"""Age, s, after which a temporary folder counts as abandoned on systems without locks on folders."""
+"""Age, s, after which a temporary folder counts as abandoned on systems without locks on folders: no file takes
+a day to write."""
 UNLOCKED = -1
 """Takes the place of a handle on systems without locks on folders."""
 KEPT_SENTENCE = "what was written before is kept, and the same command continues from there"
@@ -50,8 +51,9 @@ REASONS = {
 LIST = "kinetostat.sha256"
 """Name of the list in its folder."""
 LIST_HEAD = "# written by kinetostat; SHA-256 of the lines below: "
+"""Beginning of the first line of the list, a comment for `sha256sum`."""
 
-Sums = dict[str, str]
+Digests = dict[str, str]
 """SHA-256 of the files of a folder by their names."""
 
 
@@ -125,20 +127,20 @@ def list_files(folder: Path, paths: Iterable[Path]) -> None:
     Raises:
         InputError: the list cannot be written.
     """
-    sums = {name: digest for name, digest in (read_list(folder) or {}).items() if (folder / name).is_file()}
-    sums |= _sums_of(folder, [path.name for path in paths if path.parent == folder])
-    if sums:
-        write_bytes(folder / LIST, _text_of_list(sums))
+    digests = {name: digest for name, digest in (read_list(folder) or {}).items() if (folder / name).is_file()}
+    digests |= _digests_of(folder, [path.name for path in paths if path.parent == folder])
+    if digests:
+        write_bytes(folder / LIST, _text_of_list(digests))
 
 
 def _unlist(path: Path) -> None:
     """Take a file out of the list of its folder, because it is about to change."""
-    sums = read_list(path.parent)
-    if sums is not None and sums.pop(path.name, ""):
-        write_bytes(path.parent / LIST, _text_of_list(sums))
+    digests = read_list(path.parent)
+    if digests is not None and digests.pop(path.name, ""):
+        write_bytes(path.parent / LIST, _text_of_list(digests))
 
 
-def read_list(folder: Path) -> Sums | None:
+def read_list(folder: Path) -> Digests | None:
     """Return what a folder's list says; None where there is none or it is damaged (see `is_damaged`)."""
     try:
         head, _, lines = (folder / LIST).read_bytes().partition(b"\n")
@@ -155,29 +157,29 @@ def is_damaged(folder: Path) -> bool:
     return (folder / LIST).exists() and read_list(folder) is None
 
 
-def _text_of_list(sums: Mapping[str, str]) -> bytes:
+def _text_of_list(digests: Mapping[str, str]) -> bytes:
     """Return a list as its file says it."""
-    lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())).encode()
+    lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(digests.items())).encode()
     return _list_head(lines) + b"\n" + lines
 
 
-def _sums_of(folder: Path, names: Iterable[str]) -> Sums:
+def _digests_of(folder: Path, names: Iterable[str]) -> Digests:
     """Return the SHA-256 of files in a folder, without those that are not there."""
-    return {name: _sum_of_file(folder / name) for name in names if (folder / name).is_file()}
+    return {name: _digest_of_file(folder / name) for name in names if (folder / name).is_file()}
 
 
 def differing(folder: Path) -> list[str]:
     """Return the names of the listed files that are missing, or are not as they were written, in order."""
     wanted = read_list(folder) or {}
-    there = _sums_of(folder, wanted)
-    return sorted(name for name in wanted if there.get(name) != wanted[name])
+    present = _digests_of(folder, wanted)
+    return sorted(name for name in wanted if present.get(name) != wanted[name])
 
 
 def _list_head(lines: bytes) -> bytes:
     return f"{LIST_HEAD}{hashlib.sha256(lines).hexdigest()}".encode()
 
 
-def _sum_of_file(path: Path) -> str:
+def _digest_of_file(path: Path) -> str:
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

@@ -24,7 +24,6 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.datasets import ABOUT_STATUS, GridQuestion, about_quantity
 from kinetostat.studies.result_file import (
-    STATUS,
     UNKNOWN,
     ResultFile,
     check_space,
@@ -37,7 +36,7 @@ from kinetostat.studies.storage import settle, writing
 from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_study, read_question, study_folder
 
 MOST_NUMBERS = 10_000_000_000
-"""Greatest number of points times quantities of one grid: 80 GB."""
+"""Greatest number of points times quantities of one grid: more than 80 GB are a slip of the pen in a count."""
 GRID_STUDY_VERSION = 1
 """Version of the question that a folder keeps."""
 LAYOUT = "layout"
@@ -133,10 +132,10 @@ def answer_into(
         missing = [number for number in range(work.count) if number not in known]
         if missing:
             if final.exists():
-                final.replace(_partial(final))
-            _compute_missing(work, missing, _partial(final), study, progress, compute)
-        if _partial(final).exists():
-            _partial(final).replace(final)
+                final.replace(partial_of(final))
+            _compute_missing(work, missing, partial_of(final), study, progress, compute)
+        if partial_of(final).exists():
+            partial_of(final).replace(final)
         records = study.records()
         summary = tally_of([records[number] for number in range(work.count)], question.names)
         return StoredGrid(question, final, summary, work.count, len(missing), repaired, layout is None)
@@ -157,7 +156,8 @@ def _check_room(question: GridQuestion, final: Path) -> None:
     check_space(final.parent, question.grid.size, len(question.names))
 
 
-def _partial(final: Path) -> Path:
+def partial_of(final: Path) -> Path:
+    """Return the path of a result until it is whole."""
     return final.with_suffix(f".partial{final.suffix}")
 
 
@@ -170,14 +170,14 @@ def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) 
         layout = _create(question, final)
         study.begin({**wanted, "chunk": work.chunk, LAYOUT: layout})
         return work, layout
-    if not final.exists() and not _partial(final).exists():
+    if not final.exists() and not partial_of(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
     return Work(work.machine, work.points, work.quantities, int(stored["chunk"])), stored.get(LAYOUT)
 
 
 def _create(question: GridQuestion, final: Path) -> Layout:
-    attributes = {**{name: about_quantity(name) for name in question.names}, STATUS: _about_status()}
-    return create(_partial(final), question.labels, question.dims, attributes)
+    quantities = {name: about_quantity(name) for name in question.names}
+    return create(partial_of(final), question.labels, question.dims, quantities, _about_status())
 
 
 def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work, layout: Layout) -> str:
@@ -185,7 +185,7 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
 
     A file whose structure is damaged is made again, and the numbers of its sound chunks are copied.
     """
-    path = final if final.exists() else _partial(final)
+    path = final if final.exists() else partial_of(final)
     records = study.records()
     lost = study.damaged
     damaged = damaged_chunks(path, layout, records, work.chunk)
@@ -194,11 +194,11 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
         broken = final.with_suffix(f".damaged{final.suffix}")
         path.replace(broken)
         fresh = _create(question, final)  # of an earlier version's file, another layout
-        with writing(path), broken.open("rb") as source, _partial(final).open("r+b") as target:
+        with writing(path), broken.open("rb") as source, partial_of(final).open("r+b") as target:
             for number in records.keys() - damaged:
                 copy_run(source, layout, target, fresh, work.part(number))
             settle(target)
-        study.state(read_question(study.path) | {LAYOUT: fresh})
+        study.write_question(read_question(study.path) | {LAYOUT: fresh})
     final.with_suffix(f".damaged{final.suffix}").unlink(missing_ok=True)
     if damaged or lost:
         study.keep(record for number, record in records.items() if number not in damaged)

@@ -19,10 +19,12 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import KEPT_SENTENCE, LIST, settle, write_text, writing
 
 QUESTION, COPY, HISTORY = "study.json", "study-copy.json", "history.jsonl"
-
-ATTEMPTS, PAUSE = 20, 0.01
-"""Attempts to take a lock before it counts as taken, and seconds between: to ask takes it for some microseconds."""
-
+"""Names of the files of a folder."""
+ATTEMPTS = 20
+"""Attempts to take a lock before it counts as taken. A process that asks whether a folder is in use holds it for some
+microseconds, so that a second attempt is mostly enough; twenty are for slow disks."""
+PAUSE = 0.01
+"""Seconds from one attempt to the next: all of them take a fifth of a second."""
 CHECK = "check"
 """Key of the checksum of a record, its last."""
 DATA = "data"
@@ -148,9 +150,8 @@ class StudyFolder:
     """
 
     def __init__(self, path: Path, history: BinaryIO) -> None:
-        self.path = path
-        self.damaged = 0
-        self._history = history
+        """Begin; the process has the lock of the history, which is open to be read and written."""
+        self.path, self.damaged, self._history = path, 0, history
 
     def question(self, wanted: Record, restated: Callable[[Record], Record]) -> Record | None:
         """Return the question that this folder answers, or None where it has none yet; check that it is the wanted one.
@@ -173,16 +174,16 @@ class StudyFolder:
                 "-o, or remove that one."
             )
         if has_checksums(stored) and (damaged_questions(self.path) or not (self.path / COPY).exists()):
-            self.state(stored)
+            self.write_question(stored)
         return stored
 
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""
         (self.path / LIST).unlink(missing_ok=True)
         self._history.truncate(0)
-        self.state(question)
+        self.write_question(question)
 
-    def state(self, question: Record) -> None:
+    def write_question(self, question: Record) -> None:
         """Write the question of this folder, and its copy."""
         text = json.dumps(_with_checksum({**question, CHECKED: "CRC-32"}), ensure_ascii=False, indent=1)
         for name in (QUESTION, COPY):

@@ -45,27 +45,29 @@ from kinetostat.vibration.servo import ClosedLoops, servo_loops, with_standing_m
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, small_motions, strain_shares
 
 MOST_SHOWN = 12
-"""Modes that are shown; higher ones add to the response all the same."""
+"""Modes that are shown, two sets of the six of a rigid platform; higher ones add to the response all the same."""
 NOTHING_RINGS = "There are no natural frequencies: all that could move is rigid."
 TOO_DIFFERENT = (
     "Nothing can be said about vibrations at this pose: the softest motion is so much softer than the others, more "
     'than 1e12 times, that round-off hides it. Write "rigid" for springs that are meant to be, or make the softest '
     "one stiffer."
 )
-DRAWN = 6
-"""Modes of which shapes are drawn, and about which responses are."""
-POINTS = 1500
-"""Frequencies of a curve, besides those about the modes."""
-NEAR = 200
-"""Frequencies about each mode."""
-WIDE = 6.0
-"""Distance of these frequencies from the mode, in multiples of its frequency and damping ratio."""
+DRAWN_MODES = 6
+"""Modes of which shapes are drawn, and about which responses are: those of a rigid platform on springs."""
+CURVE_POINTS = 1500
+"""Frequencies of a curve, besides those about the modes: as many as a printed line has dots."""
+POINTS_ABOUT_A_MODE = 200
+"""Frequencies about each mode, so that the height of its peak is met within a thousandth."""
+REACH_ABOUT_A_MODE = 6.0
+"""Distance from a mode to which these frequencies reach, in multiples of its frequency times its damping ratio: there
+the response of the mode has fallen to a sixth."""
 LEAST_DRAWN_RATIO = 1e-4
 """Damping ratio below which frequencies about a mode lie as those of this one: no picture shows a sharper peak."""
 HIGHEST = 1e20
 """Highest frequency, Hz: its square is still a number."""
-BELOW, ABOVE = 0.2, 1.6
-"""Range of the curves as multiples of the lowest and of the highest frequency that is drawn."""
+RANGE_OF_CURVES = (0.2, 1.6)
+"""Ends of the curves as multiples of the lowest and of the highest frequency that is drawn, beyond which a response has
+little but that of a spring and that of a mass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +75,13 @@ class Mode(ImmutableAnswer):
     """A natural vibration.
 
     Attributes:
-        frequency: Hz.
-        ratio: its damping ratio.
+        frequency: natural frequency, Hz.
+        ratio: damping ratio.
         tool: twist of the tool point, base axes, in motions whose mass is 1 kg: components of the machine, rad and m
             per root of a kg·m².
         direction: name of the component in which the tool moves most, turns counted at the machine's length.
-        modal_mass: of that component, kg or kg·m²: a mass on a spring of `modal_stiffness` has the same frequency.
-        modal_stiffness: N/m or N·m/rad.
+        modal_mass: mass in that component, kg or kg·m²: on a spring of `modal_stiffness` it has the same frequency.
+        modal_stiffness: stiffness in that component, N/m or N·m/rad.
         effective_mass: share of all moving mass that answers when the base shakes along x, y, z.
         strain: share of the strain energy of each spring, and of the loads, by name; they add up to 1.
         kinds: the same for all springs of one kind together, such as "actuator ×6", the greatest share first.
@@ -106,20 +108,20 @@ class Vibration(AnswerInState):
 
     Attributes:
         state: the state of the machine, with its masses.
-        status: of the pose.
-        message: what is the case, in a sentence or two.
+        status: status of the pose.
+        message: the answer in a sentence or two.
         components: names of the components of twists: rx ry rz x y z, or rz x y.
         loaded: whether the machine vibrates about its state under load.
-        modes: from the lowest frequency; none where the pose has no answer.
-        moving_mass: of all that moves, kg.
+        modes: modes from the lowest frequency; none where the pose has no answer.
+        moving_mass: mass of all that moves, kg.
         uncounted: names of the parts whose mass nothing says.
         assumed: whether the damping ratio is `ASSUMED_RATIO` because the file says nothing about damping.
         solution: all modes as they were solved for, with those without mass; None where there are none.
         damping: the damping of the modes.
-        direction: in which the tool is pushed, base axes; empty where nothing says it.
+        direction: direction in which the tool is pushed, base axes; empty where nothing says it.
         cutting_pressure: cutting force per area of the chip, N/m²; None where nothing says it.
         lowest, highest: ends of the range of the response, Hz; None for about the first six modes.
-        tool: coupled to the machine, so that responses are those of its tip; None where there is none.
+        tool: a tool that is coupled to the machine, so that responses are those of its tip; None without one.
         loops: servo loops of its drives, if they are closed: modes are then those of motors that stand still.
     """
 
@@ -160,14 +162,14 @@ class Vibration(AnswerInState):
         for place, frequency in enumerate(frequencies):
             if not abs(frequency) <= HIGHEST:
                 raise InputError(f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST:g}.")
-        given = np.asarray(frequencies, dtype=float).reshape(-1)
-        whole = receptance(solution, damping, given) if self.loops is None else self.loops.receptance(given)
+        row = np.asarray(frequencies, dtype=float).reshape(-1)
+        of_machine = receptance(solution, damping, row) if self.loops is None else self.loops.receptance(row)
         if self.tool is None:
-            return whole
+            return of_machine
         first, last = self.tool.frequencies[[0, -1]]
-        for frequency in given[(given < first) | (given > last)]:
+        for frequency in row[(row < first) | (row > last)]:
             raise InputError(f"{frequency:g} Hz is beyond what the tool tells, {first:g} to {last:g} Hz.")
-        return couple(whole, self.tool, given)
+        return couple(of_machine, self.tool, row)
 
     @checked
     def along(self, direction: Sequence[float], frequencies: Sequence[float]) -> Complex:
@@ -193,11 +195,11 @@ class Vibration(AnswerInState):
             InputError: the pose has no answer, or the direction is zero.
         """
         solution, damping = self._solution()
-        way = np.array(unit_direction(direction, "direction"))
+        unit = np.array(unit_direction(direction, "direction"))
         if self.tool is None and self.loops is None:
-            return least_real_part(solution, damping, way)
+            return least_real_part(solution, damping, unit)
         return least_real_part_of(
-            lambda frequencies: along(self.receptance(frequencies.tolist()), way), self.search_frequencies
+            lambda frequencies: along(self.receptance(frequencies.tolist()), unit), self.search_frequencies
         )
 
     @property
@@ -236,8 +238,8 @@ def modes(
     """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
 
     Args:
-        machine: with its pose, or its state, as `state_of` returns it; its masses are those of [tool], of its links
-            and of its drives.
+        machine: the machine at its pose, or its state, as `state_of` returns it; its masses are those of [tool], of its
+            links and of its drives.
         along: direction in which the tool is pushed, base axes; that of [cutting] if empty.
         cutting_pressure: cutting force per area of the chip, N/m² or with a unit; that of [cutting] if None.
         lowest, highest: ends of the range of the response, Hz or with a unit; about the first six modes if None.
@@ -329,9 +331,18 @@ def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibr
     known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
     uncounted = tuple(part.name for part in masses if part.mass is None)
     shown = tuple(_modes(machine, response, equations, solution, damping))
-    message, names = _message(machine, response, shown), machine.family.component_names
     return Vibration(
-        state, Status.OK, message, names, machine.loaded, shown, sum(known), uncounted, assumed, solution, damping
+        state=state,
+        status=Status.OK,
+        message=_message(machine, response, shown),
+        components=machine.family.component_names,
+        loaded=machine.loaded,
+        modes=shown,
+        moving_mass=sum(known),
+        uncounted=uncounted,
+        assumed=assumed,
+        solution=solution,
+        damping=damping,
     )
 
 
@@ -405,24 +416,26 @@ def _names(machine: Machine) -> dict[int, str]:
     return dict(zip(machine.family.components, machine.family.component_names, strict=True))
 
 
-def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -> Array:
+def frequency_range(answer: Vibration, points: int = CURVE_POINTS, near: int = POINTS_ABOUT_A_MODE) -> Array:
     """Frequencies for curves, close together near the modes, Hz.
 
     Args:
-        answer: with its modes and the ends of its range.
-        points: over the whole range.
-        near: about each of these modes, besides.
+        answer: the vibrations, with the ends of their range.
+        points: number of frequencies over the whole range.
+        near: number of frequencies about each of these modes, besides.
 
     Raises:
         InputError: the range of the answer and the frequencies of its tool have nothing in common.
     """
-    shown = answer.modes[:DRAWN]
-    ends = (answer.lowest or BELOW * shown[0].frequency, answer.highest or ABOVE * shown[-1].frequency)
+    drawn = answer.modes[:DRAWN_MODES]
+    below, above = RANGE_OF_CURVES
+    ends = (answer.lowest or below * drawn[0].frequency, answer.highest or above * drawn[-1].frequency)
     if answer.tool is not None:
         ends = (max(ends[0], float(answer.tool.frequencies[0])), min(ends[1], float(answer.tool.frequencies[-1])))
         if ends[0] >= ends[1]:
             raise InputError("the range of the response and the frequencies of the tool have nothing in common.")
-    about = [m.frequency * (1.0 + max(m.ratio, LEAST_DRAWN_RATIO) * np.linspace(-WIDE, WIDE, near)) for m in shown]
+    widths = np.linspace(-REACH_ABOUT_A_MODE, REACH_ABOUT_A_MODE, near)
+    about = [mode.frequency * (1.0 + max(mode.ratio, LEAST_DRAWN_RATIO) * widths) for mode in drawn]
     of_tool = [] if answer.tool is None else [answer.tool.search_frequencies]
     every = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
     return np.unique(every[(every >= ends[0]) & (every <= ends[1])])

@@ -65,7 +65,7 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
     columns = ["motors still", "loops closed, 0 Hz", "least over frequency", "at Hz"]
     table = numeric_table("Free stiffness of the tool", "", columns)
     show = answer.machine.display.show
-    rows = zip(answer.components, answer.standing, answer.static, answer.least, strict=True)
+    rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=True)
     for name, standing, static, (least, frequency) in rows:
         shown = [RIGID if math.isinf(value) else show(value, _unit(name)) for value in (standing, static, least)]
         table.add_row(name, *shown, DASH if math.isinf(least) else number(frequency, digits=3))
@@ -112,7 +112,7 @@ def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
 
 
 def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
-    rows = zip(answer.components, answer.standing, answer.static, answer.least, strict=False)
+    rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=False)
     return [
         {
             "component": name,
@@ -151,7 +151,7 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     if answer.loops is None:
         raise ValueError("there is nothing to draw")
     scale = answer.machine.display.scale("N/m")
-    stiffnesses = zip(answer.components, answer.standing, strict=True)
+    stiffnesses = zip(answer.components, answer.motors_still, strict=True)
     compliant = [name for name, stiffness in stiffnesses if not math.isinf(stiffness)]
     directions = drawn_directions(answer.direction, compliant)
     closed = answer.receptance(answer.frequencies.tolist())
@@ -201,8 +201,8 @@ SERVO = Description(
     fields=(
         *FIRST_FIELDS,
         Field("stable"),
-        Field("slowest_frequency", lambda answer: answer.slowest and answer.slowest[0], "Hz"),
-        Field("slowest_ratio", lambda answer: answer.slowest and answer.slowest[1]),
+        Field("slowest_frequency", lambda answer: answer.least_damped and answer.least_damped[0], "Hz"),
+        Field("slowest_ratio", lambda answer: answer.least_damped and answer.least_damped[1]),
         Field("damping_assumed", "assumed"),
         Records("stiffness", "row", STIFFNESS, _stiffnesses),
         Records("drives", "drive", DRIVE, _records_of_drives, forms=("json", "nc")),

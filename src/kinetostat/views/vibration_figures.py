@@ -14,7 +14,7 @@ from kinetostat.arrays import Array
 from kinetostat.display import Scale
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Configuration, Machine, setting_of
-from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
+from kinetostat.studies.vibration import DRAWN_MODES, Vibration, frequency_range
 from kinetostat.views.drawing import Points
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, new_figure
 from kinetostat.views.loaded import moved_legend, moved_machine
@@ -41,7 +41,7 @@ def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
         return {}
     response = "Motion of the tool per force along it: size, phase, real part and Nyquist curve."
     drawings = {"response": Drawing(response, partial(response_figure, answer))}
-    if any(mode.shape is not None for mode in answer.modes[:DRAWN]):
+    if any(mode.shape is not None for mode in answer.modes[:DRAWN_MODES]):
         shapes = "Shapes of the first modes over the machine at rest."
         drawings["shapes"] = Drawing(shapes, partial(shapes_figure, answer))
     return drawings
@@ -148,7 +148,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
     machine, response = answer.machine, answer.state.free
     planar = response.configuration.plane is not None
     view = _view_of(machine, response.configuration)
-    shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN], 1) if mode.shape is not None]
+    shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN_MODES], 1) if mode.shape is not None]
     columns = min(MOST_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
     across = 0.4 + 2.4 * columns
