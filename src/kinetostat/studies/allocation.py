@@ -21,6 +21,8 @@ MOST_DECIDING_POSES = 40
 """Greatest number of poses that decide an allocation together: each is added because it exceeds the wanted error."""
 ALLOWED_EXCESS = 1e-9
 """Share of the wanted error by which a pose may exceed it by round-off of the search."""
+SEARCH_OPTIONS = {"maxiter": 500, "ftol": 1e-14}
+"""The search ends where the cost changes by round-off alone, or after many times the steps that it needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class Allocation(ImmutableAnswer):
 def reach_of(inputs: RandomInputs, measures: Measures, measure: str) -> dict[str, Array]:
     """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add errors up.
 
-    A joint that a load presses to one side counts with its whole clearance.
+    A joint that a load presses to one side counts with its whole clearance, twice the limit to one side.
     """
     rows = measures.linear(inputs.columns)[:, measures.places(measure)]
     squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[:, inputs.owner], 4.0, 1.0)
@@ -87,12 +89,12 @@ def allocation_for(
     np.add.at(weights.T, owner, reaches.T)
     weights = weights / wanted**power
     costs = np.bincount(owner, [part.cost for part in parts], len(lines)).astype(float)
-    moves = weights.max(axis=0) > 0.0
+    has_effect = weights.max(axis=0) > 0.0
     present = float(weights.sum(axis=1).max())
     factors = np.full(len(lines), np.inf)
-    if moves.any():
-        factors[moves] = _least_cost(weights[:, moves], costs[moves], power)
-    even = present ** (-1.0 / power) if present else np.inf
+    if has_effect.any():
+        factors[has_effect] = _least_cost(weights[:, has_effect], costs[has_effect], power)
+    even_factor = present ** (-1.0 / power) if present else np.inf
     return Allocation(
         measure=measure,
         by=by,
@@ -103,7 +105,7 @@ def allocation_for(
         costs=costs,
         cost=float((costs / factors).sum()),
         before=float(costs.sum()),
-        evenly=float(costs.sum() / even),
+        evenly=float(costs.sum() / even_factor),
     )
 
 
@@ -127,10 +129,10 @@ def _least_cost(weights: Array, costs: Array, power: int) -> Array:
 
 def _closed_form(weights: Array, costs: Array, power: int) -> Array:
     """The factors that suit a single pose, by a Lagrange multiplier; infinite for a line that has no effect there."""
+    has_effect = weights > 0.0
     with np.errstate(divide="ignore"):
-        shape = np.where(weights > 0.0, (costs / weights) ** (1.0 / (power + 1.0)), np.inf)
-    known = weights > 0.0
-    return np.asarray(shape * float((weights[known] * shape[known] ** power).sum()) ** (-1.0 / power))
+        ratios = np.where(has_effect, (costs / weights) ** (1.0 / (power + 1.0)), np.inf)
+    return np.asarray(ratios * float((weights[has_effect] * ratios[has_effect] ** power).sum()) ** (-1.0 / power))
 
 
 def _search(weights: Array, costs: Array, power: int) -> Array:
@@ -140,15 +142,14 @@ def _search(weights: Array, costs: Array, power: int) -> Array:
         parts = costs * np.exp(-logarithms)
         return float(parts.sum() / costs.sum()), -parts / costs.sum()
 
-    def room(logarithms: Array) -> Array:
+    def spare_error(logarithms: Array) -> Array:
         return np.asarray(-np.log(weights @ np.exp(power * logarithms)))
 
-    def slope(logarithms: Array) -> Array:
+    def rates_of_spare_error(logarithms: Array) -> Array:
         amounts = weights * np.exp(power * logarithms)
         return np.asarray(-power * amounts / amounts.sum(axis=1, keepdims=True))
 
     start = np.full(len(costs), -np.log(weights.sum(axis=1).max()) / power)
-    limits = {"type": "ineq", "fun": room, "jac": slope}
-    options = {"maxiter": 500, "ftol": 1e-14}
-    solved = minimize(cost, start, jac=True, method="SLSQP", constraints=limits, options=options)
+    limits = {"type": "ineq", "fun": spare_error, "jac": rates_of_spare_error}
+    solved = minimize(cost, start, jac=True, method="SLSQP", constraints=limits, options=SEARCH_OPTIONS)
     return np.asarray(np.exp(solved.x))

@@ -32,7 +32,8 @@ from kinetostat.studies.analysis_parts import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
 
-NO_REST = "{} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
+NO_REST_SENTENCE = "{} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
+"""The answer of a machine that is meant loaded and comes to no rest; its name stands in the braces."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,9 @@ class DriveAtPose:
     """A drive at a pose.
 
     Attributes:
-        name: of the joint that it drives.
+        name: name of the joint that it drives.
         lower, upper: least and greatest load, N or N·m, positive where its joint is pulled open; infinite if not set.
-        carried: what it carries by the loads that count, N or N·m.
+        carried: load that it carries by the loads that count, N or N·m.
         speed: greatest speed, m/s or rad/s; infinite if not set.
         slides: whether it is linear.
     """
@@ -61,18 +62,18 @@ class CapabilitySet(ImmutableAnswer):
 
     Attributes:
         name: "force", "moment", "speed", "rate", "acceleration" or "angular acceleration".
-        unit: SI.
-        least: radius of the largest ball in it: what the drives allow in whichever direction; negative where they do
-            not hold the loads that count already.
-        greatest: in the best direction; infinite where structure holds it without a drive, NaN where the loads that
-            count already are not held or only just.
+        unit: unit of the amounts, SI.
+        least: radius of the largest ball in it, the amount that the drives allow in every direction; negative where
+            they do not hold the loads that count already.
+        greatest: amount in the best direction; infinite where structure holds it without a drive, NaN where the loads
+            that count already are not held or only just.
         weakest: unit vector of the direction in which it is least [3].
         limited_by: names of the drives that are at their limits there.
-        normals: of its half-spaces [m x 3].
-        bounds: of these, A x <= b [m].
+        normals: rows A of its half-spaces A x <= b [m x 3].
+        bounds: their bounds b [m].
         directions: a basis of the directions that it has, as columns [3 x k]: those in which drives limit a load, or
             structure allows a motion.
-        vertices: [n x 3]; none where it has no end, or the loads are not held.
+        vertices: its corners [n x 3]; none where it has no end, or the loads are not held.
     """
 
     name: str
@@ -95,13 +96,13 @@ class CapabilitySet(ImmutableAnswer):
         Raises:
             InputError: the direction is zero.
         """
-        way = np.array(unit_direction(direction, "direction"))
+        unit = np.array(unit_direction(direction, "direction"))
         if self.least < 0.0:
             return math.nan
-        stopped = np.linalg.norm(way - self.directions @ (self.directions.T @ way)) > DEPENDENT
-        if stopped:
+        is_outside = np.linalg.norm(unit - self.directions @ (self.directions.T @ unit)) > DEPENDENT
+        if is_outside:
             return math.inf if self.name in ("force", "moment") else 0.0
-        return reach_along(self.normals, self.bounds, way)
+        return reach_along(self.normals, self.bounds, unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +110,13 @@ class Capability(AnswerInState):
     """The forces, moments and speeds that the drives of a machine allow at its pose.
 
     Attributes:
-        state: of the machine.
-        status: of the pose.
+        state: state of the machine.
+        status: status of the pose.
         message: the answer in a sentence or two.
         drives: with their limits and what they carry.
         sets: of forces, moments, speeds, angular speeds and accelerations, as far as the file limits drives and the
             machine has them.
-        direction: that was asked for, base axes; empty if none.
+        direction: the direction that was asked for, base axes; empty if none.
     """
 
     state: MachineState
@@ -159,7 +160,7 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
     if state.status is not Status.OK:
         return Capability(state, state.status, state.refusal)
     if state.machine.loaded and not (state.at_rest is not None and state.stands):
-        return Capability(state, Status.NO_REST, NO_REST.format(state.machine.name))
+        return Capability(state, Status.NO_REST, NO_REST_SENTENCE.format(state.machine.name))
     response = _with_loads(state)
     drives = _drives(response)
     sets = []
@@ -192,12 +193,12 @@ def _with_loads(state: MachineState) -> Response:
 def _drives(response: Response) -> tuple[DriveAtPose, ...]:
     return tuple(
         DriveAtPose(
-            name_of(drive.spring),
-            float(drive.lower),
-            float(drive.upper),
-            float(carried),
-            float(drive.speed),
-            drive.spring.joint.point is None,
+            name=name_of(drive.spring),
+            lower=float(drive.lower),
+            upper=float(drive.upper),
+            carried=float(carried),
+            speed=float(drive.speed),
+            slides=drive.spring.joint.point is None,
         )
         for drive, carried in zip(response.drives, response.drive_loads, strict=True)
     )
@@ -274,24 +275,31 @@ def _set(
     """The set of all amounts a with normals a <= bounds, and how far it reaches.
 
     Args:
-        name, unit: of the amounts.
-        least: radius of the largest ball in it.
-        normals, bounds: of its faces [faces x 3], [faces].
+        name, unit: name and unit of the amounts.
+        least: radius of the largest ball in the set.
+        normals, bounds: normals and bounds of its faces [faces x 3], [faces].
         directions: an orthonormal basis of the directions that it extends in [3 x k].
-        names: of the drives that are at their bounds in each face.
+        names: names of the drives that are at their bounds in each face.
     """
     sizes = np.linalg.norm(normals, axis=1)
     reaches = bounds / sizes
     has_room = least > 0.0
-    ended = vertices((normals / sizes[:, None]) @ directions, reaches) if has_room and len(bounds) else None
-    corners = np.zeros((0, 3)) if ended is None else ended @ directions.T
-    without_end = math.inf if has_room else math.nan
-    greatest = float(np.linalg.norm(corners, axis=1).max()) if len(corners) else without_end
-    if not np.isfinite(least):
-        return CapabilitySet(name, unit, least, greatest, np.zeros(0), (), normals, bounds, directions, corners)
-    worst = int(np.argmin(reaches))
-    weakest = normals[worst] / sizes[worst]
-    return CapabilitySet(name, unit, least, greatest, weakest, names[worst], normals, bounds, directions, corners)
+    in_directions = vertices((normals / sizes[:, None]) @ directions, reaches) if has_room and len(bounds) else None
+    corners = np.zeros((0, 3)) if in_directions is None else in_directions @ directions.T
+    without_corners = math.inf if has_room else math.nan
+    worst = int(np.argmin(reaches)) if np.isfinite(least) else None
+    return CapabilitySet(
+        name=name,
+        unit=unit,
+        least=least,
+        greatest=float(np.linalg.norm(corners, axis=1).max()) if len(corners) else without_corners,
+        weakest=np.zeros(0) if worst is None else normals[worst] / sizes[worst],
+        limited_by=() if worst is None else names[worst],
+        normals=normals,
+        bounds=bounds,
+        directions=directions,
+        vertices=corners,
+    )
 
 
 def _row_space(matrix: Array) -> Array:
@@ -302,17 +310,17 @@ def _row_space(matrix: Array) -> Array:
     return np.asarray(rows[values > DEPENDENT * values[0]].T)
 
 
-def _motions(given: Transmission, block: str) -> tuple[Array, Array] | None:
+def _motions(transmission: Transmission, block: str) -> tuple[Array, Array] | None:
     """The motions of the platform in a block that structure allows, and the rates of the drives.
 
     Returns:
         An orthonormal basis of the motions [3 x k], and the rates per unit of each component of the block, along these
         motions [drives x 3]; None where there are none, or the rates of the drives do not follow from them.
     """
-    if given.wrenches is None:
+    if transmission.wrenches is None:
         return None
-    stopped, driven = (_block_of(some, block) for some in (given.constraints, given.wrenches))
-    directions = _null_space(stopped, given, block)
+    stopped, driven = (_block_of(some, block) for some in (transmission.constraints, transmission.wrenches))
+    directions = _null_space(stopped, transmission, block)
     return (directions, driven @ directions @ directions.T) if directions.shape[1] else None
 
 
@@ -321,9 +329,9 @@ def _block_of(wrenches: Sequence[Wrench], block: str) -> Array:
     return np.array([wrench.components() for wrench in wrenches], dtype=float).reshape(-1, 6)[:, BLOCKS[block]]
 
 
-def _null_space(stopped: Array, given: Transmission, block: str) -> Array:
+def _null_space(stopped: Array, transmission: Transmission, block: str) -> Array:
     """An orthonormal basis of the directions that no wrench of structure stops [3 x k]."""
-    scaled = stopped / float(given.length) if block == "rotation" else stopped
+    scaled = stopped / float(transmission.length) if block == "rotation" else stopped
     if not len(scaled):
         return np.eye(3)
     _, values, rows = np.linalg.svd(scaled)

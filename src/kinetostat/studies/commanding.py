@@ -39,7 +39,7 @@ from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
 POSES_IN_SLAB = Way.ANY_MACHINE.slab
-"""Number of poses that are solved together."""
+"""Number of poses that are solved together: as many as of any other states of rest."""
 
 
 @dataclass(frozen=True)
@@ -119,18 +119,23 @@ def actuator_targets(
 
 
 def _concatenation(slabs: list[ActuatorTargets]) -> ActuatorTargets:
-    return ActuatorTargets(
-        slabs[0].actuators, *(np.concatenate([getattr(slab, name) for slab in slabs]) for name in TARGET_ARRAYS)
-    )
+    arrays = {name: np.concatenate([getattr(slab, name) for slab in slabs]) for name in TARGET_ARRAYS}
+    return ActuatorTargets(actuators=slabs[0].actuators, **arrays)
 
 
 def _empty_targets(actuators: tuple[Actuator, ...], status: Integers) -> ActuatorTargets:
     """The answer where no pose has a command."""
     count, size = len(status), len(actuators)
-    coordinates, unloaded = np.full((2, count, size), np.nan)
-    before, left, turned = np.full((3, count), np.nan)
-    rates = np.full((count, 3, size), np.nan)
-    return ActuatorTargets(actuators, coordinates, unloaded, before, left, turned, rates, status)
+    return ActuatorTargets(
+        actuators=actuators,
+        coordinates=np.full((count, size), np.nan),
+        unloaded=np.full((count, size), np.nan),
+        before=np.full(count, np.nan),
+        left=np.full(count, np.nan),
+        turned=np.full(count, np.nan),
+        rates=np.full((count, 3, size), np.nan),
+        status=status,
+    )
 
 
 def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int) -> ActuatorTargets:
@@ -163,19 +168,27 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
         return _empty_targets((), status)
     length = mechanism.length
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
-    answer = commanded_state(mechanism)
-    equations = answer.solution.balance
-    stable = answer.solution.settled & stabilities(equations).stable
-    before, left = (np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (answer.before, answer.off))
+    commanded = commanded_state(mechanism)
+    equations = commanded.solution.balance
+    stable = commanded.solution.settled & stabilities(equations).stable
+    before, left = (np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (commanded.before, commanded.off))
     left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
-    turned = np.linalg.norm(answer.off[:, :3], axis=1)
-    rates = answer.rates[:, 3:] * (length[:, None] / units)[:, None]
-    numbers = stands + equations.state.amounts * units, stands, before, left, turned, rates
-    coordinates, unloaded, before, left, turned, rates = (
-        np.where(stable.reshape(-1, *[1] * (each.ndim - 1)), each, np.nan) for each in numbers
+    turned = np.linalg.norm(commanded.off[:, :3], axis=1)
+    rates = commanded.rates[:, 3:] * (length[:, None] / units)[:, None]
+
+    def where_stable(array: Array) -> Array:
+        return np.where(stable.reshape(-1, *[1] * (array.ndim - 1)), array, np.nan)
+
+    return ActuatorTargets(
+        actuators=tuple(actuators),
+        coordinates=where_stable(stands + equations.state.amounts * units),
+        unloaded=where_stable(stands),
+        before=where_stable(before),
+        left=where_stable(left),
+        turned=where_stable(turned),
+        rates=where_stable(rates),
+        status=np.where(stable, Status.OK, status).astype(np.int64),
     )
-    status = np.where(stable, Status.OK, status).astype(np.int64)
-    return ActuatorTargets(tuple(actuators), coordinates, unloaded, before, left, turned, rates, status)
 
 
 def _actuators(
@@ -370,9 +383,9 @@ def without_command(machine: Machine, columns: Mapping[str, Array], status: Inte
         status: `Status` codes [n], not all of them OK.
     """
     lost = np.flatnonzero(status != Status.OK)
-    here = with_values(machine, {path: float(column[lost[0]]) for path, column in columns.items()})
+    machine_there = with_values(machine, {path: float(column[lost[0]]) for path, column in columns.items()})
     first = Status(int(status[lost[0]]))
-    reason = first.sentence if first is Status.NO_REST else state_of(here).refusal
+    reason = first.sentence if first is Status.NO_REST else state_of(machine_there).refusal
     if len(status) == 1:
         return reason
     has = "has" if len(lost) == 1 else "have"

@@ -13,7 +13,7 @@ Source: theory (46) and (51), and theory section 12.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -47,7 +47,7 @@ UPRIGHT = math.pi / 2.0
 USUAL_RANGE = "0 deg:90 deg:7"
 """Elevations of a telescope, from the horizon to the zenith."""
 LEAST_POINTS, MOST_POINTS = 3, 1000
-"""Elevations: three give a curve a + b cos + c sin."""
+"""Number of elevations: three give a curve a + b cos + c sin, and more than a thousand are a slip of the pen."""
 FREQUENCY = "loaded_frequency_1"
 """Name of the first natural frequency about the state at rest."""
 DIGITS_OF_ELEVATION = 9
@@ -63,12 +63,12 @@ class Reversal:
     """Parts of a leg between which the load reverses at an elevation.
 
     Attributes:
-        elevation: rad.
-        leg: its name.
+        elevation: the elevation, rad.
+        leg: name of the leg.
         parts: joints and drives of the leg that reverse there.
         jump: motion of the tool point while they cross their clearances and backlash, m; None where the file gives
             none of these.
-        turn: rotation of the platform meanwhile, rad; None likewise.
+        turn: rotation of the platform meanwhile, rad; None where `jump` is None.
     """
 
     elevation: float
@@ -85,8 +85,8 @@ class Elevation(AnswerInState):
     Attributes:
         state: the state of the machine as it stands upright.
         status: worst `Status` of all elevations.
-        message: what is the case at elevations without a result; empty where all have one.
-        elevations: rad [n].
+        message: the elevations without a result, with the reasons; empty where all have one.
+        elevations: the elevations, rad [n].
         statuses: `Status` codes [n].
         components: names of the components of the displacement.
         displacement: rotation vector and displacement of the tool point [n x components]; NaN without rest.
@@ -260,34 +260,22 @@ def _limit_use(states: MachineState, loads: Array) -> Array:
 def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reversal, ...]:
     """Find where the loads of drives and joints pass zero while gravity turns.
 
-    Between two angles at which a part is pressed, to opposite sides, its load passes zero. What is left of the load
-    along the direction in which it changes is then a + b cos + c sin, which `_zero` solves.
-
     Args:
         model: the errors of the machine, whose free motions are those of its joints and drives, at n angles.
-        angles: of gravity, rad [n].
-        machine: with its tolerances and backlash.
+        angles: angles of gravity, rad [n].
+        machine: the machine with its tolerances and backlash.
     """
     rates = model.rates()
     if not np.isfinite(rates).all():
         return ()
     reactions = np.einsum("nie,ni->ne", rates, model.drawn.load)
     # The most work that any motion of a length can do: a reaction far below it is round-off.
-    most = np.abs(model.drawn.load[:, 3:]).sum() + np.abs(model.drawn.load[:, :3]).sum() / model.length
-    waves = np.stack([np.ones(len(angles)), np.cos(angles), np.sin(angles)], axis=1)
+    most_work = np.abs(model.drawn.load[:, 3:]).sum() + np.abs(model.drawn.load[:, :3]).sum() / model.length
     gaps = _gaps(model, machine)
     parts_by_place: dict[tuple[str, float], list[_ReversedPart]] = {}
     for (leg, part), places in _free_motions(model).items():
-        reaction = reactions[:, places]
-        curves = np.linalg.lstsq(waves, reaction, rcond=None)[0]
-        pressed = np.flatnonzero(np.linalg.norm(reaction, axis=1) > NO_REACTION * most)
-        for before, after in pairwise(pressed.tolist()):
-            if reaction[before] @ reaction[after] >= 0.0:
-                continue
-            change = reaction[before] - reaction[after]
-            direction = change / np.linalg.norm(change)
-            angle = _zero(curves @ direction, angles[before], angles[after])
-            gap = gaps.get((leg, part))
+        gap = gaps.get((leg, part))
+        for angle, direction in _zeros_of_reaction(reactions[:, places], angles, NO_REACTION * most_work):
             twist = None if gap is None else rates[0][:, places] @ (direction * gap)
             height = round(UPRIGHT - angle, DIGITS_OF_ELEVATION)
             parts_by_place.setdefault((leg, height), []).append(_ReversedPart(part, twist))
@@ -295,12 +283,33 @@ def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reve
     return tuple(sorted(reversals, key=lambda reversal: reversal.elevation))
 
 
+def _zeros_of_reaction(reaction: Array, angles: Array, round_off: float) -> Iterator[tuple[float, Array]]:
+    """The angles at which a part crosses its clearance, each with the unit direction in which its reaction changes.
+
+    Between two angles at which a part is pressed, to opposite sides, its load passes zero. What is left of the load
+    along the direction in which it changes is then a + b cos + c sin, which `_zero` solves.
+
+    Args:
+        reaction: reaction of the part along its free motions at each angle [n x motions].
+        angles: angles of gravity, rad [n].
+        round_off: size of a reaction that is none.
+    """
+    waves = np.stack([np.ones(len(angles)), np.cos(angles), np.sin(angles)], axis=1)
+    curves = np.linalg.lstsq(waves, reaction, rcond=None)[0]
+    pressed = np.flatnonzero(np.linalg.norm(reaction, axis=1) > round_off)
+    for before, after in pairwise(pressed.tolist()):
+        if reaction[before] @ reaction[after] < 0.0:
+            change = reaction[before] - reaction[after]
+            direction = change / np.linalg.norm(change)
+            yield _zero(curves @ direction, angles[before], angles[after]), direction
+
+
 @dataclass(frozen=True)
 class _ReversedPart:
     """A joint or drive whose load reverses.
 
     Attributes:
-        name: of the joint or drive.
+        name: name of the joint or drive.
         twist: motion of the platform while it crosses its clearance, rad and m [6]; None where it has none.
     """
 
@@ -321,7 +330,7 @@ def _free_motions(model: ErrorModel) -> dict[tuple[str, str], list[int]]:
 
 
 def _gaps(model: ErrorModel, machine: Machine) -> dict[tuple[str, str], float]:
-    """From one end to the other of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
+    """Distance between the ends of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
     gaps: dict[tuple[str, str], float] = {}
     plays = {
         name_of(spring): float(play(machine, spring)) for spring in driven_springs(state_of(machine).configuration)
@@ -352,12 +361,15 @@ def _zero(curve: Array, start: float, end: float) -> float:
 
 def _reversal(leg: str, height: float, parts: Sequence[_ReversedPart]) -> Reversal:
     """The reversal of all parts of a leg that reverse at an elevation, rad: their motions of the tool add up."""
-    names = tuple(part.name for part in parts)
     twists = [part.twist for part in parts if part.twist is not None]
-    if not twists:
-        return Reversal(height, leg, names, None, None)
-    twist = np.sum(twists, axis=0)
-    return Reversal(height, leg, names, float(np.linalg.norm(twist[3:])), float(np.linalg.norm(twist[:3])))
+    twist = np.sum(twists, axis=0) if twists else None
+    return Reversal(
+        elevation=height,
+        leg=leg,
+        parts=tuple(part.name for part in parts),
+        jump=None if twist is None else float(np.linalg.norm(twist[3:])),
+        turn=None if twist is None else float(np.linalg.norm(twist[:3])),
+    )
 
 
 def _requirements(
