@@ -19,8 +19,10 @@ from kinetostat.tolerances import BALANCED, INDEPENDENT_CONDITION, SAME_FORCE, S
 
 MOST_CHANGES = 200
 """Greatest number of changes of the set of forces at their bounds: many times the number of cables of a machine."""
-MOST_POWER_STEPS, MOST_HALVINGS = 100, 30
-"""Greatest number of steps of Newton's method for powers, and of halvings of one of its steps."""
+MOST_POWER_STEPS = 100
+"""Greatest number of steps of Newton's method for powers, many times those that a high power takes."""
+MOST_HALVINGS = 30
+"""Greatest number of halvings of one of these steps: after as many it is round-off."""
 LEAST_CURVATURE = 1e-12
 """Least curvature of the cost by a force, beside 1 for the force that is farthest from the wanted level: a higher power
 is flat at the level itself."""
@@ -30,15 +32,15 @@ NO_CONDITION = -1
 
 @dataclass(frozen=True)
 class Balancing:
-    """All forces that balance the loads of n problems: given + internal z, for any z.
+    """All forces that balance the loads of n problems: smallest + internal z, for any z.
 
     Attributes:
-        given: forces of least norm that balance [n x m].
+        smallest: forces of least norm that balance [n x m].
         internal: orthonormal internal forces, as columns [n x m x r].
-        sure: whether `given` surely balances the load, and there are surely no other internal forces [n].
+        sure: whether `smallest` surely balances the load, and there are surely no other internal forces [n].
     """
 
-    given: Array
+    smallest: Array
     internal: Array
     sure: Mask
 
@@ -89,10 +91,10 @@ def balancing_of_any_rank(matrix: Array, load: Array, scale: float) -> Balancing
     """
     across, sizes, along = np.linalg.svd(matrix)
     rank = int((sizes > UNRESISTED * sizes.max(initial=0.0)).sum())
-    given = along[:rank].T @ ((across[:, :rank].T @ load) / sizes[:rank])
-    left = np.abs(matrix @ given - load).max(initial=0.0)
-    balances = left <= BALANCED * max(np.abs(load).max(initial=0.0), scale)
-    return Balancing(given[None], along[rank:].T[None], np.array([balances]))
+    smallest = along[:rank].T @ ((across[:, :rank].T @ load) / sizes[:rank])
+    residual = np.abs(matrix @ smallest - load).max(initial=0.0)
+    balances = residual <= BALANCED * max(np.abs(load).max(initial=0.0), scale)
+    return Balancing(smallest[None], along[rank:].T[None], np.array([balances]))
 
 
 @dataclass(frozen=True)
@@ -127,9 +129,9 @@ def distribution(matrix: Array, load: Array, least: Array, most: Array, rule: Ru
     with np.errstate(all="ignore"):
         balances = balancing(matrix, load)
     usable = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(load).all(axis=1)
-    forces, exist = np.full(balances.given.shape, np.nan), np.zeros(len(load), dtype=bool)
+    forces, exist = np.full(balances.smallest.shape, np.nan), np.zeros(len(load), dtype=bool)
     rows = np.flatnonzero(usable & balances.sure)
-    regular = Balancing(balances.given[rows], balances.internal[rows], balances.sure[rows])
+    regular = Balancing(balances.smallest[rows], balances.internal[rows], balances.sure[rows])
     forces[rows], exist[rows] = within_bounds(regular, least[rows], most[rows], rule.at(rows))
     for row in np.flatnonzero(usable & ~balances.sure):
         special = balancing_of_any_rank(matrix[row], load[row], float(least[row]))
@@ -141,7 +143,7 @@ def distribution(matrix: Array, load: Array, least: Array, most: Array, rule: Ru
 def within_bounds(balances: Balancing, least: Array, most: Array, rule: Rule) -> tuple[Array, Mask]:
     """Choose among all forces that balance a load; arguments and results as for `distribution`."""
     internal = balances.internal
-    start = balances.given + np.einsum("nmr,nr->nm", internal, rule.level[:, None] * internal.sum(axis=1))
+    start = balances.smallest + np.einsum("nmr,nr->nm", internal, rule.level[:, None] * internal.sum(axis=1))
     inner, exist = _shortest_into_bounds(internal, start, least, most)
     forces = start + np.einsum("nmr,nr->nm", internal, inner)
     forces[~exist] = np.nan
@@ -155,35 +157,42 @@ def _by_power(internal: Array, forces: Array, least: Array, most: Array, rule: R
     """Forces with the least sum of powers, by Newton's method from forces within the bounds.
 
     Each step is the least one of squares with the curvatures as weights, within the bounds; it is halved until it leads
-    to a lesser sum, which a convex sum allows.
+    to a lesser sum, as some step along it does because the sum is convex.
     """
     forces, rows = forces.copy(), np.arange(len(forces))
     scale = np.maximum(np.abs(forces - rule.level[:, None]).max(axis=1), np.maximum(least, np.abs(rule.level)))
     for _ in range(MOST_POWER_STEPS):
-        ways, before = internal[rows], forces[rows]
-        level, p = rule.level[rows, None], rule.exponent[rows, None]
-        size = np.abs(before - level).max(axis=1, keepdims=True)
-        apart = (before - level) / np.where(size > 0.0, size, 1.0)
-        curved = (p - 1.0) * np.abs(apart) ** (p - 2.0) + LEAST_CURVATURE
-        slope = np.einsum("nmr,nm->nr", ways, np.abs(apart) ** (p - 2.0) * apart)
-        factor = np.linalg.cholesky(np.einsum("nmr,nm,nms->nrs", ways, curved, ways))
-        scaled = np.linalg.solve(factor, ways.transpose(0, 2, 1)).transpose(0, 2, 1)
-        down = -size * np.linalg.solve(factor, slope[:, :, None])[:, :, 0]
-        wanted: Array = before + np.einsum("nmr,nr->nm", scaled, down)
-        into_bounds, _ = _shortest_into_bounds(np.asarray(scaled), np.asarray(wanted), least[rows], most[rows])
-        step: Array = wanted + np.einsum("nmr,nr->nm", scaled, into_bounds) - before
-        cost = (np.abs(apart) ** p).sum(axis=1)
-        for _ in range(MOST_HALVINGS):
-            powers = np.abs((before + step - level) / np.where(size > 0.0, size, 1.0)) ** p
-            worse = powers.sum(axis=1) > cost
-            if not worse.any():
-                break
-            step[worse] *= 0.5
+        before = forces[rows]
+        step = _step_of_powers(internal[rows], before, least[rows], most[rows], rule.at(rows))
         forces[rows] = before + step
         rows = rows[np.abs(step).max(axis=1) > SAME_FORCE * scale[rows]]
         if not len(rows):
             break
     return forces
+
+
+def _step_of_powers(internal: Array, forces: Array, least: Array, most: Array, rule: Rule) -> Array:
+    """A step of Newton's method for powers within the bounds, halved until the sum is less [n x m]."""
+    level, p = rule.level[:, None], rule.exponent[:, None]
+    size = np.abs(forces - level).max(axis=1, keepdims=True)
+    size_or_one = np.where(size > 0.0, size, 1.0)
+    distance = (forces - level) / size_or_one
+    curvature = (p - 1.0) * np.abs(distance) ** (p - 2.0) + LEAST_CURVATURE
+    slope = np.einsum("nmr,nm->nr", internal, np.abs(distance) ** (p - 2.0) * distance)
+    # With the factor of the curvatures, the least step by these weights is the shortest one.
+    factor = np.linalg.cholesky(np.einsum("nmr,nm,nms->nrs", internal, curvature, internal))
+    scaled = np.linalg.solve(factor, internal.transpose(0, 2, 1)).transpose(0, 2, 1)
+    descent = -size * np.linalg.solve(factor, slope[:, :, None])[:, :, 0]
+    unbounded: Array = forces + np.einsum("nmr,nr->nm", scaled, descent)
+    into_bounds, _ = _shortest_into_bounds(np.asarray(scaled), np.asarray(unbounded), least, most)
+    step: Array = unbounded + np.einsum("nmr,nr->nm", scaled, into_bounds) - forces
+    cost = (np.abs(distance) ** p).sum(axis=1)
+    for _ in range(MOST_HALVINGS):
+        worse = (np.abs((forces + step - level) / size_or_one) ** p).sum(axis=1) > cost
+        if not worse.any():
+            break
+        step[worse] *= 0.5
+    return step
 
 
 def _shortest_into_bounds(internal: Array, start: Array, least: Array, most: Array) -> tuple[Array, Mask]:

@@ -19,11 +19,13 @@ from kinetostat.tolerances import NO_ROLE
 DECIDING_SHARE = 0.01
 """Share of an entry of C from which on an element is named as one that decides it."""
 RATIO_OF_LIMITS = 10.0
-"""Ratio of limits of rigidity above which directions get a limit each."""
+"""Ratio of limits of rigidity above which directions get a limit each; within it, the greatest serves for all."""
 LEAST_EFFECT = 0.005
-"""Percent per percent below which a sentence says that a parameter has no effect."""
+"""Percent per percent below which a sentence says that a parameter has no effect: some hundredth of a usual effect."""
 MOST_PARAMETERS = 8
-"""Parameters that have a sentence, those with the largest effect."""
+"""Parameters that have a sentence, those with the largest effect: more sentences nobody reads; the table has all."""
+WHOLE_PERCENTS = 9.5
+"""Percent from which a share is written without a decimal, so that it has two digits."""
 WITHOUT_NOUN = ("proximal", "distal", "upper", "lower", "inner", "outer")
 """Labels of links that need the word "links" in a sentence."""
 
@@ -57,44 +59,45 @@ def statements(answer: Guidelines) -> list[Statement]:
 
 def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """Statements on the elements from which the compliance of each direction comes; alike directions share one."""
-    single, over = _single_elements(answer), answer.over_grid
+    single, over = _elements_without_parts(answer), answer.over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
     for i in _compliant_directions(here):
         mask = here.shares[single, i] >= DECIDING_SHARE
-        holds = None if over is None else _share_of((over.shares[single, i] >= DECIDING_SHARE) == mask)
+        holds = None if over is None else _share_of_poses((over.shares[single, i] >= DECIDING_SHARE) == mask)
         groups.setdefault((mask.tobytes(), holds), []).append(i)
     for (_, holds), directions in groups.items():
         shares = here.shares[single][:, directions, 0]
         deciding = [
-            f"{_the(answer, k)} ({_percents(row.min(), row.max())})"
+            f"{_name_in_sentence(answer, k)} ({_percents(row.min(), row.max())})"
             for k, row in zip(single, shares, strict=True)
             if row.max() >= DECIDING_SHARE
         ]
-        silent = [_the(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
-        aside = f", not from {_list_of(silent, 'or')}" if silent else ""
-        text = f"{_where(answer, directions)} the compliance comes from {_list_of(deciding)}{aside}."
-        yield Statement("compliance", _capital(text), holds)
+        silent = [_name_in_sentence(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
+        aside = f", not from {_enumeration(silent, 'or')}" if silent else ""
+        text = f"{_directions_in_words(answer, directions)} the compliance comes from {_enumeration(deciding)}{aside}."
+        yield Statement("compliance", _capitalised(text), holds)
     for word, extreme in (("rigid", 0.0), ("free", math.inf)):
         directions = [i for i, c in enumerate(answer.compliance_diagonal) if c == extreme]
         if directions:
-            yield Statement("compliance", f"The platform is {word} {_where(answer, directions)}.", None)
+            yield Statement("compliance", f"The platform is {word} {_directions_in_words(answer, directions)}.", None)
 
 
 def _weakest_elements(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
-    single, over = _single_elements(answer), answer.over_grid
+    single, over = _elements_without_parts(answer), answer.over_grid
     if not single:
         return
-    best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
+    best, gains = _most_gaining(here.gains[single])[:, 0], here.gains[single, :, 0]
     for k in dict.fromkeys(best[_compliant_directions(here)].tolist()):
         directions = [i for i in _compliant_directions(here) if best[i] == k]
-        row, many = gains[k, directions], _many(answer.elements[single[k]])
+        row, plural = gains[k, directions], _is_plural(answer.elements[single[k]])
         text = (
-            f"{_where(answer, directions)} {_the(answer, single[k])} {'are' if many else 'is'} weakest: doubling "
-            f"{'their' if many else 'its'} stiffness would cut the compliance by {_percents(row.min(), row.max())}."
+            f"{_directions_in_words(answer, directions)} {_name_in_sentence(answer, single[k])} "
+            f"{'are' if plural else 'is'} weakest: doubling {'their' if plural else 'its'} stiffness would cut the "
+            f"compliance by {_percents(row.min(), row.max())}."
         )
-        holds = None if over is None else _share_of(_first(over.gains[single])[directions] == k)
-        yield Statement("weakest", _capital(text), holds)
+        holds = None if over is None else _share_of_poses(_most_gaining(over.gains[single])[directions] == k)
+        yield Statement("weakest", _capitalised(text), holds)
 
 
 def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
@@ -106,16 +109,16 @@ def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
         clauses = []
         for directions in _clusters(factors):
             most = max(factors[i] for i in directions)
-            where = _where(answer, directions)
+            where = _directions_in_words(answer, directions)
             clauses.append(
-                f"{where} from {_stiffness(answer, element, most)} on"
+                f"{where} from {_limit_in_words(answer, element, most)} on"
                 if most < math.inf
                 else f"never {where}, where nothing else is compliant"
             )
         finite = [factor for factor in factors.values() if factor < math.inf]
         against = _against_actuators(answer, element, max(finite)) if finite else ""
-        counts = f"{_capital(_the(answer, k))} {'count' if _many(element) else 'counts'}"
-        text = f"{counts} as rigid {'; '.join(clauses)}.{against}{_at_worst(answer, k, list(factors))}"
+        counts = f"{_capitalised(_name_in_sentence(answer, k))} {'count' if _is_plural(element) else 'counts'}"
+        text = f"{counts} as rigid {'; '.join(clauses)}.{against}{_limit_over_grid(answer, k, list(factors))}"
         yield Statement("rigid", text, None)
 
 
@@ -130,7 +133,7 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
     return [sorted(group) for group in groups]
 
 
-def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
+def _limit_over_grid(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     """A sentence on the limit that is enough at every pose of the grid, in those directions in which there is one."""
     over = answer.over_grid
     if over is None:
@@ -139,8 +142,8 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     finite = [i for i in directions if most[i] < math.inf]
     if not finite:
         return ""
-    limit = _stiffness(answer, answer.elements[k], max(most[i] for i in finite))
-    return f" At every pose of the grid {_where(answer, finite)} from {limit} on."
+    limit = _limit_in_words(answer, answer.elements[k], max(most[i] for i in finite))
+    return f" At every pose of the grid {_directions_in_words(answer, finite)} from {limit} on."
 
 
 def _effects_of_parameters(answer: Guidelines) -> Iterator[Statement]:
@@ -176,14 +179,14 @@ def share_with_same_signs(effect: ParameterEffect) -> float | None:
     return min(shares, default=None)
 
 
-def _single_elements(answer: Guidelines) -> list[int]:
+def _elements_without_parts(answer: Guidelines) -> list[int]:
     """Numbers of the elements that are not made of others."""
-    taken: set[int] = set()
+    springs_before: set[int] = set()
     single = []
     for k, element in enumerate(answer.elements):
-        if not taken.issuperset(element.springs):
+        if not springs_before.issuperset(element.springs):
             single.append(k)
-        taken.update(element.springs)
+        springs_before.update(element.springs)
     return single
 
 
@@ -192,25 +195,25 @@ def _compliant_directions(roles: Roles) -> list[int]:
     return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
 
 
-def _share_of(true: Mask) -> float:
+def _share_of_poses(true: Mask) -> float:
     """Share of the poses at which all rows [rows x poses] are true."""
     return float(true.all(axis=0).mean())
 
 
-def _first(gains: Array) -> Integers:
+def _most_gaining(gains: Array) -> Integers:
     """The number of the element that gains most [components x poses]; the first one if several gain alike."""
     return np.asarray(np.nan_to_num(gains).round(6).argmax(axis=0))
 
 
 def _percents(least: float, most: float) -> str:
-    low, high = (f"{100 * x:.0f}" if 100 * x >= 9.5 else f"{100 * x:.2g}" for x in (least, most))
+    low, high = (f"{100 * x:.0f}" if 100 * x >= WHOLE_PERCENTS else f"{100 * x:.2g}" for x in (least, most))
     return f"{high}\N{NO-BREAK SPACE}%" if low == high else f"{low} to {high}\N{NO-BREAK SPACE}%"
 
 
-def _stiffness(answer: Guidelines, element: Element, factor: float) -> str:
+def _limit_in_words(answer: Guidelines, element: Element, factor: float) -> str:
     """A limit as a stiffness with its unit, and as a multiple of the present one."""
     if element.stiffness is None:
-        return f"{factor:.3g} times {'their' if _many(element) else 'its'} present stiffness"
+        return f"{factor:.3g} times {'their' if _is_plural(element) else 'its'} present stiffness"
     now = "" if element.stiffness == math.inf else f" ({factor:.3g} times now)"
     return f"{answer.machine.display.show(limit_of(element.stiffness, factor), element.unit)}{now}"
 
@@ -231,17 +234,17 @@ def limit_of(stiffness: float, factor: float) -> float:
     return factor if stiffness == math.inf else stiffness * factor
 
 
-def _many(element: Element) -> bool:
+def _is_plural(element: Element) -> bool:
     """Whether an element has several parts; a sentence about it is then in the plural."""
     return len(element.parts) > 1
 
 
-def _the(answer: Guidelines, k: int) -> str:
+def _name_in_sentence(answer: Guidelines, k: int) -> str:
     """An element as a sentence names it: "the actuators", "passive link 1", "all links together"."""
     element = answer.elements[k]
     if element.name == LINKS_TOGETHER:
         return "all links together"
-    if not _many(element):
+    if not _is_plural(element):
         return element.name
     label = element.name.partition(" ×")[0]
     ending = "" if label.endswith("s") else "es" if label.endswith(("ch", "sh", "x")) else "s"
@@ -250,18 +253,18 @@ def _the(answer: Guidelines, k: int) -> str:
     return f"the {noun}" if len(alike) == 1 else f"the {len(element.parts)} {noun}"
 
 
-def _where(answer: Guidelines, directions: Sequence[int]) -> str:
+def _directions_in_words(answer: Guidelines, directions: Sequence[int]) -> str:
     """Directions as a sentence names them: "about x and z", "along y", "in every direction"."""
     if len(directions) == len(answer.components) > 1:
         return "in every direction"
     names = [answer.components[i] for i in directions]
     about, along = [name[1:] for name in names if len(name) == 2], [name for name in names if len(name) == 1]
-    return " and ".join([f"{word} {_list_of(axes)}" for word, axes in (("about", about), ("along", along)) if axes])
+    return " and ".join([f"{word} {_enumeration(axes)}" for word, axes in (("about", about), ("along", along)) if axes])
 
 
-def _list_of(words: Sequence[str], last: str = "and") -> str:
+def _enumeration(words: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _capital(text: str) -> str:
+def _capitalised(text: str) -> str:
     return text[0].upper() + text[1:]

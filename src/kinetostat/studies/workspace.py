@@ -44,16 +44,17 @@ COLOURING_QUANTITY = "least_translational_stiffness"
 SHOWN = ("singularity_margin", COLOURING_QUANTITY)
 """Quantities of the free machine that a workspace has at its nodes, whatever judges these."""
 BORDER_VARIABLES = "border_"
+"""Beginning of the names of the variables of borders, one for each axis."""
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
+"""What these variables hold; the name of the axis follows."""
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
 HALF_STEP = 0.5001
 """Distance from a node, in steps of the grid, within which a pose belongs to it, with some room for round-off."""
 MOST_DEMANDS = 200_000
-"""Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
-
-
+"""Inside nodes at which lengths, angles and loads are computed, in a second; of more nodes, evenly chosen ones."""
 UNIT_POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
+"""Signs of the powers of a unit in the unit of a volume."""
 FEWEST_CELLS = 30
 """Fewest cells from which a standard error is estimated. With fewer, both points of every cell often agree by chance,
 and the error would come out as 0."""
@@ -70,7 +71,7 @@ class Volume:
         box: volume of all cells together.
         cells: number of cells.
         divided: number of cells in which one point is inside and the other outside.
-        unknown_cells: number of cells with a point of which nobody knows whether it is inside; such a point counts as
+        unknown_cells: number of cells with a point of which it is unknown whether it is inside; such a point counts as
             outside.
     """
 
@@ -93,6 +94,7 @@ class Volume:
 
 
 METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
+"""The way in which volumes are estimated, for files."""
 
 
 def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: Sequence[str]) -> Volume:
@@ -105,7 +107,7 @@ def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: 
 
     Args:
         inside: whether each point lies in the region; the two points of a cell follow one another [2 x cells].
-        unknown: whether nobody knows that; such points are not inside [2 x cells].
+        unknown: whether it is unknown if a point lies in it; such points are not inside [2 x cells].
         sizes: size of the box along each axis, SI.
         units: units of the axes.
 
@@ -132,18 +134,18 @@ class Workspace(ImmutableAnswer):
     """The workspace of a machine over a grid of poses.
 
     Attributes:
-        machine: with its limits.
+        machine: the machine with its limits.
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
             quantities of the conditions, and for each axis the share of the step to the next node at which the verdict
             ends.
-        verdicts: what may become of a node, "inside" first; then why not.
-        nodes: how many nodes have each verdict.
-        volume: of the inside, whether joined to the file's pose or not.
+        verdicts: the verdicts that a node may have, "inside" first.
+        nodes: number of nodes with each verdict.
+        volume: volume of the inside, whether joined to the file's pose or not.
         connected: share of the inside nodes that hang together with the file's pose; None if that is not inside.
         extents: least and greatest value of each coordinate over the inside nodes, SI; empty where there are none.
         demands: ranges of lengths, angles and loads of legs, joints and actuators over the inside nodes.
-        conditions: that poses had to meet.
+        conditions: conditions that poses had to meet.
         singularities_divide: whether they divide pose space and the file's pose has an aspect to stay in.
         limits: names of the limits that the machine's file sets.
         loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
@@ -187,12 +189,12 @@ def workspace(
     (`machine.loaded`), or a condition is about these, it must also come to rest there.
 
     Args:
-        machine: with its limits, or its state, as `state_of` returns it; its pose gives the coordinates that do not
-            vary.
+        machine: the machine with its limits, or its state, as `state_of` returns it; its pose gives the coordinates
+            that do not vary.
         ranges: "FIELD=from:to:count", two to six coordinates of the pose.
         conditions: "QUANTITY > VALUE".
         progress: receives how far the work is.
-        seed: of the random points for the volume; a whole number from 0.
+        seed: seed of the random points for the volume; a whole number from 0.
 
     Raises:
         InputError: a field that is not a coordinate of the pose, a bad range or condition, too many points.

@@ -56,8 +56,11 @@ def phrase(label: str) -> str:
 
 
 COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+"""Comparisons of a condition, and their functions."""
 CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
+"""The end of messages about a text that is not a condition."""
 LONGEST_CONDITION = 200
+"""Characters of a condition: more are no condition, and the search for one takes the longer."""
 
 _CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 COMPARED_KINDS = (
@@ -78,9 +81,9 @@ class PoseCondition:
 
     Attributes:
         text: the condition as written, with single spaces.
-        quantity: its name.
+        quantity: name of the quantity.
         comparison: "<", "<=", ">" or ">=".
-        value: SI.
+        value: the value with which it is compared, SI.
     """
 
     text: str
@@ -106,8 +109,8 @@ def parse_condition(text: str, components: Sequence[str]) -> PoseCondition:
     match = _CONDITION.fullmatch(text) if len(text) <= LONGEST_CONDITION else None
     if match is None:
         raise InputError(f"{shorten(text)} is not a condition; {CONDITION_FORM}.")
-    given, comparison, written = match.groups()
-    name = current_name(given, "quantity")
+    quantity, comparison, written = match.groups()
+    name = current_name(quantity, "quantity")
     if name in GROUPS:
         raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
     resolve_quantities([name], components)
@@ -196,8 +199,8 @@ class Judge:
             poses: a function from numbers of some of the poses to their coordinates.
         """
         codes = np.zeros(status.shape, dtype=np.int8)
-        for place, plain in enumerate(STATUS_VERDICTS):
-            codes[status == plain] = place
+        for place, known in enumerate(STATUS_VERDICTS):
+            codes[status == known] = place
         codes[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
@@ -252,11 +255,14 @@ def _demand(limit: Limit, ends: tuple[float, float]) -> Demand:
 
 
 HALVINGS = 7
-"""Number of halvings. Seven give the border to a 128th of a step, finer than a printed line."""
+"""Number of halvings of a step: seven give the border to a 128th of it, finer than a printed line."""
 DRAWN_COORDINATES = 3
 """Number of coordinates over which a workspace is drawn; the others keep the values of the pose in the file."""
 LEAST_DEPTH = 1e-3
-"""Least distance of a node from a border, in steps. At a distance of 0 a node would lie neither inside nor outside."""
+"""Least distance of a node from a border, in steps: at a distance of 0 it would lie neither inside nor outside, and a
+thousandth of a step is not seen in a picture."""
+DEPTH_UNSEARCHED = 0.5
+"""Distance of a node from a border that was not searched, in steps: it is taken to lie half-way."""
 
 
 def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Float32s]:
@@ -333,13 +339,12 @@ def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
         nearest = np.full(region.shape, np.inf)
         lower, upper = _neighbours(region, k)
         first, second = _all_but(k, slice(None, -1)), _all_but(k, slice(1, None))
-        parted = lower != upper
-        along = np.where(parted, share[first], np.inf)
-        nearest[first] = along
-        back = np.where(parted, 1.0 - share[first], np.inf)
-        nearest[second] = np.minimum(nearest[second], back)
-        # A border that was not searched has the share NaN; it is taken to lie half-way.
-        inverse_square += np.maximum(np.nan_to_num(nearest, nan=0.5, posinf=np.inf), LEAST_DEPTH) ** -2.0
+        has_border = lower != upper
+        nearest[first] = np.where(has_border, share[first], np.inf)
+        from_second = np.where(has_border, 1.0 - share[first], np.inf)
+        nearest[second] = np.minimum(nearest[second], from_second)
+        known = np.nan_to_num(nearest, nan=DEPTH_UNSEARCHED, posinf=np.inf)
+        inverse_square += np.maximum(known, LEAST_DEPTH) ** -2.0
     distance = np.minimum(np.where(inverse_square > 0.0, inverse_square, 1.0) ** -0.5, 1.0)
     return np.where(region, distance, -distance)
 
@@ -354,6 +359,7 @@ def _all_but(k: int, chosen: slice) -> tuple[slice, ...]:
 
 
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+"""Corners of a cell, in steps from its lowest one."""
 TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]])
 """Corners of the six tetrahedra about the diagonal of a cell."""
 LAYERS_OUTSIDE = 2
