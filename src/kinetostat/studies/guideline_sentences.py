@@ -75,7 +75,7 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
         silent = [_name_in_sentence(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
         aside = f", not from {_enumeration(silent, 'or')}" if silent else ""
         text = f"{_directions_in_words(answer, directions)} the compliance comes from {_enumeration(deciding)}{aside}."
-        yield Statement("compliance", _capitalised(text), holds)
+        yield Statement("compliance", _with_capital(text), holds)
     for word, extreme in (("rigid", 0.0), ("free", math.inf)):
         directions = [i for i, c in enumerate(answer.compliance_diagonal) if c == extreme]
         if directions:
@@ -97,7 +97,7 @@ def _weakest_elements(answer: Guidelines, here: Roles) -> Iterator[Statement]:
             f"compliance by {_percents(row.min(), row.max())}."
         )
         holds = None if over is None else _share_of_poses(_most_gaining(over.gains[single])[directions] == k)
-        yield Statement("weakest", _capitalised(text), holds)
+        yield Statement("weakest", _with_capital(text), holds)
 
 
 def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
@@ -117,7 +117,7 @@ def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
             )
         finite = [factor for factor in factors.values() if factor < math.inf]
         against = _against_actuators(answer, element, max(finite)) if finite else ""
-        counts = f"{_capitalised(_name_in_sentence(answer, k))} {'count' if _is_plural(element) else 'counts'}"
+        counts = f"{_with_capital(_name_in_sentence(answer, k))} {'count' if _is_plural(element) else 'counts'}"
         text = f"{counts} as rigid {'; '.join(clauses)}.{against}{_limit_over_grid(answer, k, list(factors))}"
         yield Statement("rigid", text, None)
 
@@ -266,5 +266,5 @@ def _enumeration(words: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _capitalised(text: str) -> str:
+def _with_capital(text: str) -> str:
     return text[0].upper() + text[1:]

@@ -46,7 +46,7 @@ SHOWN = ("singularity_margin", COLOURING_QUANTITY)
 BORDER_VARIABLES = "border_"
 """Beginning of the names of the variables of borders, one for each axis."""
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
-"""What these variables hold; the name of the axis follows."""
+"""Long name of these variables, before the name of the axis."""
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
 HALF_STEP = 0.5001
