@@ -160,10 +160,10 @@ def test_mujoco_sags_as_a_loaded_machine(name, weights):
         body = bodies.get(element.get("name"))
         density = machine.tables["linear_density"].legs
         if body is not None and body.name.endswith(" rod") and density:
-            end, start = body.reach[-1], bodies[body.name.removesuffix(" rod")].at
+            end, start = body.reach[-1], bodies[body.name.removesuffix(" rod")].origin
             inertial = element.find("inertial")
             inertial.set("mass", repr(0.5 * density * float(np.linalg.norm(end - start))))
-            inertial.set("pos", " ".join(map(repr, (end - body.at).tolist())))
+            inertial.set("pos", " ".join(map(repr, (end - body.origin).tolist())))
         elif body is not None:
             element.set("gravcomp", "1")
     root.find("option").set("gravity", " ".join(map(str, gravity)))
@@ -175,3 +175,13 @@ def test_mujoco_sags_as_a_loaded_machine(name, weights):
     ours = np.array(state.displacement)
     assert sag == pytest.approx(ours, abs=1e-5 * np.abs(ours).max())
     assert state.linear != pytest.approx(ours, abs=1e-3 * np.abs(ours).max()), "geometry matters here"
+
+
+@pytest.mark.parametrize("radius", ["30 cm", "6 m"])
+def test_the_light_stands_above_a_machine_of_any_size(radius):
+    """Its cone of 45 deg covers the machine: it stood 4 m above the base, within a large machine."""
+    text = text_of(analyze(load("hexapod", [f'geometry.base_radius="{radius}"'])))
+    light = np.array(ElementTree.fromstring(text).find("worldbody/light").get("pos").split(), dtype=float)
+    for place in Loaded(text).data.xanchor:
+        down = light - place
+        assert np.hypot(down[0], down[1]) < down[2]

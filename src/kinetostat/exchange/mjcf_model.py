@@ -20,8 +20,8 @@ from kinetostat.machine.machine import Configuration, Plane
 from kinetostat.tolerances import COINCIDENT_HINGES
 from kinetostat.validation.pieces import Piece, StrutPiece, array, joint_of, moves_in, pieces
 
-MOST_FREEDOMS = 6
-"""Degrees of freedom of one body."""
+MOST_HINGES = 5
+"""Most hinges of one body: a sixth coordinate would make it free, for which the engine has a joint of its own."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,11 @@ class Freedom:
     stiffness: float = 0.0
     drive: Spring | None = None
 
+    @property
+    def is_hinge(self) -> bool:
+        """Whether it turns; otherwise it slides."""
+        return self.point is not None
+
 
 @dataclasses.dataclass
 class Body:
@@ -49,7 +54,7 @@ class Body:
 
     Attributes:
         name: unique within the model.
-        at: its frame's origin, base frame, m.
+        origin: origin of its frame, base frame, m.
         freedoms: the freedoms between it and its parent, the nearest to the parent first.
         children: bodies that hang on it.
         reach: points to which a drawing connects its origin, base frame, m.
@@ -57,7 +62,7 @@ class Body:
     """
 
     name: str
-    at: Array
+    origin: Array
     freedoms: list[Freedom] = field(default_factory=list)
     children: list["Body"] = field(default_factory=list)
     reach: list[Array] = field(default_factory=list)
@@ -74,8 +79,8 @@ class Closing:
 
     Attributes:
         ball: whether only the point is constrained.
-        bodies: their names; the second one is nearer to the platform.
-        point: base frame, m.
+        bodies: names of both bodies; the second one is nearer to the platform.
+        point: the place of the constraint, base frame, m.
     """
 
     ball: bool
@@ -98,8 +103,8 @@ class Model:
 
     Attributes:
         world: the base.
-        platform: free but for the constraints.
-        closings, threads: constraints.
+        platform: the platform, which is free but for the constraints.
+        closings, threads: the constraints.
         chains: bodies of each leg from the base to the platform, one between each piece of `pieces` and the next.
         bars: near and far half of a strut, or of both bars of a parallelogram, by the numbers of leg and piece.
     """
@@ -113,7 +118,7 @@ class Model:
     _names: Counter[str] = field(default_factory=Counter)
 
     def unique(self, name: str) -> str:
-        """Return the name, with a number after it if it was given before."""
+        """Return the name, with a number after it if it has been used."""
         self._names[name] += 1
         return name if self._names[name] == 1 else self.unique(f"{name} {self._names[name]}")
 
@@ -133,12 +138,15 @@ def build(configuration: Configuration) -> Model:
 
 
 class _Chain:
-    """A leg while it is built; the next piece begins at the body that was made last."""
+    """A leg while it is built.
+
+    The next piece begins at the body that was made last, or with a ball joint where a strut has ended there.
+    """
 
     def __init__(self, model: Model, leg: Leg, plane: Plane | None) -> None:
         self._model, self._leg, self._plane = model, leg, plane
         self._body = model.world
-        self._ball = False
+        self._ends_in_ball = False
         chain = pieces(leg, plane)
         self._bodies = [self._body]
         for i, piece in enumerate(chain):
@@ -148,34 +156,34 @@ class _Chain:
 
     def close(self) -> None:
         """Join the last body to the platform."""
-        tip = self._body.reach[-1] if self._ball else self._body.at
+        tip = self._body.reach[-1] if self._ends_in_ball else self._body.origin
         self._model.platform.reach.append(tip)
-        if self._ball:
+        if self._ends_in_ball:
             self._bodies[-1] = self._model.platform
-        self._model.closings.append(Closing(self._ball, (self._body.name, self._model.platform.name), tip))
+        self._model.closings.append(Closing(self._ends_in_ball, (self._body.name, self._model.platform.name), tip))
 
-    def _add(self, piece: Piece, after: Vector | None) -> None:
-        """Add a piece; `after` is the start of the next one that has a place."""
-        if self._ball:
-            self._after_strut()
+    def _add(self, piece: Piece, next_start: Vector | None) -> None:
+        """Add a piece before the next one that has a place, which starts there."""
+        if self._ends_in_ball:
+            self._add_ball()
         if isinstance(piece, Joint | Spring):
-            self._joint(piece, self._model.platform.at if after is None else array(after))
+            self._add_joint(piece, self._model.platform.origin if next_start is None else array(next_start))
         elif isinstance(piece, Beam):
-            self._beam(piece)
+            self._add_beam(piece)
         elif isinstance(piece, StrutPiece):
-            self._strut(piece)
+            self._add_strut(piece)
         else:
-            self._parallelogram(piece)
+            self._add_parallelogram(piece)
 
-    def _grow(self, name: str, at: Array) -> Body:
+    def _add_body(self, name: str, origin: Array) -> Body:
         """Add a body at a point (base frame, m), hanging on the last one."""
-        body = Body(self._model.unique(name), at, leg=self._leg.name)
-        self._body.reach.append(at)
+        body = Body(self._model.unique(name), origin, leg=self._leg.name)
+        self._body.reach.append(origin)
         self._body.children.append(body)
         self._body = body
         return body
 
-    def _free(self, name: str, joint: Joint, stiffness: float = 0.0, drive: Spring | None = None) -> None:
+    def _add_freedom(self, name: str, joint: Joint, stiffness: float = 0.0, drive: Spring | None = None) -> None:
         """Give the last body a freedom; a screw is a hinge and a slide that a thread couples."""
         axis, point = array(joint.axis), None if joint.point is None else array(joint.point)
         hinge = Freedom(self._model.unique(name), axis, point, stiffness, drive)
@@ -185,84 +193,85 @@ class _Chain:
             self._body.freedoms.append(slide)
             self._model.threads.append(Thread(slide.name, hinge.name, float(joint.pitch)))
 
-    def _joint(self, piece: Joint | Spring, after: Array) -> None:
+    def _add_joint(self, piece: Joint | Spring, next_start: Array) -> None:
         """Add a joint or a spring: hinges about one point share a body, all others have one each.
 
         A slide has no place: it is put where the next piece begins, or half-way to there from the one before.
         """
         joint = joint_of(piece)
         name = piece.name or f"{self._leg.name} joint"
-        at = after if joint.point is None else array(joint.point)
-        if joint.point is None and self._body is not self._model.world:
-            at = (self._body.at + after) / 2.0
-        if not self._shares(joint, at):
-            self._grow(name, at)
-        if isinstance(piece, Spring):
-            self._free(name, joint, float(piece.stiffness), piece if piece.actuated else None)
+        if joint.point is not None:
+            origin = array(joint.point)
         else:
-            self._free(name, joint)
+            origin = next_start if self._body is self._model.world else (self._body.origin + next_start) / 2.0
+        if joint.point is None or not self._takes_hinge_at(origin):
+            self._add_body(name, origin)
+        if isinstance(piece, Spring):
+            self._add_freedom(name, joint, float(piece.stiffness), piece if piece.actuated else None)
+        else:
+            self._add_freedom(name, joint)
 
-    def _shares(self, joint: Joint, at: Array) -> bool:
+    def _takes_hinge_at(self, point: Array) -> bool:
+        """Return whether the last body turns about this point alone, and may have one more hinge."""
         freedoms = self._body.freedoms
-        hinges = bool(freedoms) and all(f.point is not None for f in freedoms) and joint.point is not None
         return (
-            hinges
-            and len(freedoms) < MOST_FREEDOMS - 1
-            and float(np.linalg.norm(self._body.at - at)) < COINCIDENT_HINGES
+            0 < len(freedoms) < MOST_HINGES
+            and all(freedom.is_hinge for freedom in freedoms)
+            and float(np.linalg.norm(self._body.origin - point)) < COINCIDENT_HINGES
         )
 
-    def _beam(self, beam: Beam) -> None:
+    def _add_beam(self, beam: Beam) -> None:
         """Add the compliant springs at the middle of a beam; rigid ones are omitted."""
         springs = [spring for spring in beam.springs if np.isfinite(float(spring.stiffness))]
         if self._plane is not None:
             springs = [spring for spring in springs if moves_in(self._plane, spring)]
         if springs:
-            self._grow(beam.name, array((beam.start + beam.end) * 0.5))
+            self._add_body(beam.name, array((beam.start + beam.end) * 0.5))
             for spring in springs:
-                self._free(spring.name, spring.joint, float(spring.stiffness))
+                self._add_freedom(spring.name, spring.joint, float(spring.stiffness))
 
-    def _strut(self, strut: StrutPiece) -> None:
+    def _add_strut(self, strut: StrutPiece) -> None:
         """Add a rod on a ball joint: two hinges across it, as its spin does nothing, and a slide if it is compliant."""
         start, end = array(strut.start), array(strut.end)
         along = (end - start) / np.linalg.norm(end - start)
-        near = self._grow(strut.name, start)
+        near = self._add_body(strut.name, start)
         for axis in _across(along):
-            self._free(f"{strut.name} swing", Joint(Vector(*axis), strut.start))
+            self._add_freedom(f"{strut.name} swing", Joint(Vector(*axis), strut.start))
         if np.isfinite(strut.stiffness):
-            self._grow(f"{strut.name} rod", (start + end) * 0.5)
+            self._add_body(f"{strut.name} rod", (start + end) * 0.5)
             driven = (spring for spring in self._leg.springs if spring.actuated and spring.joint.point is None)
-            self._free(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, next(driven, None))
+            self._add_freedom(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, next(driven, None))
         self._body.reach.append(end)
         self._model.bars[len(self._model.chains), len(self._bodies) - 1] = [(near, self._body)]
-        self._ball = True
+        self._ends_in_ball = True
 
-    def _after_strut(self) -> None:
+    def _add_ball(self) -> None:
         """Add the ball joint at the end of a strut that does not reach the platform: three hinges."""
         end = self._body.reach.pop()
-        self._ball = False
-        self._bodies[-1] = self._grow(f"{self._leg.name} ball", end)
+        self._ends_in_ball = False
+        self._bodies[-1] = self._add_body(f"{self._leg.name} ball", end)
         for axis in np.eye(3):
-            self._free(f"{self._leg.name} ball", Joint(Vector(*axis), Vector(*end)))
+            self._add_freedom(f"{self._leg.name} ball", Joint(Vector(*axis), Vector(*end)))
 
-    def _parallelogram(self, piece: Parallelogram) -> None:
+    def _add_parallelogram(self, piece: Parallelogram) -> None:
         """Add two bars on hinges: the first carries the far side, the second is closed by a ball joint."""
         near_side, normal = self._body, piece.normal
         tips, halves = [], []
         for bar, (near, far) in enumerate(piece.bars, 1):
             self._body = near_side
-            half = self._grow(f"{piece.name} bar {bar}", array(near))
-            self._free(f"{piece.name} swing {bar}", Joint(normal, near))
+            half = self._add_body(f"{piece.name} bar {bar}", array(near))
+            self._add_freedom(f"{piece.name} swing {bar}", Joint(normal, near))
             if np.isfinite(float(piece.bar)):
-                self._grow(f"{piece.name} stretch {bar}", array((near + far) * 0.5))
-                self._free(f"{piece.name} stretch {bar}", Joint(piece.along), float(piece.bar))
+                self._add_body(f"{piece.name} stretch {bar}", array((near + far) * 0.5))
+                self._add_freedom(f"{piece.name} stretch {bar}", Joint(piece.along), float(piece.bar))
             tips.append(self._body)
             halves.append((half, self._body))
         self._model.bars[len(self._model.chains), len(self._bodies) - 1] = halves
         (_, first), (_, second) = piece.bars
         tips[1].reach.append(array(second))
         self._body = tips[0]
-        far_side = self._grow(f"{piece.name} far side", array(first))
-        self._free(far_side.name, Joint(normal, first))
+        far_side = self._add_body(f"{piece.name} far side", array(first))
+        self._add_freedom(far_side.name, Joint(normal, first))
         far_side.reach.append(array(second))
         self._model.closings.append(Closing(True, (tips[1].name, far_side.name), array(second)))
 

@@ -20,10 +20,9 @@ from kinetostat.arrays import Array
 from kinetostat.exchange.formats import reference_point
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.loads import PLATFORM, Mass, located_members
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import COINCIDENT, COINCIDENT_HINGES, RIGID_BLOCK, SOFT_CONSTRAINT
@@ -53,6 +52,11 @@ LEAST_STEPS = 2.0
 """Time constant of a constraint in time steps: the shortest that MuJoCo allows."""
 DAMPING = 0.7
 """Damping ratio of the machine's slowest motion: it comes to rest after one swing."""
+SETTLING_ROOTS = 20.0
+"""Time after which a load has settled, in units of 1/omega of the slowest motion: with a damping ratio of 0.7, e^-14 is
+left of a deflection."""
+SETTLING_PERIODS = 10
+"""Periods of the slowest motion that are worth looking at where nothing is damped."""
 CALM = 2.0
 """Square root of a spring's armature over its stiffness, in units of the geometric mean of step and damping time:
 smaller, springs would be too fast for the step; larger, they would still swing where the machine has come to rest."""
@@ -63,9 +67,11 @@ LIGHT_SHARE = 2e-5
 THIN_SHARE = 1e-3
 """Radius of gyration of a rod about its own axis, as a share of its length: the engine turns none without inertia."""
 SHARE_BETWEEN_SPRINGS = 1e-3
-"""Inertia between springs in a row, as a share of the inertia that hangs on them; the engine needs some."""
+"""Inertia between springs in a row, as a share of the inertia that hangs on them. The engine needs some; ten times less
+would take three times as many steps, and ten times more would lower frequencies by up to half a percent."""
 STEPS_OF_SPRING = 8.0
-"""Steps in a period of the fastest spring with what hangs on it; pi of them are the limit of stability."""
+"""Steps in a period of the fastest spring with what hangs on it: pi of them are the limit of stability. The engine's
+steps raise frequencies by (omega step)²/24: with eight by 3 % for the fastest spring, by far less for slow motions."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +82,9 @@ class Pace:
         step: time step, s.
         retardation: damping of a spring per its stiffness, s.
         settling: time after which a deflection has come to rest, s.
-        inertias: mass, its centre and inertia of every body by name.
-        armatures: inertia added to joints by name, kg or kg·m²; None if `armature` decides it.
-        carried: further mass on the platform.
+        inertias: mass, its centre and inertia of every body, by its name.
+        armatures: inertia added to joints by name, kg or kg·m²; None if `armature` computes it.
+        carried: further masses on the platform.
     """
 
     step: float
@@ -106,10 +112,10 @@ def pace_of(analysis: Analysis, model: Model) -> Pace:
     gyration = GYRATION * length
     step = step_for(analysis, min(masses.values()), gyration)
     slowest = math.sqrt(max(compliances(analysis, length)) * sum(masses.values()))
-    places = {body.name: body.at for body in model.world.every()}
+    places = {body.name: body.origin for body in model.world.every()}
     places[model.platform.name] = np.array(reference_point(analysis))  # so that loads on the platform act there
     inertias = {name: Heavy(mass, places[name], mass * gyration**2 * np.eye(3)) for name, mass in masses.items()}
-    return Pace(step, 2.0 * DAMPING * slowest, 20.0 * slowest, inertias)
+    return Pace(step, retardation=2.0 * DAMPING * slowest, settling=SETTLING_ROOTS * slowest, inertias=inertias)
 
 
 def step_for(analysis: Analysis, least: float, gyration: float) -> float:
@@ -129,22 +135,20 @@ def compliances(analysis: Analysis, arm: float) -> list[float]:
     return [size for size in sizes if size > RIGID_BLOCK * max(sizes)] or [UNKNOWN_COMPLIANCE]
 
 
-def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
-    """Return the mass of every body, kg; bodies of legs without known masses get the mean of the others."""
-    bodies = [body for body in model.world.every() if body is not model.world]
-    masses = {body.name: _share(body, bodies, known) for body in bodies}
-    masses[model.platform.name] = sum(
-        float(part.mass) for part in known if part.name == PLATFORM and part.mass is not None
-    )
-    weighed = [mass for mass in masses.values() if mass > 0.0]
-    usual = sum(weighed) / len(weighed) if weighed else NOMINAL_MASS
-    return {name: mass or usual for name, mass in masses.items()}
+def _masses(model: Model, parts: Sequence[Mass]) -> dict[str, float]:
+    """Return the mass of every body, kg: the known masses of a leg are spread evenly over its bodies.
 
-
-def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
-    """Return the mass of a body if the known masses of its leg are spread evenly over all bodies of the leg, kg."""
-    masses = [float(part.mass) for part in known if part.mass is not None and part.leg == body.leg]
-    return sum(masses) / sum(other.leg == body.leg for other in bodies)
+    Bodies of legs without known masses get the mean of the others.
+    """
+    bodies, known = _moving_bodies(model), [part for part in parts if part.mass is not None]
+    masses = {}
+    for body in bodies:
+        of_leg = sum(float(part.mass) for part in known if part.leg == body.leg)
+        masses[body.name] = of_leg / sum(other.leg == body.leg for other in bodies)
+    masses[model.platform.name] = sum(float(part.mass) for part in known if part.name == PLATFORM)
+    positive = [mass for mass in masses.values() if mass > 0.0]
+    mean = sum(positive) / len(positive) if positive else NOMINAL_MASS
+    return {name: mass or mean for name, mass in masses.items()}
 
 
 def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
@@ -157,11 +161,10 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     Raises:
         InputError: if nothing has a mass.
     """
-    machine = analysis.machine
-    joints, response = analysis.state.joints, analysis.state.free
-    carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
-    members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
-    heavy = _parts_by_body(model, response, links(members, response.configuration), armatures)
+    machine, joints, configuration = analysis.machine, analysis.state.joints, analysis.state.configuration
+    carried, armatures = tuple(on_platform(machine, configuration.platform)), _rotors(machine, model)
+    members = located_members(machine, configuration, None if joints is None else joints.coordinates)
+    heavy = _parts_by_body(model, configuration, links(members, configuration), armatures)
     known_mass = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
     if known_mass == 0.0:
         raise InputError(
@@ -169,7 +172,7 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
         )
     gyration = GYRATION * float(analysis.characteristic_length or 1.0)
     light = LIGHT_SHARE * known_mass
-    places = {body.name: body.at for body in _moving_bodies(model)}
+    places = {body.name: body.origin for body in _moving_bodies(model)}
     places[model.platform.name] = np.array(reference_point(analysis))
     inertias = {
         name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
@@ -177,8 +180,15 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     }
     least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
     step = min([step_for(analysis, least, gyration), *_steps_for_springs(_moving_bodies(model), inertias, armatures)])
-    slowest = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known_mass)
-    return Pace(step, 0.0, 10.0 * slowest, inertias, armatures, carried)
+    period = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known_mass)
+    return Pace(
+        step=step,
+        retardation=0.0,
+        settling=SETTLING_PERIODS * period,
+        inertias=inertias,
+        armatures=armatures,
+        carried=carried,
+    )
 
 
 def _moving_bodies(model: Model) -> list[Body]:
@@ -195,11 +205,13 @@ def _rotors(machine: Machine, model: Model) -> dict[str, float]:
 
 
 def _parts_by_body(
-    model: Model, response: Response, parts: Iterable[HeavyLink], armatures: dict[str, float]
+    model: Model, configuration: Configuration, parts: Iterable[HeavyLink], armatures: dict[str, float]
 ) -> dict[str, list[Heavy]]:
-    """Parts of links that each body carries, by its name; what stretches evenly changes the armature of its slide."""
+    """Return the parts of links that each body carries, by its name.
+
+    A link that stretches evenly changes the armature of its slide in `armatures`.
+    """
     heavy: dict[str, list[Heavy]] = {}
-    configuration = response.configuration
     chains = [pieces(leg, configuration.plane) for leg in configuration.legs]
     for link in parts:
         for body, part in _parts_of_link(link, model, chains[link.leg], armatures):
@@ -208,28 +220,35 @@ def _parts_by_body(
 
 
 def _parts_of_link(
-    link: HeavyLink, model: Model, between: Sequence[Piece], armatures: dict[str, float]
+    link: HeavyLink, model: Model, chain: Sequence[Piece], armatures: dict[str, float]
 ) -> Iterator[tuple[Body, Heavy]]:
     """Give the bodies that carry a link and what each carries: both bars of a parallelogram, or the bar that it is."""
-    chain, first, last = model.chains[link.leg], link.bodies[0], link.bodies[-1]
+    bodies, first, last = model.chains[link.leg], link.bodies[0], link.bodies[-1]
     if len(link.points) == 1:
-        yield chain[first], Heavy(link.mass, link.points[0], link.inertia)
+        yield bodies[first], Heavy(link.mass, link.points[0], link.inertia)
         return
     start, end = link.points
-    for (leg, _), halves in model.bars.items():
-        for near, far in halves if leg == link.leg and len(halves) > 1 else ():
-            if float(np.linalg.norm(near.at - start)) < COINCIDENT_HINGES:  # one of two bars
-                yield from _halves((near, far), (start, end), link.mass, armatures)
-                return
-    while first < last and _turns_at(between[first], start):
+    if bar := _bar_at(model, link.leg, start):
+        yield from _halves(bar, (start, end), link.mass, armatures)
+        return
+    while first < last and _turns_at(chain[first], start):
         first += 1
-    while first < last and _turns_at(between[last - 1], end):
+    while first < last and _turns_at(chain[last - 1], end):
         last -= 1
     bars = model.bars.get((link.leg, first), []) if last == first + 1 else []
-    pairs = bars or [(chain[first], chain[last])]
+    pairs = bars or [(bodies[first], bodies[last])]
     for near, far in pairs:
-        shift = near.at - start if len(pairs) > 1 else np.zeros(3)
+        shift = near.origin - start if len(pairs) > 1 else np.zeros(3)
         yield from _halves((near, far), (start + shift, end + shift), link.mass / len(pairs), armatures)
+
+
+def _bar_at(model: Model, leg: int, start: Array) -> tuple[Body, Body] | None:
+    """Return the halves of that bar of a parallelogram of a leg that starts at a point, if there is one."""
+    for (number, _), bars in model.bars.items():
+        for near, far in bars if number == leg and len(bars) > 1 else ():
+            if float(np.linalg.norm(near.origin - start)) < COINCIDENT_HINGES:
+                return near, far
+    return None
 
 
 def _halves(
@@ -245,7 +264,8 @@ def _halves(
         yield near, rod(mass, start, end)
         return
     for slide in far.freedoms:
-        if slide.point is None and abs(slide.axis @ (end - start)) > (1.0 - COINCIDENT) * np.linalg.norm(end - start):
+        along = abs(slide.axis @ (end - start)) > (1.0 - COINCIDENT) * np.linalg.norm(end - start)
+        if not slide.is_hinge and along:
             armatures[slide.name] = armatures.get(slide.name, 0.0) - mass / 6.0
     middle = 0.5 * (start + end)
     yield near, rod(0.5 * mass, start, middle)
