@@ -1,4 +1,4 @@
-"""Types of NumPy arrays, by what their entries are; shapes stand in docstrings.
+"""Types of NumPy arrays by their entries; shapes stand in docstrings. Names are short, because signatures repeat them.
 
 No function lives here.
 """
@@ -12,8 +12,9 @@ Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.integer[Any]]
-"""Statuses, in as many bytes as the computation takes for them."""
+"""Codes of `Status`. Their width is open: compiled programs write int8, the analysis of a pose what NumPy chooses."""
 Complex = npt.NDArray[np.complex128]
 Float32s = npt.NDArray[np.float32]
 """Single precision, which is enough for pictures."""
 AnyArray = npt.NDArray[Any]
+"""An array of any entries: data that are only stored, copied or written."""

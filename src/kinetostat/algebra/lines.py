@@ -44,22 +44,22 @@ def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scal
         The common end of both, m; not a number where they do not meet.
     """
     span = end - start
-    off = span.dot(axis)
-    flat = span - axis * off
-    shrink = reciprocal(flat.dot(flat))
-    flat_rod = rod * rod - off * off
-    along = 0.5 * (1.0 + (crank * crank - flat_rod) * shrink)
+    offset = span.dot(axis)
+    in_plane = span - axis * offset
+    shrink = reciprocal(in_plane.dot(in_plane))
+    rod_square = rod * rod - offset * offset  # of the rod as seen along the axis
+    along = 0.5 * (1.0 + (crank * crank - rod_square) * shrink)
     across = sqrt(crank * crank * shrink - along * along)
-    return start + flat * along + axis.cross(flat) * across
+    return start + in_plane * along + axis.cross(in_plane) * across
 
 
 def crank_range(start: Vector, end: Vector, axis: Vector, crank: Scalar) -> tuple[Scalar, Scalar]:
     """Least and greatest distance (m) of `end` from the circle of the crank's end: a rod must be between them."""
     span = end - start
-    off = span.dot(axis)
-    size = (span - axis * off).norm()
-    near, far = size - crank, size + crank
-    return sqrt(near * near + off * off), sqrt(far * far + off * off)
+    offset = span.dot(axis)
+    radius = (span - axis * offset).norm()
+    near, far = radius - crank, radius + crank
+    return sqrt(near * near + offset * offset), sqrt(far * far + offset * offset)
 
 
 def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> tuple[Scalar, Scalar]:
@@ -91,9 +91,9 @@ def squared_distance(first: tuple[Vector, Vector], second: tuple[Vector, Vector]
     along, across, between = first[1] - first[0], second[1] - second[0], first[0] - second[0]
     a, b, c = along.dot(along), along.dot(across), across.dot(across)
     d, e = along.dot(between), across.dot(between)
-    crossed = a * c - b * b
-    apart = crossed > PARALLEL_SEGMENTS * (a * c)
-    s = where(apart, _within_ends((b * e - c * d) * reciprocal(where(apart, crossed, 1.0))), 0.0)
+    determinant = a * c - b * b
+    crossing = determinant > PARALLEL_SEGMENTS * (a * c)
+    s = where(crossing, _within_ends((b * e - c * d) * reciprocal(where(crossing, determinant, 1.0))), 0.0)
     t = (b * s + e) * reciprocal(c)
     begin, end = _within_ends(-d * reciprocal(a)), _within_ends((b - d) * reciprocal(a))
     s = where(t < 0.0, begin, where(t > 1.0, end, s))

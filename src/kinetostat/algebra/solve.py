@@ -257,29 +257,29 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], sq
         squares: for each weight, the square of the size that its component of a column of unit size may have, > 0; its
             order of magnitude counts.
     """
-    left = [list(column) for column in columns]
-    shares: list[Row] = [[] for _ in left]
+    reduced = [list(column) for column in columns]
+    shares: list[Row] = [[] for _ in reduced]
     pivots: Row = []
     inverses: Row = []
     doubt: Scalar = 0.0
-    growth: Row = [1.0] * len(left)  # of round-off, by what was subtracted
+    growth: Row = [1.0] * len(reduced)  # of round-off, by what was subtracted
     scales = [reciprocal(square) for square in squares]
-    for k, column in enumerate(left):
-        felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
-        pivot = _product(felt, column)
-        size = growth[k] * growth[k]
-        seen = _squared_shares(column, weights, scales)
-        alive = seen > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * size
-        unsure = where(seen > SURELY_MORE * SURELY_MORE * size, 0.0, 1.0)
-        doubt = larger(doubt, where(alive, unsure, 0.0))
-        pivots.append(where(alive, pivot, 0.0))
-        inverses.append(where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0))
-        for i in range(k + 1, len(left)):
-            share = weighted(_product(felt, left[i]), inverses[k])
+    for k, column in enumerate(reduced):
+        weighted_column = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
+        pivot = _product(weighted_column, column)
+        round_off = growth[k] * growth[k]
+        size = _squared_shares(column, weights, scales)
+        seen = size > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * round_off
+        unsure = where(size > SURELY_MORE * SURELY_MORE * round_off, 0.0, 1.0)
+        doubt = larger(doubt, where(seen, unsure, 0.0))
+        pivots.append(where(seen, pivot, 0.0))
+        inverses.append(where(seen, reciprocal(where(seen, pivot, 1.0)), 0.0))
+        for i in range(k + 1, len(reduced)):
+            share = weighted(_product(weighted_column, reduced[i]), inverses[k])
             shares[i].append(share)
-            left[i] = _less(left[i], share, column)
+            reduced[i] = _difference(reduced[i], share, column)
             growth[i] = growth[i] + abs(share) * growth[k]
-    return Conjugated(left, shares, pivots, inverses, doubt)
+    return Conjugated(reduced, shares, pivots, inverses, doubt)
 
 
 def _squared_shares(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
@@ -307,18 +307,20 @@ def least_energy(
         The columns, and the doubt as in `Conjugated`, about the internal ones.
     """
     modes = conjugate(internal, weights, squares)
-    left = [list(column) for column in columns]
+    reduced = [list(column) for column in columns]
     for mode, inverse in zip(modes.columns, modes.inverses, strict=True):
-        felt = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
-        left = [_less(column, weighted(_product(felt, column), inverse), mode) for column in left]
-    return left, modes.doubt
+        weighted_mode = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
+        reduced = [_difference(column, weighted(_product(weighted_mode, column), inverse), mode) for column in reduced]
+    return reduced, modes.doubt
 
 
-def _product(felt: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
-    return total([weighted(a, b) for a, b in zip(felt, column, strict=False)])
+def _product(weighted_column: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
+    """Inner product of a column that the weights have multiplied with another one."""
+    return total([weighted(a, b) for a, b in zip(weighted_column, column, strict=False)])
 
 
-def _less(column: Sequence[Scalar], share: Scalar, other: Sequence[Scalar]) -> Row:
+def _difference(column: Sequence[Scalar], share: Scalar, other: Sequence[Scalar]) -> Row:
+    """A column less a share of another one."""
     return [a - share * b for a, b in zip(column, other, strict=True)]
 
 
@@ -353,48 +355,47 @@ class Eliminated:
 
     def solve(self, right: Sequence[Scalar]) -> Row:
         """A^-1 b."""
-        left = self.forward(right)
-        for k in reversed(range(len(left))):
-            from_later = total([self.upper[k][j] * left[j] for j in range(k + 1, len(left))])
-            left[k] = (left[k] - from_later) * self.shrink[k]
-        return left
+        solution = self.forward(right)
+        for k in reversed(range(len(solution))):
+            from_later = total([self.upper[k][j] * solution[j] for j in range(k + 1, len(solution))])
+            solution[k] = (solution[k] - from_later) * self.shrink[k]
+        return solution
 
 
 def elimination(rows: Sequence[Sequence[Scalar]], symmetric: bool = True) -> Eliminated:
-    """Eliminate; of a symmetric matrix only the upper triangle is read."""
-    left, size = [list(row) for row in rows], len(rows)
+    """Factorise a square matrix; of a symmetric one only the upper triangle is read."""
+    upper, size = [list(row) for row in rows], len(rows)
     lower: list[Row] = [[] for _ in rows]
     shrink: Row = []
     for k in range(size):
-        shrink.append(1.0 / left[k][k])
+        shrink.append(1.0 / upper[k][k])
         for i in range(k + 1, size):
-            share = (left[k][i] if symmetric else left[i][k]) * shrink[k]
+            share = (upper[k][i] if symmetric else upper[i][k]) * shrink[k]
             lower[i].append(share)
             for j in range(i if symmetric else k + 1, size):
-                left[i][j] = left[i][j] - share * left[k][j]
-    return Eliminated(lower, left, shrink)
+                upper[i][j] = upper[i][j] - share * upper[k][j]
+    return Eliminated(lower, upper, shrink)
 
 
 def definite(factors: Eliminated, rows: Sequence[Sequence[Scalar]]) -> Scalar:
     """Whether a symmetric matrix is surely positive definite, by the pivots of its elimination."""
-    good: Scalar = True
+    is_definite: Scalar = True
     for k, pivot in enumerate(factors.pivots):
-        good = good & (pivot > SURE_PIVOT * abs(rows[k][k]))
-    return good
+        is_definite = is_definite & (pivot > SURE_PIVOT * abs(rows[k][k]))
+    return is_definite
 
 
 def semidefinite_root(rows: Sequence[Sequence[Scalar]]) -> list[Row]:
     """The lower triangle G with G G^T = A of a matrix that may be semidefinite, by Cholesky's factorisation."""
     size = range(len(rows))
-    left: list[Row] = [list(row) for row in rows]
-    result: list[Row] = [[0.0 for _ in size] for _ in size]
+    rest: list[Row] = [list(row) for row in rows]
+    root: list[Row] = [[0.0 for _ in size] for _ in size]
     for k in size:
-        pivot = left[k][k]
-        good = pivot > UNRESISTED * abs(rows[k][k])
-        root = sqrt(where(good, pivot, 1.0))
-        result[k][k] = where(good, root, 0.0)
+        resisted = rest[k][k] > UNRESISTED * abs(rows[k][k])
+        pivot_root = sqrt(where(resisted, rest[k][k], 1.0))
+        root[k][k] = where(resisted, pivot_root, 0.0)
         for i in range(k + 1, len(rows)):
-            result[i][k] = where(good, left[i][k] / root, 0.0)
+            root[i][k] = where(resisted, rest[i][k] / pivot_root, 0.0)
             for j in range(k + 1, i + 1):
-                left[i][j] = left[i][j] - result[i][k] * result[j][k]
-    return result
+                rest[i][j] = rest[i][j] - root[i][k] * root[j][k]
+    return root

@@ -10,9 +10,11 @@ PRINTABLE = r"^[^\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u206
 LONGEST_WORD = 300
 """Characters without a space in a message: more than paths usually have, and less than would fill a terminal."""
 _LONG = re.compile(rf"\S{{{LONGEST_WORD},}}")
-M = TypeVar("M")
-SHOWN, WORDED = 5, 100
-"""Mistakes of a file that a message shows, and those that are put into words at all: a hostile file has thousands."""
+Mistake = TypeVar("Mistake")
+SHOWN_MISTAKES = 5
+"""Mistakes of a file that a message shows: as many as people mend before they try again."""
+WORDED_MISTAKES = 100
+"""Mistakes that are put into words at all, so that equal sentences are found: a hostile file has thousands."""
 
 
 class InputError(ValueError):
@@ -79,8 +81,8 @@ def _next(name: str) -> str | None:
     return f"{stem}{int(name[len(stem) :]) + 1}" if stem != name else None
 
 
-def first_mistakes(mistakes: Sequence[M], sentence: Callable[[M], str]) -> str:
+def first_mistakes(mistakes: Sequence[Mistake], sentence: Callable[[Mistake], str]) -> str:
     """Return a sentence for each of the first different mistakes of a file, and how many more there are."""
-    sentences = list(dict.fromkeys(sentence(mistake) for mistake in mistakes[:WORDED]))
-    left = len(sentences) - SHOWN + max(len(mistakes) - WORDED, 0)
-    return " ".join(sentences[:SHOWN]) + (f" (and {left} more)" if left > 0 else "")
+    sentences = list(dict.fromkeys(sentence(mistake) for mistake in mistakes[:WORDED_MISTAKES]))
+    hidden = len(sentences) - SHOWN_MISTAKES + max(len(mistakes) - WORDED_MISTAKES, 0)
+    return " ".join(sentences[:SHOWN_MISTAKES]) + (f" (and {hidden} more)" if hidden > 0 else "")

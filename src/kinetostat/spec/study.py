@@ -15,10 +15,15 @@ from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, s
 from kinetostat.spec.requirements import TABLE, Requirements, read_requirements, requirement_lines, requirements_schema
 
 MOST_POPULATION = 100_000
+"""Designs of a generation: some hundred are usual, so that more than this is a mistake."""
 MOST_GENERATIONS = 100_000
+"""Generations of a search: some hundred are usual, so that more than this is a mistake."""
 MOST_STARTS = 1000
+"""Starts of the gradient method: each is a search of its own, and some dozen are usual."""
 MOST_SAMPLES = 100_000
+"""Random machines around the best design: with so many a share of them is known to a thousandth or two."""
 MOST_LISTED = 10_000
+"""Poses of a list and choices of a variable: every design is judged at each pose."""
 
 Written: TypeAlias = float | str
 """A value of a field as people write it: text with a unit, or a bare number in SI."""
@@ -251,7 +256,7 @@ LISTS = ("variables", "objectives", "constraints")
 def study_toml(study: StudyFile) -> str:
     """Return the TOML text of a study; what is as it would be without being written is left out."""
     content = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-    lines = ["schema = 1", *toml_pairs({key: content[key] for key in ("name", "machine")})]
+    lines = [f"schema = {study.schema_version}", *toml_pairs({key: content[key] for key in ("name", "machine")})]
     lines += _table("[set]", content.get("set", {}))
     for name in LISTS:
         for table in content.get(name, []):

@@ -29,6 +29,9 @@ LEAST_AXIS = 1e-9
 PARALLEL = 1e-6
 """Sine of the angle between the axes of a universal joint below which they are one."""
 ELASTIC = ("lumped", "beam", "timoshenko")
+"""Models of a link that need a cross-section, and so a length and a direction."""
+RANDOM_AMOUNT = 0.4
+"""Greatest random displacement of a joint, rad or m: large enough to leave a special home pose well behind."""
 
 
 def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
@@ -107,11 +110,10 @@ def complete_plan(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     joints are displaced at random to find idle freedoms; legs need not close for that.
     """
     home = chains(plan, **tables)
-    amounts = np.random.default_rng(1).uniform(-0.4, 0.4, home.size).tolist()
-    remaining = iter(amounts)
+    amounts = iter(np.random.default_rng(1).uniform(-RANDOM_AMOUNT, RANDOM_AMOUNT, home.size).tolist())
     legs = []
     for leg, steps in zip(plan.legs, home.legs, strict=True):
-        placed, _ = place(steps, remaining)
+        placed, _ = place(steps, amounts)
         freedoms = [joint for element in placed for joint in element.freedoms]
         idle = _dependent_freedoms(freedoms, plan.planar, home.home.translation, float(home.length))
         centred = rows_about_one_point([_centre(joint) for joint in freedoms])
@@ -137,24 +139,27 @@ def _centre(joint: Joint) -> tuple[float, ...] | None:
 
 
 def _dependent_freedoms(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
-    """Numbers of the freedoms that depend on those before and beside them; twists out of a plane count as given."""
-    absent = Plane().missing_freedoms if planar else ()
-    twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
+    """Numbers of the freedoms that depend on the others; those that a plane does not have count as given.
+
+    The method is Gram and Schmidt's with pivoting: the largest rest is kept and taken out of the others.
+    """
     if not freedoms:
         return ()
+    absent = Plane().missing_freedoms if planar else ()
+    twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
     matrix = np.array(twists, dtype=float).T / np.repeat([1.0, length or 1.0], 3)[:, None]
     matrix /= np.linalg.norm(matrix, axis=0)
-    given, rest = matrix[:, : len(absent)], matrix[:, len(absent) :]
-    rest = rest - given @ np.linalg.lstsq(given, rest, rcond=None)[0] if absent else rest
-    kept: list[int] = []
-    for _ in range(rest.shape[1]):
-        sizes = np.linalg.norm(rest, axis=0)
+    given, rests = matrix[:, : len(absent)], matrix[:, len(absent) :]
+    rests = rests - given @ np.linalg.lstsq(given, rests, rcond=None)[0] if absent else rests
+    independent: list[int] = []
+    for _ in range(rests.shape[1]):
+        sizes = np.linalg.norm(rests, axis=0)
         if sizes.max() < PARALLEL_AXES:
             break
-        kept.append(int(np.argmax(sizes)))
-        axis = rest[:, kept[-1]] / sizes[kept[-1]]
-        rest = rest - np.outer(axis, axis @ rest)
-    return tuple(i for i in range(rest.shape[1]) if i not in kept)
+        independent.append(int(np.argmax(sizes)))
+        axis = rests[:, independent[-1]] / sizes[independent[-1]]
+        rests = rests - np.outer(axis, axis @ rests)
+    return tuple(i for i in range(rests.shape[1]) if i not in independent)
 
 
 SHARED = (
@@ -169,32 +174,32 @@ def check_chain(leg: str, joints: tuple[JointPlan, ...], legs: Mapping[str, Any]
     Args:
         leg: name of the leg.
         joints: the joints of the leg.
-        legs: all legs as written, by name, with everything in them by name.
+        legs: all legs as written, by name, with their joints and links by name.
         where: names file and leg in messages.
 
     Raises:
-        InputError: with the joint, what cannot be written, and what to write instead.
+        InputError: names the joint, and says what to write instead.
     """
-    at, seen = BASE, {BASE}
+    body, passed = BASE, {BASE}
     for i, joint in enumerate(joints):
         near, far = joint.joins
-        here = f'{where}, joint "{joint.name}"'
-        if near != at:
-            before = f'joint "{joints[i - 1].name}" ends at "{at}"' if i else 'a leg starts at "base"'
+        place = f'{where}, joint "{joint.name}"'
+        if near != body:
+            before = f'joint "{joints[i - 1].name}" ends at "{body}"' if i else 'a leg starts at "base"'
             raise InputError(
-                f'{here} starts at "{near}", but {before}: the chain is disconnected. '
-                + (_branching(near) if near in seen else _elsewhere(near, leg, legs, at, f'["{at}", "{far}"]'))
+                f'{place} starts at "{near}", but {before}: the chain is disconnected. '
+                + (_branching(near) if near in passed else _elsewhere(near, leg, legs, body, f'["{body}", "{far}"]'))
             )
-        if far in seen or (far == PLATFORM and i < len(joints) - 1):
+        if far in passed or (far == PLATFORM and i < len(joints) - 1):
             raise InputError(
-                f'{here} leads to "{far}" too early; a leg passes each body once and ends at the platform. Of loops '
+                f'{place} leads to "{far}" too early; a leg passes each body once and ends at the platform. Of loops '
                 "within a leg only a parallelogram can be written, which is one joint."
             )
-        at, seen = far, {*seen, far}
-    if at != PLATFORM:
+        body, passed = far, {*passed, far}
+    if body != PLATFORM:
         raise InputError(
-            f'{where} does not reach the platform: its last joint "{joints[-1].name}" ends at "{at}". '
-            + _elsewhere(at, leg, legs, PLATFORM, f'["{joints[-1].joins[0]}", "platform"]')
+            f'{where} does not reach the platform: its last joint "{joints[-1].name}" ends at "{body}". '
+            + _elsewhere(body, leg, legs, PLATFORM, f'["{joints[-1].joins[0]}", "platform"]')
             + " The platform is one body: one whose parts move against each other cannot be written."
         )
 

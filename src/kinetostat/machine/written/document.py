@@ -166,13 +166,13 @@ def check_paths(document: Document, settings: Iterable[str]) -> None:
         InputError: with what it has.
     """
     for setting in settings:
-        table, *names = setting.partition("=")[0].strip().split(".")
-        at: Any = document.get(table)
-        for name in names[:2] if table == "legs" else ():
-            if isinstance(at, dict) and name not in at and not (name in COPY_KEYS and name == names[1]):
-                choice(name, at, f"--set {shorten(setting)}: the name after {table}")
-            at = at.get(name) if isinstance(at, dict) else None
-            table = f"{table}.{name}"
+        path, *names = setting.partition("=")[0].strip().split(".")
+        table: Any = document.get(path)
+        for name in names[:2] if path == "legs" else ():
+            if isinstance(table, dict) and name not in table and not (name in COPY_KEYS and name == names[1]):
+                choice(name, table, f"--set {shorten(setting)}: the name after {path}")
+            table = table.get(name) if isinstance(table, dict) else None
+            path = f"{path}.{name}"
 
 
 def separate(document: Document, origin: str) -> tuple[Plan, Document]:
@@ -194,10 +194,11 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     pose = rest.get("pose", {})
     for name in pose if isinstance(pose, dict) else ():
         choice(name, coordinates, f'"{origin}": a name in [pose]')
-    given = tuple(name for name in coordinates if isinstance(pose, dict) and name in pose)
-    if not given:
+    pose_names = tuple(name for name in coordinates if isinstance(pose, dict) and name in pose)
+    if not pose_names:
         raise InputError(f'"{origin}": [pose] must give the task coordinates, some of {", ".join(coordinates)}.')
-    return Plan(legs, shapes, materials, given, space == "planar"), rest
+    plan = Plan(legs=legs, shapes=shapes, materials=materials, pose=pose_names, planar=space == "planar")
+    return plan, rest
 
 
 def _cross_sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[str, str]]:
@@ -280,12 +281,12 @@ def _joint(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str
     acts, preloaded = _acts(part, sprung, where), "preload" in part
     rod, section = _rod(part, shapes, where)
     return JointPlan(
-        name,
-        kind,
-        (joins[0], joins[1]),
-        bool(actuated),
-        sprung,
-        compliance,
+        name=name,
+        kind=kind,
+        joins=(joins[0], joins[1]),
+        actuated=bool(actuated),
+        sprung=sprung,
+        compliance=compliance,
         series=series,
         seat=seat,
         motor=motor,
@@ -373,7 +374,7 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         if key in weight and needed not in weight:
             raise InputError(f"{where} has {key}, but no {needed}; give its {needed}, or leave {key} out.")
     direction = (float(up[0]), float(up[1]), float(up[2])) if up else None
-    return LinkPlan(name, model, section, direction, compliance, weight)
+    return LinkPlan(name=name, model=model, cross_section=section, up=direction, compliance=compliance, weight=weight)
 
 
 def _matrix(value: object, where: str) -> Matrix:

@@ -45,13 +45,13 @@ LEGS = "legs."
 def family_of(plan: Plan) -> Family:
     """The family of all machines with this plan."""
     return Family(
-        NAME,
-        SUMMARY,
-        tables_of(plan),
-        partial(configure, plan),
-        plan.planar,
-        partial(chains, plan),
-        literals(plan),
+        name=NAME,
+        summary=SUMMARY,
+        tables=tables_of(plan),
+        configure=partial(configure, plan),
+        planar=plan.planar,
+        chains=partial(chains, plan),
+        literals=literals(plan),
         members=partial(members, plan),
         recipe=(family_of, (plan,)),
     )
@@ -89,16 +89,17 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
     """The machine with its joints at given coordinates; the platform is where the first leg takes it.
 
     Args:
-        plan: what the machine consists of.
+        plan: the plan of the machine.
         joints: coordinates of all joints leg by leg, from the home pose: m, and rad or turns.
-        tables: its numbers, SI.
+        tables: the numbers of the machine, SI, by keyword.
     """
     home = chains(plan, **tables)
     remaining = iter(joints)
     placed = [place(steps, remaining) for steps in home.legs]
     chains_of = [with_rods(steps, chain) for steps, (chain, _) in zip(home.legs, placed, strict=True)]
     legs = tuple(
-        Leg(leg.name, chain, (), leg.idle, leg.centred) for leg, chain in zip(plan.legs, chains_of, strict=True)
+        Leg(leg.name, chain, idle=leg.idle, centred=leg.centred)
+        for leg, chain in zip(plan.legs, chains_of, strict=True)
     )
     return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
 
@@ -107,8 +108,13 @@ def chains(plan: Plan, **tables: Any) -> Chains:
     """All legs at the home pose."""
     legs = tuple(tuple(chain_at_home(plan, leg, tables)) for leg in plan.legs)
     home = Displacement(IDENTITY, Vector(*tables["platform"].point))
-    pose = {name: getattr(tables["pose"], name) for name in plan.pose}
-    return Chains(legs, home, pose, _length(plan, tables), tuple(leg.inverse for leg in plan.legs))
+    return Chains(
+        legs=legs,
+        home=home,
+        pose={name: getattr(tables["pose"], name) for name in plan.pose},
+        length=_length(plan, tables),
+        inverses=tuple(leg.inverse for leg in plan.legs),
+    )
 
 
 def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
@@ -124,9 +130,9 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
         placed = step.element.displaced(motion)
         if step.moves:
             amount, mover = next(coordinates), step.element.mover
-            known = amount.placement if isinstance(amount, Turn) else None
-            if known is not None:
-                placed, motion = _at(placed, known.point, known.axis), known.motion
+            revolute = amount.placement if isinstance(amount, Turn) else None
+            if revolute is not None:
+                placed, motion = _with_line(placed, revolute.point, revolute.axis), revolute.motion
                 chain.append(placed)
                 continue
             placed, moved = placed.moved(amount)
@@ -136,7 +142,7 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 motion, home = moved @ motion, ZERO
             else:
                 if mover.point is home:
-                    placed = _at(placed, centre)
+                    placed = _with_line(placed, centre)
                 home, centre = mover.point, placed.mover.point
                 turn = motion.rotation @ step.element.moved(amount)[1].rotation
                 motion = Displacement(turn, centre - turn.apply(home))
@@ -144,8 +150,8 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
     return chain, motion
 
 
-def _at(element: Joint | Spring, point: Vector, axis: Vector | None = None) -> Joint | Spring:
-    """A revolute, or a spring on one, with its point and its axis as they are known otherwise."""
+def _with_line(element: Joint | Spring, point: Vector, axis: Vector | None = None) -> Joint | Spring:
+    """A revolute, or a spring on one, with a point and an axis that are known otherwise; its own axis if None."""
     if isinstance(element, Spring):
         return replace(element, joint=replace(element.joint, point=point, axis=axis or element.joint.axis))
     return replace(element, point=point, axis=axis or element.axis)
@@ -235,16 +241,16 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
         joints: coordinates at the pose, which place the ends of the links; without them no ends are given.
         tables: the tables of the machine, by keyword.
     """
-    links, left = [], None if joints is None else iter(joints)
+    links, coordinates = [], None if joints is None else iter(joints)
     for leg in plan.legs:
         data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
-        starts, ends = [departure(numbers) for numbers in data], [Vector(*numbers.point) for numbers in data[1:]]
-        placed = [None] * len(starts) if left is None else _carriers(plan, leg, tables, left)
-        moves = False
-        for joint, start, end, carrier in zip(leg.joints, starts, ends, placed, strict=False):
-            moves = moves or joint.kind != "fixed"
-            if moves:
-                links.append(_member(plan, leg, joint.joins[1], (start, end), carrier, tables))
+        carriers = [None] * len(data) if coordinates is None else _carriers(plan, leg, tables, coordinates)
+        can_move = False
+        for joint, near, far, carrier in zip(leg.joints, data, data[1:], carriers, strict=False):
+            can_move = can_move or joint.kind != "fixed"
+            if can_move:
+                ends = departure(near), Vector(*far.point)
+                links.append(_member(plan, leg, joint.joins[1], ends, carrier, tables))
     return links
 
 
@@ -268,30 +274,39 @@ def _carriers(
 def _member(
     plan: Plan, leg: LegPlan, body: str, ends: tuple[Vector, Vector], carrier: Carrier | None, tables: Mapping[str, Any]
 ) -> Member:
-    """A link with what it weighs and how it grows.
+    """A link with its mass and its growth.
 
     Args:
         plan, leg, body: the machine, its leg, and the name of the link's body.
         ends: the ends of its axis at the home pose, base frame, m.
-        carrier: where it is, if that is known.
-        tables: numbers of the machine.
+        carrier: the place of the link; None if it is not known.
+        tables: the numbers of the machine.
     """
     length, section = (ends[1] - ends[0]).norm(), _section(leg, body)
-    mass, bending, growth = (0.0, 0.0, 0.0)
+    mass, bending, growth = 0.0, 0.0, 0.0
     if section:
         shape, data = plan.shapes[section], tables[f"sections.{section}"]
         mass, bending = linear_density_of(shape, data) * length, least_bending_of(shape, data)
         growth = growth_of(data.expansion, data.temperature_rise, f'the links of section "{section}"') * length
-    link, at, tensor = leg.links.get(body), None, None
+    link, centre, inertia = leg.links.get(body), None, None
     if link is not None and link.weight:
-        given = tables[leg.table(body)]
-        mass = given.mass
+        weight = tables[leg.table(body)]
+        mass = weight.mass
         if carrier is not None and "centre_of_mass" in link.weight:
-            at = partial(_station, carrier, direction_in(leg, given.centre_of_mass))
+            centre = partial(_station, carrier, direction_in(leg, weight.centre_of_mass))
         if carrier is not None and "inertia" in link.weight:
-            tensor = partial(turned_tensor, carrier[0].rotation.apply, inertia_in(leg, given.inertia))
-    whole = None if carrier is None else partial(_stations, carrier, ends)
-    return Member(leg.name, f"{leg.name} {body}", length, mass, bending, growth, whole, at, tensor)
+            inertia = partial(turned_tensor, carrier[0].rotation.apply, inertia_in(leg, weight.inertia))
+    return Member(
+        leg=leg.name,
+        name=f"{leg.name} {body}",
+        length=length,
+        mass=mass,
+        bending=bending,
+        growth=growth,
+        ends=None if carrier is None else partial(_stations, carrier, ends),
+        centre=centre,
+        inertia=inertia,
+    )
 
 
 def _stations(carrier: Carrier, ends: tuple[Vector, Vector]) -> tuple[Station, ...]:
@@ -325,5 +340,5 @@ def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
         return 1.0
     count = float(len(arms))
     from_origin = total([point.dot(point) for point in (*points, centre)])
-    apart = squares > ONE_PLACE * ONE_PLACE * from_origin + count * LEAST_LENGTH * LEAST_LENGTH
-    return where(apart, sqrt(squares * (1.0 / count)), 1.0)
+    have_distance = squares > ONE_PLACE * ONE_PLACE * from_origin + count * LEAST_LENGTH * LEAST_LENGTH
+    return where(have_distance, sqrt(squares * (1.0 / count)), 1.0)

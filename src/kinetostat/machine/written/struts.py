@@ -30,9 +30,9 @@ class StrutRod:
     """The rod of a strut in a chain at the home pose; in a placed chain a spring stands for it.
 
     Attributes:
-        part: what it is called.
+        part: the name of the rod.
         actuator: the actuator in whose slide it stretches, and whose load it carries.
-        start: where it begins if no joint with a centre comes before it, base frame, m.
+        start: the beginning of the rod if no joint with a centre comes before it, base frame, m.
         axial: E A, N.
     """
 
@@ -71,10 +71,10 @@ def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan,
 
     Args:
         name: the name of the leg.
-        slide: what the file says about the strut.
+        slide: the actuated slide of the strut.
         actuator: the actuator of the strut.
-        data: its numbers.
-        plan, tables: the plan and tables of the machine, for the cross-section.
+        data: the numbers of the slide.
+        plan, tables: the plan and the tables of the machine, for the cross-section.
     """
     section = slide.cross_section
     shape, sizes = (plan.shapes[section], tables[f"sections.{section}"]) if section else ("", None)
@@ -87,20 +87,20 @@ def with_rods(steps: Sequence[Step], placed: Sequence[Element | StrutRod]) -> tu
 
     Args:
         steps: the steps of the leg at the home pose.
-        placed: the same elements where they are at a pose, base frame.
+        placed: the same elements at a pose, base frame.
     """
     centres = [
         getattr(element, "joint", element).path if step.moves else ()
         for step, element in zip(steps, placed, strict=True)
     ]
-    whole: list[Element] = []
+    elements: list[Element] = []
     for i, element in enumerate(placed):
         if isinstance(element, StrutRod):
             start = [element.start, *chain.from_iterable(centres[:i])][-1]
-            whole.append(element.spring(start, next(chain.from_iterable(centres[i:]))))
+            elements.append(element.spring(start, next(chain.from_iterable(centres[i:]))))
         else:
-            whole.append(element)
-    return tuple(whole)
+            elements.append(element)
+    return tuple(elements)
 
 
 def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
@@ -108,7 +108,7 @@ def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
 
     Args:
         joints: the joints of the leg, in order.
-        place: the place of the joint with the rod among them.
+        place: the number of the joint with the rod among them, from 0.
         where: names the joint in messages.
 
     Raises:
@@ -122,14 +122,13 @@ def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
             f"{where} is {what} and has {field}; only an actuated prismatic joint is a strut whose rod stretches. "
             f"Leave {field} out, or give the section to a link of the leg."
         )
-    before, after = ([other.kind for other in row] for row in (joints[:place], joints[place + 1 :]))
-    moving = [kind for kind in before if kind != "fixed"]
-    if moving and all(kind == "prismatic" for kind in moving):
+    moving_before = [other.kind for other in joints[:place] if other.kind != "fixed"]
+    if moving_before and all(kind == "prismatic" for kind in moving_before):
         raise InputError(
             f"{where} has {field}, but only slides come before it, so that nothing says where its rod begins; leave "
             f"{field} out and write the rod's stiffness into stiffness."
         )
-    if all(kind in UNPOINTED for kind in after):
+    if all(other.kind in UNPOINTED for other in joints[place + 1 :]):
         raise InputError(
             f"{where} has {field}, but no joint that turns comes after it, so that nothing says where its rod ends; "
             f"leave {field} out and write the rod's stiffness into stiffness."
