@@ -343,7 +343,7 @@ def test_a_system_that_does_not_say_its_processor_keeps_nothing(folder, monkeypa
 
 def recipe(machine) -> Recipe:
     form, _ = form_of(machine, ["pose.z"])
-    return recipe_of(objectives_of, Specimen(machine), form, objectives=((("stiffness_x", 1.0),),), closed=False)
+    return recipe_of(objectives_of, Specimen(machine), form, objectives=((("stiffness_x", 1.0),),))
 
 
 def test_families_that_a_program_registers_stay_off_the_disk(folder):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinetostat import InputError, Status, analyze, compile, evaluate, load  # noqa: A004
-from kinetostat.engine.form import Specimen, form_of, objectives_of
+from kinetostat.engine.form import Specimen, TraceOptions, form_of, objectives_of
 from kinetostat.engine.trace import needed_nodes
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.machine.machine import Machine
@@ -102,7 +102,7 @@ def test_values_alone_know_no_limits_and_cost_fewer_operations():
     assert np.isfinite(compile(machine, "z", "stiffness_x", judged=False)(0.4))
     form, _ = form_of(machine, ["pose.z"])
     objectives = ((("stiffness_x", 1.0),),)
-    bodies = [objectives_of(Specimen(machine), form, objectives, judged=judged).body for judged in (True, False)]
+    bodies = [objectives_of(Specimen(machine), form, objectives, TraceOptions(judged=j)).body for j in (True, False)]
     whole, alone = (len(needed_nodes([*body.results, body.code])) for body in bodies)
     assert alone < 0.95 * whole
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from kinetostat.algebra.scalar import finite, is_bounded, ordinary, where
-from kinetostat.engine.form import Specimen, form_of, objectives_of
+from kinetostat.engine.form import Specimen, TraceOptions, form_of, objectives_of
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.llvm_source import freeing_first
 from kinetostat.engine.trace import Graph, Node, needed_nodes
@@ -35,7 +35,7 @@ def test_what_frees_registers_comes_first(name):
     form, _ = form_of(machine, ("pose.x", "pose.z"))
     objectives = tuple(((quantity, 1.0),) for quantity in (*GROUPS["compliance"], *GROUPS["stiffness"]))
     closed = machine.family.chains is not None and closes_inside(machine)
-    body = objectives_of(Specimen(machine), form, objectives, None, closed).body
+    body = objectives_of(Specimen(machine), form, objectives, TraceOptions(closed=closed)).body
     traced = needed_nodes([*body.results, body.code])
     order = freeing_first(traced)
     assert sorted(node.number for node in order) == [node.number for node in traced]

@@ -136,7 +136,7 @@ def function_of(
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         count: number of points at which it will be evaluated. For few points, states of rest and vibrations are not
             found by machine code, which takes seconds to compile.
-        judged: whether points are judged, see `form.objectives_of`; states of rest and vibrations always are, because
+        judged: whether points are judged, see `form.TraceOptions`; states of rest and vibrations always are, because
             only that says whether they are some.
     """
     key, paths, quantities = Identical(machine), tuple(paths), tuple(quantities)

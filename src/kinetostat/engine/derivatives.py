@@ -17,7 +17,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import FUNCTIONS_KEPT, Function, PopulationResults, Progress, by_free_springs, silent
-from kinetostat.engine.form import Specimen, Weights, equations_of, form_of, objectives_of, plan_for
+from kinetostat.engine.form import Specimen, TraceOptions, Weights, equations_of, form_of, objectives_of, plan_for
 from kinetostat.engine.kernel import (
     PROGRAMS_KEPT,
     FallingBack,
@@ -328,18 +328,10 @@ class _Routes:
         kind, paths = Specimen(self._machine), self._differentiated
         if not weights:
             return program_of(recipe_of(equations_of, kind, self._form, paths=paths), self._native)
-        recipe = recipe_of(
-            objectives_of,
-            kind,
-            self._form,
-            objectives=weights,
-            paths=paths,
-            closed=closed,
-            modes=self._modes,
-            limited=False,
-            plan=self._plan,
-            mode_counts=self._mode_counts,
+        options = TraceOptions(
+            closed=closed, limited=False, plan=self._plan, modes=self._modes, mode_counts=self._mode_counts
         )
+        recipe = recipe_of(objectives_of, kind, self._form, objectives=weights, options=options, paths=paths)
         return program_of(recipe, self._native)
 
 

@@ -58,6 +58,25 @@ class Form:
     turning: tuple[str, ...]
 
 
+class _Inputs:
+    """Numbers that a program is given and parameters share, as they are counted."""
+
+    def __init__(self) -> None:
+        self.numbers: list[float] = []
+        self._places: dict[float, int] = {}
+
+    def add(self, number: float) -> int:
+        """Add a number that is not shared and return its place."""
+        self.numbers.append(number)
+        return len(self.numbers) - 1
+
+    def share(self, number: float) -> int:
+        """Return the place of a number that may be shared, and add it if it is not there."""
+        if number not in self._places:
+            self._places[number] = self.add(number)
+        return self._places[number]
+
+
 def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()) -> tuple[Form, Array]:
     """Return the form of a machine's programs and the values of their fixed inputs, SI.
 
@@ -69,39 +88,42 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
         varying: leaf paths of the parameters that vary.
         kept: leaf paths of those that get an input each, even if they are 0.
     """
-    fixed = {path: float(value) for path, value in values(machine).items() if path not in varying}
-    angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
-    turns = [path for path in angles & fixed.keys() if math.isfinite(fixed[path])]
-    fixed |= {path: float(reduced_angles(np.array(fixed[path]))) for path in turns}
-    axes = directions(machine)
-    simple = {path: (0.0, 1.0) if path in axes else (0.0,) for path in fixed if path not in kept}
-    constant = {path: v for path, v in fixed.items() if math.isinf(v) or abs(v) in simple.get(path, ())}
-    numbers: list[float] = []
-    places: dict[float, int] = {}  # of numbers that parameters share, by their size
-    uses = []
-    for path, value in fixed.items():
-        if path in constant:
+    angles, axes = _paths_of(machine, "angle"), _paths_of(machine, "direction")
+    constant, uses, inputs = [], [], _Inputs()
+    for path, number in values(machine).items():
+        if path in varying:
             continue
-        alone = path in kept
-        place = len(numbers) if alone else places.setdefault(abs(value), len(numbers))
-        if place == len(numbers):
-            numbers.append(value if alone else abs(value))
-        uses.append((path, place, value < 0.0 and not alone))
-    ordinary = tuple(ORDINARY_BOUNDS[0] < number < ORDINARY_BOUNDS[1] for number in numbers)
-    turning = tuple(path for path in varying if path in angles)
-    return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
+        value = float(number)
+        if path in angles and math.isfinite(value):
+            value = float(reduced_angles(np.array(value)))
+        is_exact = value == 0.0 or (path in axes and abs(value) == 1.0)
+        if math.isinf(value) or (is_exact and path not in kept):
+            constant.append((path, value))
+        elif path in kept:
+            uses.append((path, inputs.add(value), False))
+        else:
+            uses.append((path, inputs.share(abs(value)), value < 0.0))
+    numbers = np.array(inputs.numbers)
+    form = Form(
+        constant=tuple(constant),
+        inputs=tuple(ORDINARY_BOUNDS[0] < number < ORDINARY_BOUNDS[1] for number in inputs.numbers),
+        uses=tuple(uses),
+        varying=tuple(varying),
+        turning=tuple(path for path in varying if path in angles),
+    )
+    return form, numbers
 
 
 def form_with_numbers(machine: Machine, varying: Sequence[str]) -> Form:
     """Return the form of programs that hold all numbers of a machine but those that vary, by leaf path."""
-    constant = [(path, float(value)) for path, value in values(machine).items() if path not in varying]
-    angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
-    return Form(tuple(constant), (), (), tuple(varying), tuple(path for path in varying if path in angles))
+    constant = tuple((path, float(value)) for path, value in values(machine).items() if path not in varying)
+    turning = tuple(path for path in varying if path in _paths_of(machine, "angle"))
+    return Form(constant=constant, inputs=(), uses=(), varying=tuple(varying), turning=turning)
 
 
-def directions(machine: Machine) -> frozenset[str]:
-    """Return the leaf paths of all components of axes."""
-    return frozenset(leaf for p in parameters(machine.family) if p.quantity.kind == "direction" for leaf in p.leaves)
+def _paths_of(machine: Machine, kind: str) -> frozenset[str]:
+    """The leaf paths of all numbers of a kind of quantity, such as the components of axes."""
+    return frozenset(leaf for p in parameters(machine.family) if p.quantity.kind == kind for leaf in p.leaves)
 
 
 def reduced_angles(angle: Array) -> Array:
@@ -132,11 +154,11 @@ class TracedMachine:
     """A machine whose parameters are traced.
 
     Attributes:
-        graph: in which they are.
+        graph: the graph in which they are.
         fixed: inputs that are the same at all points.
-        columns: those that vary, by leaf path.
+        columns: inputs that vary, by leaf path.
         parameters: all that are not constant, by leaf path: inputs, some with the other sign.
-        machine: with them.
+        machine: the machine with these parameters.
     """
 
     graph: Graph
@@ -173,127 +195,140 @@ class TracedFormula:
     inputs: tuple[Traced, ...]
 
 
+@dataclass(frozen=True)
+class TraceOptions:
+    """Choices by which quantities are traced.
+
+    Attributes:
+        closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
+            status are further columns, unless the family places the joints itself.
+        judged: whether the code is the status of the pose. Otherwise it says whether joints are known, and reach,
+            margin and limits are computed only as far as quantities need them.
+        limited: whether limits of the loads of actuators are compared at rest, for a machine that is meant loaded.
+        stepping: whether to give, after the objectives, the coordinates of the state of rest after another step and
+            the square of its size, so that the program can be repeated until this is small.
+        plan: the motions that there are, where quantities need them, see `plan_for`.
+        modes: number of modes that are known, as further columns (`scalar_frequencies.vibrating`); 0 to solve for
+            frequencies inside.
+        mode_counts: numbers of modes over springs that are known, as further columns, where legs that have masses
+            close loops.
+    """
+
+    closed: bool = False
+    judged: bool = True
+    limited: bool = True
+    stepping: bool = False
+    plan: "rigid.MotionPlan | None" = None
+    modes: int = 0
+    mode_counts: "springwise.ModeCounts | None" = None
+
+
+DEFAULT_OPTIONS = TraceOptions()
+
+
 def objectives_of(
     kind: Specimen,
     form: Form,
     objectives: Sequence[Weights],
+    options: TraceOptions = DEFAULT_OPTIONS,
     paths: Sequence[str] | None = None,
-    closed: bool = False,
-    modes: int = 0,
-    limited: bool = True,
-    plan: "rigid.MotionPlan | None" = None,
-    stepping: bool = False,
-    judged: bool = True,
-    mode_counts: "springwise.ModeCounts | None" = None,
 ) -> TracedFormula:
-    """Trace weighted sums of quantities as functions of the parameters; NaN where the code is not OK.
+    """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
+
+    If quantities are about the machine under load, coordinates of its state are further columns, see `rest.step_of`.
 
     Args:
-        kind: of the machine.
+        kind: kind of the machine.
         form: how its parameters enter.
         objectives: weighted sums of quantities.
+        options: how they are traced.
         paths: leaf paths of the parameters to differentiate by, beside the joint coordinates; None for no derivatives.
-        closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
-            status are further columns, unless the family places the joints itself. If quantities are about the machine
-            under load, coordinates of its state follow, see `step_of`.
-        limited: whether the limits of a machine meant under its loads judge its points at rest.
-        plan: which motions there are, where quantities need them, see `plan_for`.
-        modes: how many modes are known, as further columns (`scalar_frequencies.vibrating`); 0 to solve for frequencies
-            inside.
-        mode_counts: how many modes over springs are known, as further columns, where legs that have masses close loops.
-        stepping: whether to give, after the objectives, the coordinates of the state after another step and the square
-            of its size, so that the program can be repeated until this is small.
-        judged: whether the code is the status of the pose. Otherwise it says whether joints are known, and reach,
-            margin and limits are computed only as far as quantities need them.
     """
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    response = respond(given.machine, joints)
+    traced = traced_machine(kind, form)
+    joints, columns = traced_joints(traced, options.closed)
     names = [name for weights in objectives for name, _ in weights]
-    response, coordinates = _response_at_rest(given, response, joints, names, limited, mode_counts, bool(paths))
-    response, unknowns = _response_vibrating(given, response, joints, names, modes, mode_counts, bool(paths))
-    response = response_in_motion(given.machine, response, joints, plan, names)
-    code = response.status if judged else response.joint_status
-    accepted = code < Status.OK + 0.5
+    free = respond(traced.machine, joints)
+    response, coordinates = _response_at_rest(traced, free, joints, names, options, bool(paths))
+    response, modes = _response_vibrating(traced, response, joints, names, options, bool(paths))
+    response = response_in_motion(traced.machine, response, joints, options.plan, names)
+    status = response.status if options.judged else response.joint_status
+    accepted = status < Status.OK + 0.5
     results = [result_of(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
-    if stepping and response.loaded is not None:
+    if options.stepping and response.loaded is not None:
         results += [result_of(value) for value in response.loaded["after"]]
-    return formula_of(given, columns, results, result_of(code), paths, (*coordinates, *unknowns))
+    return formula_of(traced, columns, results, result_of(status), paths, (*coordinates, *modes))
 
 
 def _response_at_rest(
-    given: TracedMachine,
+    traced: TracedMachine,
     response: Response,
     joints: Joints | None,
     names: Sequence[str],
-    limited: bool,
-    mode_counts: "springwise.ModeCounts | None",
+    options: TraceOptions,
     differentiated: bool,
 ) -> tuple[Response, tuple[Traced, ...]]:
     """Trace what quantities under load need; return the response with it, and the columns of the state and its modes.
 
     Args:
-        given: the traced machine.
-        response: of the machine in its free state.
-        joints: of the machine, where its family does not place them.
-        names: of all quantities; where none is about the machine under load, there are no columns.
-        limited: as for `objectives_of`.
-        mode_counts: how many modes over springs are known, as further columns.
+        traced: the traced machine.
+        response: its response in the free state.
+        joints: its joints, where its family does not place them.
+        names: names of all quantities; where none is about the machine under load, there are no columns.
+        options: how they are traced.
         differentiated: whether results are differentiated.
     """
-    wanted = rest_numbers(given.machine, names, limited)
+    wanted, counts = rest_numbers(traced.machine, names, options.limited), options.mode_counts
     if not wanted:
         return response, ()
-    equations = reduced.reduced_machine(given.machine, response, joints)
-    state = new_inputs(given.graph, equations.size)
-    # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
-    there = equations.step([*state])[0] if differentiated else [*state]
-    loaded, status = equations.numbers(there, wanted, response, names)
+    equations = reduced.reduced_machine(traced.machine, response, joints)
+    state = new_inputs(traced.graph, equations.size)
+    # At a state of rest a step has no size, but it has derivatives: those of the state by the parameters.
+    coordinates = equations.step([*state])[0] if differentiated else [*state]
+    loaded, status = equations.numbers(coordinates, wanted, response, names)
     modes: list[tuple[Traced, ...]] = []
-    if mode_counts is not None and mode_counts.at_rest:
-        motions = springwise.SpringMotions(equations.cut, there)
-        modes = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.loaded + mode_counts.factor)]
+    if counts is not None and counts.at_rest:
+        motions = springwise.SpringMotions(equations.cut, coordinates)
+        modes = [new_inputs(traced.graph, motions.size) for _ in range(counts.loaded + counts.factor)]
         status = where(motions.sure, status, int(Status.NOT_CONVERGED))
-        if mode_counts.loaded:
-            squares = [motions.square(mode) for mode in modes[: mode_counts.loaded]]
+        if counts.loaded:
+            squares = [motions.square(mode) for mode in modes[: counts.loaded]]
             loaded["frequency"] = scalar_frequencies.lowest_frequencies(squares)
-        if mode_counts.factor:
+        if counts.factor:
             loaded["factor"] = motions.factor(modes[-1])
     if "frequency" in wanted and "frequency" not in loaded:
-        loaded["frequency"] = scalar_frequencies.frequencies_at(equations.cut, there, differentiated)
+        loaded["frequency"] = scalar_frequencies.frequencies_at(equations.cut, coordinates, differentiated)
     columns = (*state, *(column for mode in modes for column in mode))
     return replace(response, loaded=loaded, status=status), columns
 
 
 def _response_vibrating(
-    given: TracedMachine,
+    traced: TracedMachine,
     response: Response,
     joints: Joints | None,
     names: Sequence[str],
-    modes: int,
-    mode_counts: "springwise.ModeCounts | None",
+    options: TraceOptions,
     differentiated: bool,
 ) -> tuple[Response, tuple[Traced, ...]]:
     """Trace the frequencies about the free state that quantities need; return also the columns of modes that are known.
 
     Modes over springs are known where legs with masses close loops; others where derivatives are wanted; else the
-    program solves for frequencies itself.
+    program solves for frequencies itself. Arguments are those of `_response_at_rest`.
     """
-    if mode_counts is not None and mode_counts.free:
-        motions = springwise.motions_without_loads(given.machine, response, joints)
-        shapes = [new_inputs(given.graph, motions.size) for _ in range(mode_counts.free)]
-        squares = scalar_frequencies.lowest_frequencies([motions.square(shape) for shape in shapes])
+    counts = options.mode_counts
+    if counts is not None and counts.free:
+        motions = springwise.motions_without_loads(traced.machine, response, joints)
+        modes = [new_inputs(traced.graph, motions.size) for _ in range(counts.free)]
+        frequencies = scalar_frequencies.lowest_frequencies([motions.square(mode) for mode in modes])
         status = where(motions.sure, response.status, int(Status.SINGULAR))
-        columns = tuple(column for shape in shapes for column in shape)
-        return replace(response, frequencies=squares, status=status), columns
-    if modes:
-        vibration = scalar_frequencies.vibrating(given.machine, response, joints, modes)
-        unknowns = new_inputs(given.graph, vibration.columns)
-        squares = scalar_frequencies.lowest_frequencies(vibration.squares(unknowns))
-        return replace(response, frequencies=squares), unknowns
+        columns = tuple(column for mode in modes for column in mode)
+        return replace(response, frequencies=frequencies, status=status), columns
+    if options.modes:
+        vibration = scalar_frequencies.vibrating(traced.machine, response, joints, options.modes)
+        columns = new_inputs(traced.graph, vibration.columns)
+        return replace(response, frequencies=scalar_frequencies.lowest_frequencies(vibration.squares(columns))), columns
     if any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
-        squares = scalar_frequencies.free_frequencies(given.machine, response, joints, differentiated)
-        return replace(response, frequencies=squares), ()
+        frequencies = scalar_frequencies.free_frequencies(traced.machine, response, joints, differentiated)
+        return replace(response, frequencies=frequencies), ()
     return response, ()
 
 
@@ -301,20 +336,20 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
     """Decide at the pose of a machine which motions its programs count with; None where quantities need none.
 
     Args:
-        machine: with numbers.
-        names: of quantities.
+        machine: the machine with its numbers.
+        names: names of quantities.
         varying: leaf paths of the parameters that vary. A spring whose stiffness does counts as a spring by form,
             even if the file says 0.
 
     Raises:
         InputError: quantities need them, and the machine has no place at the pose of its file.
     """
-    damping, changing, names = machine.tables["damping"], {*varying}, [*names]
-    rubs = any(path in changing or getattr(damping, path.partition(".")[2]) for path in FRICTION_OF_JOINTS)
+    damping, varying, names = machine.tables["damping"], {*varying}, [*names]
+    rubs = any(path in varying or getattr(damping, path.partition(".")[2]) for path in FRICTION_OF_JOINTS)
     if not needs_motion(names) or not (needs_masses(names) or rubs):
         return None
     stiff = {leaf for parameter in parameters(machine.family) if parameter.quantity.stiff for leaf in parameter.leaves}
-    free = [path for path in changing if path in stiff and values(machine)[path] == 0.0]
+    free = [path for path in varying if path in stiff and values(machine)[path] == 0.0]
     state = machine_state.MachineState(with_values(machine, dict.fromkeys(free, 1.0)) if free else machine)
     if int(state.free.status) in PLACELESS:
         raise InputError(
@@ -322,28 +357,6 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
             f"joints; change [pose]. {state.refusal}"
         )
     return rigid.plan_of(state.machine, state.configuration, state.joints)
-
-
-def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False, chord: bool = False) -> TracedFormula:
-    """Trace a step of Newton's method towards rest: from coordinates of the state, which are the last columns, to them.
-
-    The last result is the square of the step's size.
-
-    Args:
-        kind: of a machine whose equations can be reduced.
-        form: how its parameters enter.
-        closed: as for `objectives_of`.
-        first: whether to begin at the free state, without columns of coordinates.
-        chord: whether the step is one of the chord method, see `Reduced.chord_step`.
-    """
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    equations = reduced.reduced_machine(given.machine, respond(given.machine, joints), joints)
-    coordinates = () if first else new_inputs(given.graph, equations.size)
-    step = equations.chord_step if chord else equations.step
-    stepped, square = equations.start() if first else step([*coordinates])
-    results = [result_of(value) for value in (*stepped, square)]
-    return formula_of(given, columns, results, 0.0, coordinates=coordinates)
 
 
 def new_inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
@@ -357,19 +370,19 @@ def equations_of(kind: Specimen, form: Form, paths: Sequence[str]) -> TracedForm
     Columns are those of objectives that are not closed.
 
     Args:
-        kind: of the machine.
+        kind: kind of the machine.
         form: how its parameters enter.
         paths: leaf paths of the parameters to differentiate by.
     """
-    given = traced_machine(kind, form)
-    _, columns = traced_joints(given, closed=False)
-    chains = given.machine.chains()
+    traced = traced_machine(kind, form)
+    _, columns = traced_joints(traced, closed=False)
+    chains = traced.machine.chains()
     results = [result_of(result) for result in (*closing_equations(chains, columns[:-1]), chains.length)]
-    return formula_of(given, columns, results, 0.0, paths)
+    return formula_of(traced, columns, results, 0.0, paths)
 
 
 def formula_of(
-    given: TracedMachine,
+    traced: TracedMachine,
     joints: Sequence[Traced],
     results: Sequence[Operand],
     code: Operand,
@@ -377,18 +390,18 @@ def formula_of(
     coordinates: Sequence[Traced] = (),
 ) -> TracedFormula:
     """Join results and a code into a formula; its columns are those that vary, of joints, and further coordinates."""
-    body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
-    inputs = () if paths is None else (*(given.parameters[path] for path in paths), *joints[:-1])
+    body = Body(traced.fixed, [*traced.columns.values(), *joints, *coordinates], results, code)
+    inputs = () if paths is None else (*(traced.parameters[path] for path in paths), *joints[:-1])
     return TracedFormula(body, inputs)
 
 
-def traced_joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
+def traced_joints(traced: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
     """Return the joints of a traced machine, and the columns that bring them: coordinates and a status."""
-    if given.machine.family.chains is None:
+    if traced.machine.family.chains is None:
         return None, ()
     if closed:
-        return CLOSED_FORMS.over_scalars(given.machine.chains()), ()
-    columns = new_inputs(given.graph, given.machine.chains().size + 1)
+        return CLOSED_FORMS.over_scalars(traced.machine.chains()), ()
+    columns = new_inputs(traced.graph, traced.machine.chains().size + 1)
     return Joints(columns[:-1], columns[-1]), columns
 
 

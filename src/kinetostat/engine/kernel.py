@@ -14,7 +14,16 @@ from typing import Any
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, TracedFormula, form_of, objectives_of, plan_for, reduced_angles
+from kinetostat.engine.form import (
+    Form,
+    Specimen,
+    TracedFormula,
+    TraceOptions,
+    form_of,
+    objectives_of,
+    plan_for,
+    reduced_angles,
+)
 from kinetostat.engine.gradient import Interpreted, with_gradients
 from kinetostat.engine.machine_code import MachineCode, Program, machine_code_of, unpack
 from kinetostat.engine.program_files import read_program, write_program
@@ -181,7 +190,7 @@ def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
-        judged: whether points are judged, see `objectives_of`.
+        judged: whether points are judged, see `TraceOptions`.
     """
     if not closes_inside(machine):
         return program_fill(machine, varying, quantities, False, judged)
@@ -202,7 +211,8 @@ def program_fill(
     objectives = tuple(((name, 1.0),) for name in quantities)
     kind = Specimen(at_home(machine, varying) if closed else machine)
     plan = plan_for(machine, quantities, varying)
-    recipe = recipe_of(objectives_of, kind, form, objectives=objectives, closed=closed, plan=plan, judged=judged)
+    options = TraceOptions(closed=closed, plan=plan, judged=judged)
+    recipe = recipe_of(objectives_of, kind, form, objectives=objectives, options=options)
     return ProgramFill(machine, form, fixed, program_of(recipe), closed)
 
 

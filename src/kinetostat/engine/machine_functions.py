@@ -22,13 +22,13 @@ from kinetostat.engine.form import (
     form_with_numbers,
     formula_of,
     result_of,
-    step_of,
     traced_joints,
     traced_machine,
 )
 from kinetostat.engine.kernel import closes_inside
 from kinetostat.engine.loaded import have_programs
 from kinetostat.engine.points import PointTable
+from kinetostat.engine.rest import step_of
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import within_reach
@@ -132,7 +132,7 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
     Args:
         kind: of a machine.
         form: how its parameters enter.
-        closed: as for `objectives_of`.
+        closed: as in `TraceOptions`.
     """
     given = traced_machine(kind, form)
     joints, columns = traced_joints(given, closed)

@@ -7,13 +7,29 @@ surely in a stable state of rest are NOT_CONVERGED, and left to the solver for a
 from collections.abc import Mapping, Sequence
 from functools import partial
 from threading import Lock
+from typing import Literal
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Specimen, form_of, objectives_of, plan_for, step_of
+from kinetostat.engine.form import (
+    Form,
+    Specimen,
+    TracedFormula,
+    TraceOptions,
+    form_of,
+    formula_of,
+    new_inputs,
+    objectives_of,
+    plan_for,
+    result_of,
+    traced_joints,
+    traced_machine,
+)
 from kinetostat.engine.kernel import program_columns, program_of, recipe_of
 from kinetostat.engine.trace import Runnable
+from kinetostat.equilibrium.reduced import reduced_machine
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.written.family import at_home
 from kinetostat.numerics.iteration import SHRINKING
@@ -27,6 +43,37 @@ six lead from 1e-6 to `LAST_STEP`. Newton's method goes on where that was not en
 NUMBERS_TOGETHER = 2**17
 """Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
 step takes them, and there are enough points for the call of a program to cost nothing beside them."""
+
+
+RestStep = Literal["first", "newton", "chord"]
+"""Steps towards a state of rest: from the free state, by Newton's method, and by the chord method."""
+
+
+def step_of(kind: Specimen, form: Form, closed: bool, step: RestStep = "newton") -> TracedFormula:
+    """Trace a step towards rest: from coordinates of the state, which are the last columns, to them.
+
+    The last result is the square of the step's size. The first step begins at the free state, without columns of
+    coordinates; steps of the chord method are those of `Reduced.chord_step`.
+
+    Args:
+        kind: kind of a machine whose equations can be reduced.
+        form: how its parameters enter.
+        closed: as in `TraceOptions`.
+        step: which step it is.
+    """
+    traced = traced_machine(kind, form)
+    joints, columns = traced_joints(traced, closed)
+    equations = reduced_machine(traced.machine, respond(traced.machine, joints), joints)
+    coordinates = () if step == "first" else new_inputs(traced.graph, equations.size)
+    match step:
+        case "first":
+            after, square = equations.start()
+        case "newton":
+            after, square = equations.step([*coordinates])
+        case "chord":
+            after, square = equations.chord_step([*coordinates])
+    results = [result_of(value) for value in (*after, square)]
+    return formula_of(traced, columns, results, 0.0, coordinates=coordinates)
 
 
 class StepMemory:
@@ -72,12 +119,10 @@ class RestFill:
         objectives = tuple(((name, 1.0),) for name in quantities)
         self._states = None if legs else StatePrograms(machine, self.form, closed, native=True)
         step = partial(recipe_of, step_of, kind, self.form, closed=closed)
-        self._first = program_of(step(first=True))
-        self._chord = program_of(step(chord=True)) if legs else None
-        plan = plan_for(machine, quantities, paths)
-        self._step = program_of(
-            recipe_of(objectives_of, kind, self.form, objectives=objectives, closed=closed, plan=plan, stepping=legs)
-        )
+        self._first = program_of(step(step="first"))
+        self._chord = program_of(step(step="chord")) if legs else None
+        options = TraceOptions(closed=closed, plan=plan_for(machine, quantities, paths), stepping=legs)
+        self._step = program_of(recipe_of(objectives_of, kind, self.form, objectives=objectives, options=options))
 
     @property
     def size(self) -> int:
@@ -183,12 +228,12 @@ class StatePrograms:
         self._kind = Specimen(at_home(machine, form.varying) if native else machine)
         self._form, self._closed, self._native = form, closed, native
         self._making = Lock()
-        self._first = self._step(first=True)
+        self._first = self._step("first")
         self._size = self._first.rows - 1  # the last result is the square of the size of the step
 
-    def _step(self, first: bool) -> Runnable:
+    def _step(self, step: RestStep) -> Runnable:
         with self._making:  # threads that need a program at the same time wait until it is there
-            recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, first=first)
+            recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, step=step)
             return program_of(recipe, self._native)
 
     def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
@@ -206,7 +251,7 @@ class StatePrograms:
             points = np.flatnonzero(moving)
             if not len(points):
                 break
-            step, columns = self._step(first=False), [*given, *result[:-1]]
+            step, columns = self._step("newton"), [*given, *result[:-1]]
             every = 2 * len(points) > count  # then picking them out would take longer than computing the others as well
             if not every:
                 columns = [column[points] for column in columns]

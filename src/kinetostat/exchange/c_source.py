@@ -19,7 +19,7 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.form import each_alone, objectives_of, plan_for, step_of
+from kinetostat.engine.form import TraceOptions, each_alone, objectives_of, plan_for
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
@@ -34,7 +34,7 @@ from kinetostat.engine.machine_functions import (
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
-from kinetostat.engine.rest import MOST_NEWTON_STEPS
+from kinetostat.engine.rest import MOST_NEWTON_STEPS, step_of
 from kinetostat.engine.trace import Body
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.state import state_of
@@ -144,7 +144,7 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     """Print the formulas that the functions of a machine need."""
     kind, form, closed = functions.specimen, functions.form, functions.closed
     # Limits of loads need a state of rest, which only functions of what is under load are given.
-    entries = objectives_of(kind, form, each_alone(ENTRIES), closed=closed, limited=False)
+    entries = objectives_of(kind, form, each_alone(ENTRIES), TraceOptions(closed=closed, limited=False))
     yield _program(functions, "entries_at", entries.body)
     placement, count = functions.placement, len(functions.actuators)
     body, inputs = placement.formula.body, placement.formula.inputs
@@ -152,9 +152,9 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     yield _program(functions, "actuators_at", driven)
     yield _program(functions, "actuator_slopes_at", with_gradients(driven, inputs))
     if functions.rests:
-        for name, first in (("first_steps_at", True), ("step_at", False)):
-            yield _program(functions, name, step_of(kind, form, closed, first).body)
-        displacements = objectives_of(kind, form, each_alone(DISPLACEMENTS), closed=closed)
+        yield _program(functions, "first_steps_at", step_of(kind, form, closed, "first").body)
+        yield _program(functions, "step_at", step_of(kind, form, closed).body)
+        displacements = objectives_of(kind, form, each_alone(DISPLACEMENTS), TraceOptions(closed=closed))
         yield _program(functions, "displacement_at", displacements.body)
         places = Body(body.fixed, body.columns, body.results[count : count + PLACE], body.code)
         sloped = with_gradients(places, inputs).results
@@ -166,10 +166,8 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
             yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
         if counts and counts.at_rest:
             yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
-        objectives, limited = each_alone(functions.quantities), functions.needs_state
-        traced = partial(
-            objectives_of, kind, form, objectives, closed=closed, limited=limited, plan=plan, mode_counts=counts
-        )
+        options = TraceOptions(closed=closed, limited=functions.needs_state, plan=plan, mode_counts=counts)
+        traced = partial(objectives_of, kind, form, each_alone(functions.quantities), options)
         yield _program(functions, "quantities_at", traced().body)
         formula = traced(functions.inputs)
         inputs = formula.inputs[: len(functions.inputs)]

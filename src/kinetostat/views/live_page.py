@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.engine.form import each_alone, objectives_of, plan_for, step_of
+from kinetostat.engine.form import TraceOptions, each_alone, objectives_of, plan_for
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
@@ -34,7 +34,7 @@ from kinetostat.engine.machine_functions import (
 )
 from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.printed import NOTATION, pack_graph
-from kinetostat.engine.rest import MOST_NEWTON_STEPS
+from kinetostat.engine.rest import MOST_NEWTON_STEPS, step_of
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -179,7 +179,7 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     placement = functions.placement.formula
     bodies = {
         # What is free of loads takes no state; limits of loads judge the program of the state of rest.
-        "answers": objectives_of(kind, form, each_alone(ENTRIES), closed=closed, limited=False).body,
+        "answers": objectives_of(kind, form, each_alone(ENTRIES), TraceOptions(closed=closed, limited=False)).body,
         "places": placement.body,
         "shares": functions.shares.formula.body,
     }
@@ -188,7 +188,8 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     if free := [name for name in functions.quantities if not functions.at_rest(name)]:
         modes = ModeCounts(free=counts.free) if counts.free else None
         wanted = each_alone(free)
-        formula = objectives_of(kind, form, wanted, closed=closed, limited=False, plan=plan, mode_counts=modes)
+        options = TraceOptions(closed=closed, limited=False, plan=plan, mode_counts=modes)
+        formula = objectives_of(kind, form, wanted, options)
         bodies["quantities"] = formula.body
         if modes:
             bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
@@ -198,10 +199,10 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
         bodies["slopes"] = with_gradients(body, placement.inputs)
     if functions.rests:
         wanted = each_alone([*DISPLACEMENTS, *filter(functions.at_rest, functions.quantities)])
-        bodies["first"] = step_of(kind, form, closed, True).body
+        bodies["first"] = step_of(kind, form, closed, "first").body
         bodies["step"] = step_of(kind, form, closed).body
         modes = replace(counts, free=0) if counts.at_rest else None
-        formula = objectives_of(kind, form, wanted, closed=closed, plan=plan, mode_counts=modes)
+        formula = objectives_of(kind, form, wanted, TraceOptions(closed=closed, plan=plan, mode_counts=modes))
         bodies["loaded"] = formula.body
         if modes:
             bodies["springsAtRest"] = spring_parts_of(kind, form, closed, at_rest=True).body
