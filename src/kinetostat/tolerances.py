@@ -21,6 +21,17 @@ lie exactly at its limit is not refused by round-off, and yet far below what any
 
 ROUND_OFF_OF_INERTIA = 1e-4
 """Share of its largest entry by which an inertia tensor may be impossible, because files give a few digits."""
+SAME_MATTER = 1e-9
+"""Relative difference up to which numbers of two cross-sections are one: units and decimals of a file round them."""
+NO_AXIS = 1e-9
+"""Length of an axis, as a number or in m, below which it has no direction: nobody writes an axis so short."""
+PARALLEL_IN_FILE = 1e-6
+"""Sine of the angle between directions below which a file that wants two of them has written one: files have about six
+digits."""
+SYMMETRIC = 1e-9
+"""Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
+SIMPLE_COSINE = 1e-15
+"""Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
 
 # Exchange with other programs
 

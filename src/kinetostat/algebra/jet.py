@@ -152,9 +152,9 @@ class _JetFunctions:
         shrink = 1.0 / (x.value * x.value + y.value * y.value)
         first = (x.value * y.first - y.value * x.first) * shrink
         second = (x.value * y.second - y.value * x.second) * shrink
-        turned = x.second * y.first + x.value * y.mixed - y.second * x.first - y.value * x.mixed
-        grown = 2.0 * (x.value * x.second + y.value * y.second)
-        return Jet(arctan2(y.value, x.value), first, second, (turned - first * grown) * shrink)
+        numerator_rate = x.second * y.first + x.value * y.mixed - y.second * x.first - y.value * x.mixed
+        square_rate = 2.0 * (x.value * x.second + y.value * y.second)
+        return Jet(arctan2(y.value, x.value), first, second, (numerator_rate - first * square_rate) * shrink)
 
     @staticmethod
     def where(condition: Any, a: Scalar, b: Scalar) -> Scalar:

@@ -21,6 +21,7 @@ from kinetostat.machine.machine import Family
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import quantities
+from kinetostat.tolerances import SAME_MATTER
 from kinetostat.units import UnitError, parse
 
 
@@ -219,8 +220,6 @@ RIGIDITIES = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bendi
 MODULI = ("youngs_modulus", "shear_modulus")
 OF_MATTER = {"density": "density", "expansion": "thermal expansion"}
 """Other properties of a material, and their kind of quantity."""
-SAME_MATTER = 1e-9
-"""Relative difference up to which numbers of two cross-sections are one: units and decimals of a file round them."""
 
 Known: TypeAlias = Mapping[str, float | list[float]]
 """Properties of links from cross-sections, beside rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of

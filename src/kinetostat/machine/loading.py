@@ -84,8 +84,10 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
-    read = build(documents.read_text(path), name, settings)
-    return replace(read, requirements=with_files(dict(read.requirements), path.parent)) if read.requirements else read
+    loaded = build(documents.read_text(path), name, settings)
+    if not loaded.requirements:
+        return loaded
+    return replace(loaded, requirements=with_files(dict(loaded.requirements), path.parent))
 
 
 @checked

@@ -5,7 +5,7 @@ of the payload. A machine whose file has named loads gets a family of its own, w
 links are loads on legs and have their place in `equilibrium`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -18,7 +18,7 @@ from kinetostat.algebra.vector import ZERO, Displacement, Vector, rotation_along
 from kinetostat.frozen import dataclass
 from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Turn
-from kinetostat.machine.links import LINK_TABLES, growth_of
+from kinetostat.machine.links import LINK_TABLES, LinkKind, growth_of
 from kinetostat.machine.machine import Configuration, Family, Machine, Member, springs
 from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.spec.document import Document
@@ -89,8 +89,8 @@ def turned_tensor(turn: Callable[[Vector], Vector], tensor: Sequence[Scalar]) ->
         return (0.0,) * 6
     xx, yy, zz, xy, xz, yz = tensor
     columns = [Vector(xx, xy, xz), Vector(xy, yy, yz), Vector(xz, yz, zz)]
-    half = [turn(column).components() for column in columns]  # R I, by columns
-    rows = [turn(Vector(*row)).components() for row in zip(*half, strict=True)]
+    turned_columns = [turn(column).components() for column in columns]  # of R I
+    rows = [turn(Vector(*row)).components() for row in zip(*turned_columns, strict=True)]
     return tuple(rows[i][j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
 
 
@@ -99,31 +99,24 @@ def _known_mass(link: Member) -> Scalar | None:
 
 
 def _members(machine: Machine, configuration: Configuration) -> list[Member]:
-    """The links of a machine; those written leg by leg without their places."""
-    family = machine.family
-    if family.members is not None:
-        return family.members(**machine.family_tables)
-    members = []
-    for kind in family.links:
-        columns = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
-        placed = kind.placed_links(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
-        for i, (leg, name, length, ends) in enumerate(placed):
-            density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in columns)
-            # Bars beside each other lengthen their leg as one of them does: each counts as its share of that.
-            parallel = sum(other == leg for other, *_ in placed) if leg else 1
-            growth = growth_of(expansion, rise, kind.name) * length * (1.0 / parallel)
-            members.append(
-                Member(
-                    leg=leg,
-                    name=name,
-                    length=length,
-                    mass=density * length,
-                    bending=bending,
-                    growth=growth,
-                    ends=ends,
-                )
-            )
-    return members
+    """The links of a machine; those of one that is written leg by leg without their places."""
+    if machine.family.members is not None:
+        return machine.family.members(**machine.family_tables)
+    return [member for kind in machine.family.links for member in _members_of_kind(kind, machine, configuration)]
+
+
+def _members_of_kind(kind: LinkKind, machine: Machine, configuration: Configuration) -> Iterator[Member]:
+    """The links of one kind of a family in closed form."""
+    columns = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
+    placed = kind.placed_links(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
+    for i, (leg, name, length, ends) in enumerate(placed):
+        density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in columns)
+        # Bars beside each other lengthen their leg as one of them does: each counts as its share of that.
+        parallel = sum(other == leg for other, *_ in placed) if leg else 1
+        growth = growth_of(expansion, rise, kind.name) * length * (1.0 / parallel)
+        yield Member(
+            leg=leg, name=name, length=length, mass=density * length, bending=bending, growth=growth, ends=ends
+        )
 
 
 MOST_LOADS = 16

@@ -406,9 +406,11 @@ def frame_of(machine: Machine, axes: str = "base") -> str:
 
 def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:
     """List the coordinates of the pose that do not vary, in the units of its display; empty where all vary."""
-    here = values(machine)
+    numbers = values(machine)
     fixed = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
-    shown = (machine.display.show(float(here[p.path]), KINDS[p.quantity.kind].unit, digits=POSE_DIGITS) for p in fixed)
+    shown = (
+        machine.display.show(float(numbers[p.path]), KINDS[p.quantity.kind].unit, digits=POSE_DIGITS) for p in fixed
+    )
     return ", ".join(f"{p.path.removeprefix('pose.')} {text}" for p, text in zip(fixed, shown, strict=True))
 
 

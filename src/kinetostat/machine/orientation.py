@@ -18,6 +18,8 @@ from kinetostat.spec.fields import Quantity
 from kinetostat.tolerances import NO_ANGLE_RATES, ROUNDED_ORIENTATION
 from kinetostat.units import UnitError
 
+NEWTON_STEPS = 4
+"""Steps to the nearest rotation: an error of `ROUNDED_ORIENTATION` is round-off after three, and one is to spare."""
 ANGLES = ("roll", "pitch", "yaw")
 TILT = ("azimuth", "angle", "torsion")
 FORMS = {
@@ -115,12 +117,12 @@ def _of_quaternions(value: object, where: str) -> Array:
 def _of_matrices(value: object, where: str) -> Array:
     turns = _numbers(value, (3, 3), "rotation", where)
     with np.errstate(all="ignore"):
-        off = np.abs(np.swapaxes(turns, 1, 2) @ turns - np.eye(3)).max(axis=(1, 2))
+        errors = np.abs(np.swapaxes(turns, 1, 2) @ turns - np.eye(3)).max(axis=(1, 2))
     _refuse(
-        off,
+        errors,
         lambda i: (
             f"{where} is not a rotation: lengths and products of its columns differ from those of perpendicular unit "
-            f"vectors by up to {off[i]:.2g}; write {FORMS['rotation']}."
+            f"vectors by up to {errors[i]:.2g}; write {FORMS['rotation']}."
         ),
     )
     _refuse(
@@ -130,7 +132,7 @@ def _of_matrices(value: object, where: str) -> Array:
         ),
     )
     # Newton's iteration for the nearest rotation: the error of rounded digits squares, and an exact matrix stays exact.
-    for _ in range(4):
+    for _ in range(NEWTON_STEPS):
         turns = turns @ (1.5 * np.eye(3) - 0.5 * np.swapaxes(turns, 1, 2) @ turns)
     return turns
 
@@ -163,12 +165,20 @@ def _angle_values(value: Any, where: str) -> Array:
         raise InputError(f"{where} is {shorten(value)}: {error}.") from None
 
 
-def _refuse(off: Array, sentence: Any) -> None:
-    """Refuse the first orientation whose error is larger than rounded digits explain."""
-    wrong = np.flatnonzero(~(off <= ROUNDED_ORIENTATION))
+def _refuse(errors: Array, sentence: Callable[[int], str]) -> None:
+    """Refuse the first orientation whose error is larger than rounded digits explain.
+
+    Args:
+        errors: the error of each orientation [n].
+        sentence: gives the message for an orientation by its number; which pose it is, is added before its full stop.
+
+    Raises:
+        InputError: there is one.
+    """
+    wrong = np.flatnonzero(~(errors <= ROUNDED_ORIENTATION))
     if wrong.size:
-        at = f" (pose {wrong[0] + 1})" if len(off) > 1 else ""
-        raise InputError(sentence(wrong[0])[:-1] + at + ".")
+        pose = f" (pose {wrong[0] + 1})" if len(errors) > 1 else ""
+        raise InputError(f"{sentence(wrong[0]).removesuffix('.')}{pose}.")
 
 
 def _rows(*rows: tuple[Array, Array, Array]) -> Array:

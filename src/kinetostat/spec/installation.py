@@ -80,8 +80,8 @@ def _clone_of_uv() -> str:
 
 def _uv() -> str | None:
     root = source_tree()
-    beside = [root / ".uv" / "bin" / "uv"] if root else []
-    path = next((str(uv) for uv in beside if uv.exists()), None) or os.environ.get("UV") or shutil.which("uv")
+    clone_uv = root / ".uv" / "bin" / "uv" if root else None
+    path = str(clone_uv) if clone_uv and clone_uv.exists() else os.environ.get("UV") or shutil.which("uv")
     return _short_path(Path(path)) if path and shutil.which(path) else None
 
 
@@ -120,8 +120,8 @@ def _source_of_package() -> str:
         return f"{PACKAGE}.whl"
     origin = json.loads(installed.read_text("direct_url.json") or "{}").get("url", "")
     path = Path(origin.removeprefix("file://"))
-    there = origin.startswith("file://") and path.exists()
-    return str(path) if there else f"{PACKAGE}-{installed.version}-py3-none-any.whl"
+    is_folder_or_file = origin.startswith("file://") and path.exists()
+    return str(path) if is_folder_or_file else f"{PACKAGE}-{installed.version}-py3-none-any.whl"
 
 
 def _python() -> str:
@@ -142,5 +142,5 @@ def _path_of_shell() -> str:
 
 def _short_path(path: Path) -> str:
     """Return a path relative to the present folder if it lies below it, else the whole path, quoted for a shell."""
-    here = Path.cwd()
-    return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))
+    folder = Path.cwd()
+    return shlex.quote(str(path.relative_to(folder) if path.is_relative_to(folder) else path))

@@ -208,13 +208,13 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
 def _place(location: Sequence[Any], document: Document) -> tuple[list[str], Any]:
     """Return the path of a mistake as people write it, without the names of alternatives, and what stands there."""
     path: list[str] = []
-    at: Any = document
+    value: Any = document
     for i, part in enumerate(location):
-        inside = (isinstance(at, dict) and part in at) or (isinstance(at, list) and isinstance(part, int))
-        if inside or i == 0 or (isinstance(at, dict) and i == len(location) - 1):
+        inside = (isinstance(value, dict) and part in value) or (isinstance(value, list) and isinstance(part, int))
+        if inside or i == 0 or (isinstance(value, dict) and i == len(location) - 1):
             path.append(str(part))
-            at = at[part] if inside else None
-    return path, at
+            value = value[part] if inside else None
+    return path, value
 
 
 def _model(path: Sequence[str]) -> type[BaseModel] | None:

@@ -19,7 +19,7 @@ SCHEMA_VERSION = 1
 LONGEST_MACHINE_NAME = 80
 """Characters of a machine's name: titles of figures and pages have room for it."""
 HEAD = ("schema", "name", "family")
-"""Keys at the top of a file that are no tables."""
+"""Keys at the top of a file that are not tables."""
 NO_TABLE = "Input should be a valid dictionary or instance of {}"
 
 DISPLAY_SCHEMA: dict[str, Any] = {
@@ -190,7 +190,7 @@ def _missing(within: str, name: str, last: str, known: Mapping[str, Quantity], f
 
 
 def _look_up(document: Document, path: list[str]) -> object:
-    at: Any = document
+    value: Any = document
     for key in path:
-        at = at.get(key) if isinstance(at, dict) else at
-    return at
+        value = value.get(key) if isinstance(value, dict) else value
+    return value

@@ -33,6 +33,11 @@ LEAST_SHARE = 1e-6
 """Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
 
 
+_ClosedArm = tuple[list[Scalar | Turn], Displacement, Closure, Scalar]
+"""Coordinates of the joints before the ball, the displacement of the arm that they carry, the condition for the single
+joint to reach, and the square of what the pair misses."""
+
+
 @dataclass(frozen=True)
 class BallLeg:
     """A leg of six joints with a ball at one end, and two revolutes about another point among the others.
@@ -93,38 +98,45 @@ class BallLeg:
         return ClosedLeg(amounts[::-1], leg.closure, leg.gap)
 
     def _solve(self, movers: Sequence[Joint], motion: Displacement) -> ClosedLeg:
-        """Find the coordinates of a leg whose ball comes last."""
+        """Find the coordinates of a leg whose ball comes last: the three joints before it, and then the ball."""
         ball = movers[3:]
         centre = ball[0].pivot
-        goal = motion.apply(centre)
-        if self.pair_first:
-            *pair, single = movers[:3]
-            fixed = pair[0].pivot
-            end = goal - fixed
-            square = _square(end)
-            amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
-            start = single.moved(amount)[1].apply(centre) - fixed
-        else:
-            single, *pair = movers[:3]
-            fixed = pair[0].pivot
-            start = centre - fixed
-            square = _square(start)
-            backward_amount, limits = to_distance(single, goal, centre, fixed, square)
-            end = single.moved(backward_amount)[1].apply(goal) - fixed
-            amount = _opposite(backward_amount)
-        size = reciprocal(sqrt(square))
-        before = single.axis * self.aligned if self.aligned else start * size
-        turns, gap = self._pair(pair, before, end * size, centre - fixed)
+        before_ball = self._close_pair_first if self.pair_first else self._close_single_first
+        amounts, arm, closure, gap = before_ball(movers[:3], centre, motion.apply(centre))
+        ball_turns, ball_gap = _ball_turns(ball, arm.rotation, motion.apply(centre), motion)
+        return ClosedLeg([*amounts, *ball_turns], closure, gap + ball_gap)
+
+    def _close_pair_first(self, movers: Sequence[Joint], centre: Vector, goal: Vector) -> _ClosedArm:
+        """The single joint puts the ball at its distance from the pair, and the pair turns the arm between them."""
+        *pair, single = movers
+        fixed = pair[0].pivot
+        end = goal - fixed
+        square = _square(end)
+        amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
         moved = single.moved(amount)[1]
-        if self.pair_first:
-            arm = _place(turns[1]).motion @ moved
-            amounts = [*turns, _with_placement(amount, single, _place(turns[1]).motion, arm)]
-        else:
-            turns = [_after(moved, turn) for turn in turns]
-            arm = _place(turns[1]).motion
-            amounts = [_with_placement(amount, single, moved, moved), *turns]
-        ball_turns, ball_gap = _ball_turns(ball, arm.rotation, goal, motion)
-        return ClosedLeg([*amounts, *ball_turns], Closure(self.leg, sqrt(square), *limits), gap + ball_gap)
+        shrink = reciprocal(sqrt(square))
+        start = single.axis * self.aligned if self.aligned else (moved.apply(centre) - fixed) * shrink
+        turns, gap = self._pair(pair, start, end * shrink, centre - fixed)
+        pair_motion = _place(turns[1]).motion
+        arm = pair_motion @ moved
+        amounts = [*turns, _with_placement(amount, single, pair_motion, arm)]
+        return amounts, arm, Closure(self.leg, sqrt(square), *limits), gap
+
+    def _close_single_first(self, movers: Sequence[Joint], centre: Vector, goal: Vector) -> _ClosedArm:
+        """The single joint carries the pair; seen from the pair, it puts the goal at the distance of the ball."""
+        single, *pair = movers
+        fixed = pair[0].pivot
+        start = centre - fixed
+        square = _square(start)
+        backward_amount, limits = to_distance(single, goal, centre, fixed, square)
+        end = single.moved(backward_amount)[1].apply(goal) - fixed
+        shrink = reciprocal(sqrt(square))
+        turns, gap = self._pair(pair, start * shrink, end * shrink, centre - fixed)
+        amount = _opposite(backward_amount)
+        moved = single.moved(amount)[1]
+        turns = [_after(moved, turn) for turn in turns]
+        amounts = [_with_placement(amount, single, moved, moved), *turns]
+        return amounts, _place(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
         """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.

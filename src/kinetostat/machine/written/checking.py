@@ -22,12 +22,8 @@ from kinetostat.machine.written.joints import JOINT_TYPES, departure
 from kinetostat.machine.written.parallel_axes import parallel_axes
 from kinetostat.machine.written.plan import BASE, PLATFORM, JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import PARALLEL_AXES
+from kinetostat.tolerances import NO_AXIS, PARALLEL_AXES, PARALLEL_IN_FILE
 
-LEAST_AXIS = 1e-9
-"""Length below which an axis has no direction."""
-PARALLEL = 1e-6
-"""Sine of the angle between the axes of a universal joint below which they are one."""
 ELASTIC = ("lumped", "beam", "timoshenko")
 """Models of a link that need a cross-section, and so a length and a direction."""
 RANDOM_AMOUNT = 0.4
@@ -63,21 +59,21 @@ def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
 def _check_axes(data: Any, where: str) -> None:
     axes = {name: getattr(data, name) for name in ("axis", "first_axis", "second_axis") if hasattr(data, name)}
     for name, axis in axes.items():
-        if math.hypot(*axis) < LEAST_AXIS:
+        if math.hypot(*axis) < NO_AXIS:
             raise InputError(f"{where}: {name} has no length; give a direction, e.g. {name} = [0, 0, 1].")
     if {"first_axis", "second_axis"} <= axes.keys():
         pair = axes["first_axis"], axes["second_axis"]
         first, second = (np.array(axis) / math.hypot(*axis) for axis in pair)
-        if np.linalg.norm(np.cross(first, second)) < PARALLEL:
+        if np.linalg.norm(np.cross(first, second)) < PARALLEL_IN_FILE:
             raise InputError(f"{where}: first_axis and second_axis are parallel; turn one of them.")
-    if hasattr(data, "far") and math.dist(data.point, data.far) < LEAST_AXIS:
+    if hasattr(data, "far") and math.dist(data.point, data.far) < NO_AXIS:
         raise InputError(f"{where}: point and far are the same; give the middles of both short sides.")
 
 
 def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
     axis = getattr(data, "axis", (0.0, 0.0, 1.0))
     sizes = {"normal": math.hypot(axis[0], axis[1]), "along": abs(axis[2]), "always": 0.0, "": math.inf}
-    if not sizes[JOINT_TYPES[joint.kind].in_plane] < PARALLEL * math.hypot(*axis):
+    if not sizes[JOINT_TYPES[joint.kind].in_plane] < PARALLEL_IN_FILE * math.hypot(*axis):
         raise InputError(
             f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
             'change its axis or its type, or write space = "spatial".'
@@ -91,14 +87,14 @@ def _check_link(
     before, behind = (tables[leg.table(joint.name)] for joint in (near, far))
     ends = [np.array(departure(before).components()), np.array(behind.point)]
     span = ends[1] - ends[0]
-    if np.linalg.norm(span) < LEAST_AXIS:
+    if np.linalg.norm(span) < NO_AXIS:
         raise InputError(
             f'{where} has no length: joints "{near.name}" and "{far.name}" share a point; move one joint, or make the '
             "link rigid."
         )
     if link.up is None and shape in ("rectangle", "own"):
         raise InputError(f"{where}: its cross-section has two axes; say where z points, e.g. up = [0, 0, 1].")
-    if link.up is not None and np.linalg.norm(np.cross(span, link.up)) < PARALLEL * np.linalg.norm(span):
+    if link.up is not None and np.linalg.norm(np.cross(span, link.up)) < PARALLEL_IN_FILE * np.linalg.norm(span):
         raise InputError(f"{where}: up points along the link; give another direction.")
 
 

@@ -44,6 +44,7 @@ from kinetostat.machine.written.tables import WEIGHT
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import LARGEST_OTHER, LEAST_STIFFNESS
+from kinetostat.tolerances import SYMMETRIC
 
 MOST_JOINTS = 24
 """Joints that a leg may have: more is a mistake, and the equations would take minutes."""
@@ -53,8 +54,6 @@ CABLE_KEYS = ("from", "to", "stiffness", "preload")
 
 LARGEST_NUMBER = 1e100
 """Size of numbers in a matrix beyond which they are a slip: their products would overflow."""
-SYMMETRIC = 1e-9
-"""Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
 
 
 def by_name(document: Document, origin: str) -> Document:

@@ -20,6 +20,7 @@ from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Inverse
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
+from kinetostat.tolerances import SIMPLE_COSINE
 from kinetostat.units import UnitError, parse
 
 NAME = "legs"
@@ -50,8 +51,6 @@ PLANAR_POSE = ("x", "y", "yaw")
 
 COPY_KEYS = ("copies", "angles", "mirrored")
 """Fields of a leg about its copies."""
-SNAP = 1e-15
-"""Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
 
 MOST_LEGS = 24
 """Legs that a machine may have, with all copies: the work of sharing loads grows with the cube of their number."""
@@ -286,7 +285,7 @@ def _angle(angle: object, where: str) -> float:
 
 def _without_round_off(number: float) -> float:
     simple = round(2.0 * number) / 2.0
-    return simple if abs(number - simple) < SNAP else number
+    return simple if abs(number - simple) < SIMPLE_COSINE else number
 
 
 def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
