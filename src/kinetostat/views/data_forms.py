@@ -7,14 +7,26 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import AnyArray
+from kinetostat.late import LateModule
 from kinetostat.spec.renamed import RENAMED, with_former_keys
 from kinetostat.views.question import Description, Field, Records
+
+if TYPE_CHECKING:
+    import h5netcdf
+    import h5py
+else:  # both take long to load
+    h5netcdf = LateModule("h5netcdf")
+    h5py = LateModule("h5py")
+
+Variable = tuple[Any, Any, dict[str, str]]
+"""Axes of a variable of NetCDF (the name of one, or several), its values, and its attributes."""
 
 
 def as_answer(data: dict[str, Any]) -> dict[str, Any]:
@@ -50,8 +62,8 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _nested_lists(values: np.ndarray[Any, Any]) -> Any:
-    """An array as nested lists, with null for what is not finite; at once, because grids have millions of numbers."""
+def _nested_lists(values: AnyArray) -> Any:
+    """Return an array as nested lists, null where it is not finite; at once, since grids have millions of numbers."""
     if values.dtype.kind != "f":
         return values.tolist()
     entries = values.astype(object)
@@ -154,39 +166,41 @@ def netcdf_of(description: Description, answer: Any) -> bytes:
     Axes are those of the description, and of records their numbers from 1 and the names of mappings. The file is as
     xarray would write it, which takes three times as long to import as to write.
     """
-    import h5netcdf  # takes long to load
-    import h5py
-
-    coordinates: dict[str, Any] = {
-        axis.name: (axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _about(axis))
+    coordinates: dict[str, Variable] = {
+        axis.name: (axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _attributes_of(axis))
         for axis in description.axes
     }
-    variables: dict[str, Any] = {}
+    variables: dict[str, Variable] = {}
     for part in description.fields:
         if "nc" not in part.forms:
             continue
         if isinstance(part, Records):
             _add_records(part, part.of(answer), variables, coordinates)
         elif part.axes:
-            variables[part.name] = (part.axes, part.of(answer), _about(part))
+            variables[part.name] = (part.axes, part.of(answer), _attributes_of(part))
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update(machine=answer.machine.name, reference=answer.machine.reference)
-        for name, (axes, entries, about) in (variables | coordinates).items():
-            values, axes = np.asarray(entries), (axes,) if isinstance(axes, str) else axes
-            for axis, size in zip(axes, values.shape, strict=True):
-                if axis not in file.dimensions:
-                    file.dimensions[axis] = size
-            kind, missing = values.dtype.kind, np.nan if values.dtype.kind == "f" else None
-            dtype = {"U": h5py.string_dtype(), "b": np.dtype("i1")}.get(kind, values.dtype)
-            variable = file.create_variable(name, tuple(axes), dtype, fillvalue=missing)
-            variable[...] = values.astype(object) if kind == "U" else values.astype(dtype)
-            variable.attrs.update(about | ({"dtype": "bool"} if kind == "b" else {}))
+        for name, variable in (variables | coordinates).items():
+            _write_variable(file, name, *variable)
     return memory.getvalue()
 
 
+def _write_variable(file: Any, name: str, axes: Any, entries: Any, attributes: dict[str, str]) -> None:
+    """Write a variable as xarray would: texts of any length, flags as bytes that say so, NaN for missing numbers."""
+    axes, values = (axes,) if isinstance(axes, str) else axes, np.asarray(entries)
+    for axis, size in zip(axes, values.shape, strict=True):
+        if axis not in file.dimensions:
+            file.dimensions[axis] = size
+    kind = values.dtype.kind
+    dtype = {"U": h5py.string_dtype(), "b": np.dtype("i1")}.get(kind, values.dtype)
+    variable = file.create_variable(name, tuple(axes), dtype, fillvalue=np.nan if kind == "f" else None)
+    variable[...] = values.astype(object) if kind == "U" else values.astype(dtype)
+    variable.attrs.update(attributes | ({"dtype": "bool"} if kind == "b" else {}))
+
+
 def _add_records(
-    records: Records, items: Sequence[Any], variables: dict[str, Any], coordinates: dict[str, Any]
+    records: Records, items: Sequence[Any], variables: dict[str, Variable], coordinates: dict[str, Variable]
 ) -> None:
     """Add a variable for each field of records, and the axes that they need."""
     coordinates[records.axis] = (records.axis, np.arange(1, len(items) + 1), {})
@@ -196,12 +210,16 @@ def _add_records(
         values = [part.of(item) for item in items]
         names = _entries(part, items)
         if names is None:
-            variables[part.name] = (records.axis, np.asarray([_scalar(value) for value in values]), _about(part))
+            variables[part.name] = (
+                records.axis,
+                np.asarray([_scalar(value) for value in values]),
+                _attributes_of(part),
+            )
         else:
             (axis,) = part.axes
             coordinates[axis] = (axis, names, {})
             rows = [[value.get(name, 0.0) for name in names] for value in values]
-            variables[part.name] = ((records.axis, axis), np.asarray(rows, dtype=float), _about(part))
+            variables[part.name] = ((records.axis, axis), np.asarray(rows, dtype=float), _attributes_of(part))
 
 
 def _scalar(value: Any) -> Any:
@@ -209,5 +227,5 @@ def _scalar(value: Any) -> Any:
     return value if isinstance(value, bool | Real) else np.nan if value is None else str(value)
 
 
-def _about(part: Any) -> dict[str, str]:
+def _attributes_of(part: Any) -> dict[str, str]:
     return {name: text for name, text in (("units", part.unit), ("long_name", part.long_name)) if text}

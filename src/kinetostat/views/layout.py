@@ -6,7 +6,7 @@ possible, because measuring them takes most of the time of a figure. Nothing is 
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from typing import Any
@@ -119,8 +119,7 @@ def fix_layout(figure: Figure) -> None:
     FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
     letter(figure)
     if layout := figure.get_layout_engine():
-        boxes = {(panel, "get_tightbbox"): _CachedTightBox(panel).box for panel in figure.axes}
-        with _replaced_methods(boxes):
+        with _replaced_methods([(panel, "get_tightbbox", _CachedTightBox(panel).box) for panel in figure.axes]):
             layout.execute(figure)
     figure.set_layout_engine("none")
     for panel in figure.axes:
@@ -128,14 +127,14 @@ def fix_layout(figure: Figure) -> None:
 
 
 @contextmanager
-def _replaced_methods(methods: Mapping[tuple[object, str], Callable[..., Any]]) -> Iterator[None]:
-    """Replace methods of single objects, by object and name, and give them back at the end."""
-    for (owner, name), method in methods.items():
+def _replaced_methods(methods: Sequence[tuple[object, str, Callable[..., Any]]]) -> Iterator[None]:
+    """Replace methods of single objects, each by its object and name, and give the old ones back at the end."""
+    for owner, name, method in methods:
         setattr(owner, name, method)
     try:
         yield
     finally:
-        for owner, name in methods:
+        for owner, name, _ in methods:
             delattr(owner, name)
 
 
@@ -147,8 +146,8 @@ def steady_ticks(panels: Sequence[Axes]) -> AbstractContextManager[None]:
     """
     axes = [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)]
     methods = [(axis, name) for axis in axes for name in MEASURING_METHODS if hasattr(axis, name)]
-    steady = {(axis, name): _first_result(getattr(axis, name)) for axis, name in methods if name not in vars(axis)}
-    return _replaced_methods(steady)
+    changing = [(axis, name) for axis, name in methods if name not in vars(axis)]
+    return _replaced_methods([(axis, name, _first_result(getattr(axis, name))) for axis, name in changing])
 
 
 def _first_result(function: Callable[..., Any]) -> Callable[..., Any]:

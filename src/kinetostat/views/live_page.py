@@ -53,9 +53,9 @@ from kinetostat.views.scene.leg_solids import rail_ends
 from kinetostat.views.scene.machine_scene import has_open_frame, plates
 
 TEMPLATES = Path(__file__).with_name("live")
-SPAN, TURN, SHARE = 0.4, math.radians(30.0), 0.5
+LENGTH_RANGE, ANGLE_RANGE, SHARE_RANGE = 0.4, math.radians(30.0), 0.5
 """Ranges of sliders about the value in the file: of lengths, in units of the machine's length; of angles, rad; of other
-numbers, as a share of themselves."""
+numbers, as a share of themselves. Most machines reach a good part of them."""
 INDICES = (
     "singularity_margin",
     "frobenius_condition",
@@ -158,16 +158,15 @@ def _compressed_text(content: object) -> str:
 
 
 def _page(name: str, content: object) -> str:
+    operations, statuses = json.dumps([*NOTATION]), json.dumps([status.sentence for status in Status])
+    formulas = (TEMPLATES / "formulas.js").read_text("utf-8")
     words = {
         "name": escape(name),
         "version": version("kinetostat"),
         "machine": json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
         "picture": (TEMPLATES / "picture.js").read_text("utf-8"),
         "script": (TEMPLATES / "page.js").read_text("utf-8"),
-        "formulas": (TEMPLATES / "formulas.js")
-        .read_text("utf-8")
-        .replace("$operations", json.dumps([*NOTATION]))
-        .replace("$statuses", json.dumps([status.sentence for status in Status])),
+        "formulas": formulas.replace("$operations", operations).replace("$statuses", statuses),
     }
     body = Template((TEMPLATES / "page.html").read_text("utf-8")).substitute(words)
     return whole_page(name, (TEMPLATES / "page.css").read_text("utf-8"), [body])
@@ -214,6 +213,7 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
     machine = functions.machine
     columns = sample_points(functions)
     points = np.array(list(columns.values())).T
+    rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
     forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
     return {
         "name": machine.name,
@@ -226,9 +226,7 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "components": machine.family.components,
         "length": functions.length,
         "forward": forward if functions.square else None,
-        "rest": {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
-        if functions.rests
-        else None,
+        "rest": rest if functions.rests else None,
         "springs": asdict(functions.mode_counts) | asdict(functions.springs) if functions.mode_counts else None,
         "samples": [_sample(functions, row.tolist()) for row in points],
         "file": as_toml(machine),
@@ -242,9 +240,10 @@ def _sliders(functions: MachineFunctions) -> list[dict[str, Any]]:
     rows = []
     for path, kind in functions.arguments:
         home = float(numbers[path])
-        span = {"length": SPAN * functions.length, "angle": TURN}.get(kind, SHARE * abs(home) or 1.0)
-        label = path.removeprefix(POSE)
-        rows.append({"name": label, "si": KINDS[kind].unit, "home": home, "low": home - span, "high": home + span})
+        ranges = {"length": LENGTH_RANGE * functions.length, "angle": ANGLE_RANGE}
+        reach = ranges.get(kind, SHARE_RANGE * abs(home) or 1.0)
+        ends = {"home": home, "low": home - reach, "high": home + reach}
+        rows.append({"name": path.removeprefix(POSE), "si": KINDS[kind].unit, **ends})
     return rows
 
 
@@ -280,9 +279,9 @@ def _leg_drawing(parts: Anatomy, points: Sequence[Vector], first: int, sizes: Pr
     is drawn, and the points at its ends; of two bars, of both.
 
     Args:
-        parts: of the leg.
-        points: that the page computes for the leg, base frame, m.
-        first: number of the first of them.
+        parts: the parts of the leg.
+        points: the points that the page computes for the leg, base frame, m.
+        first: number of the first of these points.
         sizes: the proportions of the machine.
     """
 

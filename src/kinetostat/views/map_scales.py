@@ -27,13 +27,17 @@ FAR_EXTREME = 1.0
 WIDE_RATIO = 30.0
 """Ratio of the usual values of a map, if all are positive, from which its colours follow the logarithm."""
 LEVELS = 12
-"""Number of bands of a map, about: as many colours as the eye tells apart."""
+"""Approximate number of bands of a map: as many colours as the eye tells apart."""
 SAME_LEVEL = 1e-9
 """Share of the range of levels within which a level and an extreme differ by round-off alone."""
 STEPS_OF_DECADE = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
-"""Levels within a decade, from few decades to many."""
+"""Levels within a decade, from few decades to many: the first are taken of which a bar can show all."""
 MAP_WIDTH, LONG_NUMBER = 1.8, 0.3
 """Width of a map among others without its scales, and of a number that is long below it, inches."""
+NUMBER_PITCH = 1.4
+"""Least distance of long numbers below a map, in widths of the widest one: a gap is seen between them."""
+EQUAL_SCALES = (0.5, 2.0)
+"""Ratios of two lengths between which a map has equal scales: others would leave half of its panel empty."""
 
 
 def usual_range(values: Array) -> tuple[float, float]:
@@ -94,9 +98,9 @@ def _round_powers(low: float, high: float) -> Array:
     """Return 1, 2, 5 (1, 3; 1) times powers of ten from at most `low` to at least `high`: as many as a bar can show."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     for steps in STEPS_OF_DECADE:
-        every = [step * 10.0**power for power in range(first, last + 1) for step in steps]
-        inner = [n for n, value in enumerate(every) if low < value < high]
-        chosen = every[inner[0] - 1 : inner[-1] + 2]
+        candidates = [step * 10.0**power for power in range(first, last + 1) for step in steps]
+        inner = [n for n, value in enumerate(candidates) if low < value < high]
+        chosen = candidates[inner[0] - 1 : inner[-1] + 2]  # with the next one on either side
         if len(chosen) <= LEVELS + 2:
             return np.array(chosen)
     return np.array(chosen[:: -(-len(chosen) // LEVELS)])
@@ -106,7 +110,8 @@ def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) ->
     """Set equal scales for two lengths of similar range, and logarithmic ones where the grid is."""
     lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
     spans = [np.ptp(dataset[name].values) for name in (across, up)]
-    if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:
+    least, greatest = EQUAL_SCALES
+    if all(lengths) and least < spans[0] / spans[1] < greatest:
         panel.set_aspect("equal")
     if dataset[across].attrs["log"]:
         panel.set_xscale("log")
@@ -129,6 +134,6 @@ def trim_height(figure: Figure, panel: Axes, height: float) -> None:
 
 def thin_numbers(panel: Axes) -> None:
     """Let long numbers below a map stand apart; Matplotlib counts on three digits, and lets longer ones meet."""
-    wide = width_of(f"{end:.6g}" for end in panel.get_xlim())
-    if wide > LONG_NUMBER and panel.get_xscale() == "linear":
-        panel.locator_params(axis="x", nbins=max(2, int(MAP_WIDTH / (1.4 * wide))))
+    width = width_of(f"{end:.6g}" for end in panel.get_xlim())
+    if width > LONG_NUMBER and panel.get_xscale() == "linear":
+        panel.locator_params(axis="x", nbins=max(2, int(MAP_WIDTH / (NUMBER_PITCH * width))))

@@ -21,16 +21,19 @@ from kinetostat.views.rendering.rasteriser import nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear
 
 Lamp: TypeAlias = tuple[Float32s, Callable[[Float32s, Float32s], Mask]]
-"""Direction to a distant lamp, and whether it reaches points [3 x n] looked up aside by pixels of its map [2 x n]."""
+"""Direction to a distant lamp, and a function that tells whether it reaches points [3 x n], given the pixels by which
+each is looked up beside its place in the map of the lamp [2 x n]."""
 
 SUN = np.array((-0.55, -0.75, 1.5)) / math.sqrt(0.55**2 + 0.75**2 + 1.5**2)
 """Direction to the main light, base axes: over the left shoulder of a viewer in front."""
 SUN_RADIUS = 0.055
 """Radius of the main light as seen from the machine, rad: it decides how soft the shadows are."""
 SUNS, SKIES = 12, 56
-"""Lamps that make up the main light, and the sky."""
+"""Lamps that make up the main light, and the sky: so many that the edges of soft shadows show no steps."""
 SUN_SIDE, SKY_SIDE = 1024, 320
-"""Largest side of a lamp's shadow map, pixels."""
+"""Largest side of a lamp's shadow map, pixels: shadows of single lamps of the sky are faint, and may be coarse."""
+MAP_BORDER = 2
+"""Pixels of a shadow map that stay empty on each side, so that what lies beyond is lit."""
 LIFTED_PIXELS = 1.6
 """Height of a point above its surface when its light is looked up, in pixels of the map: no surface shades itself."""
 LOOKUP_BLUR = 3.0
@@ -58,8 +61,13 @@ BOXES = (
 """Soft boxes that metals mirror: direction, cosine of their half width, brightness."""
 GLINT = (tuple(SUN.tolist()), 0.96, 6.0)
 """The main light as surfaces mirror it, in the same form."""
-WALL, GROUND = 0.3, 0.42
+WALL_BRIGHTNESS, GROUND_BRIGHTNESS = 0.3, 0.42
 """Brightness of the room above and below the horizon."""
+HIDDEN_BOUNCE, HIDDEN_ROOM = 0.35, 0.3
+"""Share of the light from the ground, and of what is mirrored of the room, that reaches surfaces to which no sky is
+open: light in corners is never all gone."""
+BOX_DIMMING = 0.45
+"""Share of the brightness of a mirrored soft box that the roughest surface takes away."""
 
 
 @dataclass(frozen=True)
@@ -80,10 +88,10 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
     """Compute the light on points of surfaces from many distant lamps, each with a map of the solids in its way.
 
     Args:
-        points: base frame, m [n x 3].
+        points: the points, base frame, m [n x 3].
         normals: the normals of the surfaces, unit vectors [n x 3].
         casters: solids that cast shadows.
-        detail: pixels across a picture of all of it: shadows need not be finer.
+        detail: pixels across a picture of everything: shadows need not be finer.
     """
     box = casters.points if len(casters.points) else np.zeros((1, 3))
     low, high = box.min(axis=0), box.max(axis=0)
@@ -106,25 +114,25 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
 def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
     """A lamp with a shadow map [side x side] that covers the ball around all casters: the depth nearest to the lamp."""
     axes = axes_towards(-direction)
-    axes[:2] *= 0.5 * (side - 4) / radius
+    axes[:2] *= 0.5 * (side - 2 * MAP_BORDER) / radius
     shift = np.array([0.5 * side, 0.5 * side, 2.0 * radius]) - axes @ centre
     placed = np.einsum("nj,ij->ni", casters.points, axes) + shift
     nearest, _ = nearest_triangles(placed[:, :2], 4.0 * radius - placed[:, 2], casters.triangles, side, side)
     nearest[nearest == 0.0] = -np.inf  # no caster: lit at every depth
-    turn, moved = axes.astype(np.float32), shift.astype(np.float32)[:, None]
+    map_axes, map_shift = axes.astype(np.float32), shift.astype(np.float32)[:, None]
 
     def reaches(points: Float32s, aside: Float32s) -> Mask:
-        at = np.einsum("ij,jn->in", turn, points) + moved
-        column, row = np.clip(at[:2] + aside, 0, side - 1).astype(np.int32)
-        lit: Mask = nearest[row * side + column] <= np.float32(4.0 * radius) - at[2]
+        on_map = np.einsum("ij,jn->in", map_axes, points) + map_shift
+        column, row = np.clip(on_map[:2] + aside, 0, side - 1).astype(np.int32)
+        lit: Mask = nearest[row * side + column] <= np.float32(4.0 * radius) - on_map[2]
         return lit
 
     return direction.astype(np.float32), reaches
 
 
-def _mean_light(lamps: Sequence[Lamp], away: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
-    """Mean light of lamps on points [3 x n] lifted `away` (m) from their surface, with and without shadows [2 x n]."""
-    lifted = points + normals * np.float32(away)
+def _mean_light(lamps: Sequence[Lamp], lift: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
+    """Mean light of lamps on points [3 x n], lifted (m) from their surface, with and without shadows [2 x n]."""
+    lifted = points + normals * np.float32(lift)
     light = np.zeros((2, points.shape[1]), np.float32)
     for number, (direction, reaches) in enumerate(lamps):
         cosines = np.maximum(np.einsum("i,in->n", direction, normals), 0.0)
@@ -148,8 +156,8 @@ def _sun_directions() -> Array:
 
 def _sky_directions() -> Array:
     """Return the lamps on the upper half of a sphere, as dense as the cosine from the zenith: an overcast sky."""
-    flat = _disc(SKIES)
-    return np.column_stack([flat, np.sqrt(1.0 - np.sum(flat**2, axis=1))])
+    level = _disc(SKIES)
+    return np.column_stack([level, np.sqrt(1.0 - np.sum(level**2, axis=1))])
 
 
 def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Light) -> Float32s:
@@ -162,9 +170,9 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
     K. Narkowicz, ACES filmic tone mapping curve (2016).
 
     Args:
-        look: numbers of their looks [n].
-        normals, to_eye: unit vectors [n x 3], base axes.
-        light: on the points.
+        look: numbers of the looks of the points [n].
+        normals, to_eye: unit vectors along the normals and to the eye [n x 3], base axes.
+        light: the light on the points.
     """
     looks = LOOKS.values()
     color = np.array([linear(entry.color) for entry in looks], dtype=np.float32)[look]
@@ -173,27 +181,29 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
     mirrored = DIELECTRIC * (1.0 - metal) + color * metal
     facing = np.maximum(np.sum(normals * to_eye, axis=1, keepdims=True), LEAST_FACING)
     open_to, sun = light.openness[:, None], light.sun[:, None]
-    bounce = BOUNCE_POWER * (0.5 - 0.5 * normals[:, 2:]) * (0.35 + 0.65 * open_to)
+    bounce = BOUNCE_POWER * (0.5 - 0.5 * normals[:, 2:]) * (HIDDEN_BOUNCE + (1.0 - HIDDEN_BOUNCE) * open_to)
     diffuse = color * (1.0 - metal) * (SUN_POWER * sun + SKY_POWER * light.sky[:, None] + bounce)
     grazing = np.maximum(1.0 - roughness, mirrored) - mirrored
     reflectance = mirrored + grazing * (1.0 - np.minimum(facing, 1.0)) ** 5
     mirror = 2.0 * facing * normals - to_eye
-    room = (0.3 + 0.7 * open_to) * _room(mirror, roughness) + sun * _box(mirror, roughness, *GLINT)
-    x = EXPOSURE * (diffuse + reflectance * room)
+    room = (HIDDEN_ROOM + (1.0 - HIDDEN_ROOM) * open_to) * _room(mirror, roughness)
+    exposed = EXPOSURE * (diffuse + reflectance * (room + sun * _box(mirror, roughness, *GLINT)))
     (a, b), (c, d, e) = FILM_CURVE
-    return np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0.0, 1.0)
+    return np.clip(exposed * (a * exposed + b) / (exposed * (c * exposed + d) + e), 0.0, 1.0)
 
 
 def _room(direction: Float32s, roughness: Float32s) -> Float32s:
     """Return the brightness [n x 1] of the room in a direction: walls, ground and soft boxes."""
-    brightness = GROUND + (WALL - GROUND) * smooth_step(direction[:, 2:], -_blur(roughness), _blur(roughness))
+    blur = _blur(roughness)
+    wall_share = smooth_step(direction[:, 2:], -blur, blur)
+    brightness = GROUND_BRIGHTNESS + (WALL_BRIGHTNESS - GROUND_BRIGHTNESS) * wall_share
     return sum((_box(direction, roughness, *box) for box in BOXES), start=brightness)
 
 
 def _box(direction: Float32s, roughness: Float32s, centre: Sequence[float], edge: float, power: float) -> Float32s:
     """Brightness [n x 1] of a soft box in a direction, the more blurred and the weaker the rougher the surface."""
     along, blur = direction @ np.array(centre, dtype=np.float32)[:, None], _blur(roughness)
-    return power * smooth_step(along, edge - blur, edge + blur) * (1.0 - 0.45 * roughness)
+    return power * smooth_step(along, edge - blur, edge + blur) * (1.0 - BOX_DIMMING * roughness)
 
 
 def _blur(roughness: Float32s) -> Float32s:
@@ -222,8 +232,16 @@ FAINTEST_SHADOW = 0.015
 """Share of missing light below which the ground is simply bright."""
 EDGE_FADE = 0.12
 """Share of the picture over which the ground fades towards each edge, so that pictures stand on a page unframed."""
+SHADOW_FADE = 1.0 / 3.0
+"""Share of the way from the rim of the ground to its centre on which shadows fade in: they do not end in a line."""
+GRID_FADE_POWER = 1.5
+"""Power of that way by which the ink of the grid grows: lines at the rim are fainter than shadows."""
 GRID_LINE_WIDTH = 1.1
 """Width of the grid's lines, pixels."""
+MESHES_ACROSS = 8.0
+"""Meshes of the grid across the machine, about: their width is a power of ten, m."""
+LEAST_MESH_PIXELS = 1.0 / 0.35
+"""Pixels of a mesh below which its lines are fainter, because they crowd towards the horizon."""
 
 
 @dataclass(frozen=True)
@@ -253,23 +271,25 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
 
     Args:
         ground: the ground below the machine.
-        light: on its `points`.
+        light: the light on the `points` of the ground.
         camera: the camera of the picture.
     """
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     rays = camera.rays(x, y)
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (ground.centre[2] - camera.eye[2]) / rays[..., 2]
-        at = camera.eye[:2] + distance[..., None] * rays[..., :2] - ground.centre[:2]
-    radius = np.linalg.norm(at, axis=-1) / (GROUND_RADIUS * ground.size)
-    here = (distance > 0.0) & (radius < 1.0)
-    at, fade = np.where(here[..., None], at, 0.0), np.where(here, 1.0 - np.minimum(radius, 1.0), 0.0)
+        offsets = camera.eye[:2] + distance[..., None] * rays[..., :2] - ground.centre[:2]
+    radius = np.linalg.norm(offsets, axis=-1) / (GROUND_RADIUS * ground.size)
+    is_ground = (distance > 0.0) & (radius < 1.0)
+    offsets = np.where(is_ground[..., None], offsets, 0.0)
+    nearness = np.where(is_ground, 1.0 - np.minimum(radius, 1.0), 0.0)  # 1 below the machine, 0 at the rim
     edge = _inside(x / camera.width) * _inside(y / camera.height)
-    place = (at[..., ::-1] / ground.size + 1.0) * 0.5 * (ground.side - 1)
-    missing = map_coordinates(_missing(ground, light), np.moveaxis(place, -1, 0), order=1, mode="nearest")
-    shadow = missing * np.minimum(3.0 * fade, 1.0) * edge
-    step = 10.0 ** round(math.log10(ground.size / 8.0))
-    return shadow.astype(np.float32), (_grid(at / step) * fade**1.5 * edge).astype(np.float32)
+    map_places = (offsets[..., ::-1] / ground.size + 1.0) * 0.5 * (ground.side - 1)
+    missing = map_coordinates(_missing(ground, light), np.moveaxis(map_places, -1, 0), order=1, mode="nearest")
+    shadow = missing * np.minimum(nearness / SHADOW_FADE, 1.0) * edge
+    mesh_width = 10.0 ** round(math.log10(ground.size / MESHES_ACROSS))
+    grid = _grid(offsets / mesh_width) * nearness**GRID_FADE_POWER * edge
+    return shadow.astype(np.float32), grid.astype(np.float32)
 
 
 def _missing(ground: Ground, light: Light) -> Float32s:
@@ -284,12 +304,17 @@ def _inside(share: Array) -> Float32s:
     return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE_FADE)
 
 
-def _grid(at: Array) -> Array:
-    """Share of each pixel [height x width] that the lines at whole numbers cover, fainter where they crowd."""
-    ink = np.zeros(at.shape[:2])
+def _grid(places: Array) -> Array:
+    """Share of each pixel that the lines at whole numbers cover, fainter where they crowd [height x width].
+
+    Args:
+        places: what each pixel shows, in meshes of the grid [height x width x 2].
+    """
+    ink = np.zeros(places.shape[:2])
     for axis in range(2):
-        lines = at[..., axis]
-        pixel = np.maximum(np.hypot(*np.gradient(lines)), 1e-9)
-        away = np.abs(lines - np.round(lines)) / pixel
-        ink = np.maximum(ink, np.clip(0.5 * GRID_LINE_WIDTH + 0.5 - away, 0.0, 1.0) * np.clip(0.35 / pixel, 0.0, 1.0))
+        across = places[..., axis]
+        pixel = np.maximum(np.hypot(*np.gradient(across)), 1e-9)  # meshes of a pixel
+        pixels_away = np.abs(across - np.round(across)) / pixel
+        covered = np.clip(0.5 * GRID_LINE_WIDTH + 0.5 - pixels_away, 0.0, 1.0)
+        ink = np.maximum(ink, covered * np.clip(1.0 / (LEAST_MESH_PIXELS * pixel), 0.0, 1.0))
     return ink

@@ -7,7 +7,7 @@ machine. Nothing is drawn here.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import AXES, ZERO, Vector
@@ -22,6 +22,9 @@ from kinetostat.views.scene.solids import unit
 
 JointKind: TypeAlias = Literal["revolute", "universal", "spherical", "helical", "flexure", "motor"]
 LinkKind: TypeAlias = Literal["bar", "telescope", "bars", "cable"]
+SPRING_PLACE = 0.65
+"""Place of a linear spring on the way to the next point, as a share of it: on the rod of a telescope, beyond its
+cylinder."""
 
 
 @dataclass(frozen=True)
@@ -125,26 +128,41 @@ class Anatomy:
 
 def anatomy(leg: Leg) -> Anatomy:
     """Read the visible parts of a leg at its pose."""
-    reading = _Reading(leg)
+    reader = _ChainReader(leg)
     for element in leg.chain:
-        reading.take(element)
+        reader.read(element)
     drives = [spring for spring in leg.springs if spring.actuated]
     return Anatomy(
         leg=leg.name,
         label=leg.label,
         actuated=bool(drives),
         removed=bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
-        joints=tuple(joint for joint in reading.joints if not _within_bars(joint, reading.links)),
-        links=tuple(reading.links),
-        rails=tuple(reading.finished_rails()),
-        springs=tuple(reading.springs),
-        foot=reading.first or ZERO,
-        head=reading.at or ZERO,
+        joints=tuple(joint for joint in reader.joints if not _within_bars(joint, reader.links)),
+        links=tuple(reader.links),
+        rails=tuple(reader.finished_rails()),
+        springs=tuple(reader.springs),
+        foot=reader.foot or ZERO,
+        head=reader.head or ZERO,
     )
 
 
-class _Reading:
-    """Reader of a chain: the parts so far, the point reached, and the slide that leads on from there."""
+class _Slide(NamedTuple):
+    """A slide of a chain: its name, its direction (unit vector), and whether an actuator moves it."""
+
+    name: str
+    axis: Vector
+    driven: bool
+
+
+class _ChainReader:
+    """Reader of a chain from base to platform.
+
+    Attributes:
+        joints, links, rails, springs: the parts that have been read.
+        foot, head: the first point of the chain, and the one that has been reached, base frame, m.
+        slide: the slide that leads on from the head; None if there is none.
+        pending_springs: linear springs, whose place is known with the next point.
+    """
 
     def __init__(self, leg: Leg) -> None:
         self.leg = leg
@@ -152,63 +170,68 @@ class _Reading:
         self.links: list[LinkPart] = []
         self.rails: list[RailPart] = []
         self.springs: list[SpringPart] = []
-        self.first: Vector | None = None
-        self.at: Vector | None = None
-        self.slide: tuple[str, Vector, bool] | None = None
-        self.waiting: list[Spring] = []
+        self.foot: Vector | None = None
+        self.head: Vector | None = None
+        self.slide: _Slide | None = None
+        self.pending_springs: list[Spring] = []
 
-    def take(self, element: Element) -> None:
+    def read(self, element: Element) -> None:
         """Read the next element."""
         match element:
             case Joint(point=None):
-                self.slide = (element.name, element.axis, False)
+                self.slide = _Slide(element.name, element.axis, driven=False)
             case Joint():
-                self.reach(_point(element))
-                self._turning(element)
+                self._go_to(_point(element))
+                self._add_axis(element)
             case Spring(actuated=True) if element.joint.point is None:
-                self.slide = (element.name, element.joint.axis, True)
+                self.slide = _Slide(element.name, element.joint.axis, driven=True)
             case Spring():
-                self._elastic(element)
+                self._add_spring(element)
             case Parallelogram():
-                self.reach(element.near)
                 half = element.side * (0.5 * element.width)
                 pinned = not self.leg.lines
-                self.links.append(LinkPart(element.name, "bars", element.near, element.far, side=half, pinned=pinned))
-                self.reach(element.far, linked=True)
+                bars = LinkPart(element.name, "bars", element.near, element.far, side=half, pinned=pinned)
+                self._go_along(bars)
             case Arm() | Beam():
-                self.reach(element.start)
-                self.links.append(
-                    LinkPart(self._name_of(element.name), "bar", element.start, element.end, up=element.up)
-                )
-                self.reach(element.end, linked=True)
-
-    def reach(self, point: Vector, linked: bool = False) -> None:
-        """Go on to a point. What lies between is a link, unless one was read already, or a slide along a rail."""
-        start, slide = self.at, self.slide
-        leaves_point = start is not None and not linked and not together(start, point)
-        if leaves_point and slide is not None and _along(slide[1], point - (start or point)):
-            pulls = any(spring.acts == "pulls" for spring in self.leg.springs)
-            kind: LinkKind = "cable" if pulls else "telescope"
-            self.links.append(LinkPart(slide[0], kind, start or point, point, slide[2]))
-        elif slide is not None:
-            self.rails.append(RailPart(slide[0], start or point, slide[1], slide[2]))
-        if leaves_point and (slide is None or not _along(slide[1], point - (start or point))):
-            self.links.append(LinkPart(self._name_of(""), "bar", start or point, point))
-        middle = (start or point) * 0.35 + point * 0.65
-        self.springs += [_spring_part(spring, middle) for spring in self.waiting]
-        self.waiting, self.slide, self.at = [], None, point
-        self.first = self.first or point
+                self._go_to(element.start)
+                name = self._link_name(element.name)
+                self._go_along(LinkPart(name, "bar", element.start, element.end, up=element.up))
 
     def finished_rails(self) -> list[RailPart]:
         """Return all rails; a slide at the end of the chain runs along the platform."""
-        if self.slide is None or self.at is None:
+        if self.slide is None or self.head is None:
             return self.rails
-        return [*self.rails, RailPart(self.slide[0], self.at, self.slide[1], self.slide[2])]
+        return [*self.rails, RailPart(self.slide.name, self.head, self.slide.axis, self.slide.driven)]
 
-    def _name_of(self, name: str) -> str:
+    def _go_along(self, link: LinkPart) -> None:
+        """Go on to the beginning of a link, and along it to its end."""
+        self._go_to(link.start)
+        self.links.append(link)
+        self.head = link.end
+
+    def _go_to(self, point: Vector) -> None:
+        """Go on to a point: what lies between is a link, or a slide, which is a telescope or runs along a rail."""
+        start = self.head or point
+        slide, is_apart = self.slide, not together(start, point)
+        telescopes = slide is not None and is_apart and _along(slide.axis, point - start)
+        if slide is not None and telescopes:
+            pulls = any(spring.acts == "pulls" for spring in self.leg.springs)
+            kind: LinkKind = "cable" if pulls else "telescope"
+            self.links.append(LinkPart(slide.name, kind, start, point, slide.driven))
+        elif slide is not None:
+            self.rails.append(RailPart(slide.name, start, slide.axis, slide.driven))
+        if is_apart and not telescopes:
+            self.links.append(LinkPart(self._link_name(""), "bar", start, point))
+        place = start * (1.0 - SPRING_PLACE) + point * SPRING_PLACE
+        self.springs += [_spring_part(spring, place) for spring in self.pending_springs]
+        self.pending_springs, self.slide, self.head = [], None, point
+        self.foot = self.foot or point
+
+    def _link_name(self, name: str) -> str:
         return name or f"{self.leg.name} link {len(self.links) + 1}"
 
-    def _turning(self, joint: Joint) -> None:
+    def _add_axis(self, joint: Joint) -> None:
+        """Add a joint about one axis, or a further axis to the joint that has this name and place."""
         last = self.joints[-1] if self.joints else None
         if last is not None and last.name == joint.name and together(last.point, _point(joint)):
             self.joints[-1] = _kind_of(replace(last, axes=(*last.axes, joint.axis)), self.leg)
@@ -216,12 +239,12 @@ class _Reading:
             kind: JointKind = "revolute" if is_zero(joint.pitch) else "helical"
             self.joints.append(JointPart(joint.name, kind, _point(joint), (joint.axis,)))
 
-    def _elastic(self, spring: Spring) -> None:
-        """A motor, a flexure, or a virtual joint of a link."""
+    def _add_spring(self, spring: Spring) -> None:
+        """Add a motor, a flexure, or a virtual joint of a link."""
         if spring.joint.point is None:
-            self.waiting.append(spring)
+            self.pending_springs.append(spring)
             return
-        self.reach(_point(spring.joint))
+        self._go_to(_point(spring.joint))
         if spring.actuated or spring.hinge:
             kind: JointKind = "motor" if spring.actuated else "flexure"
             self.joints.append(JointPart(spring.name, kind, _point(spring.joint), (spring.joint.axis,)))
@@ -239,18 +262,18 @@ def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
         return replace(joint, kind="universal")
     if len(leg.lines) == 1 and together(joint.point, _lower_end(leg)):
         strut = leg.lines[0].direction
-        across = unit(strut.cross(_far_from(strut)))
+        across = unit(strut.cross(_axis_far_from(strut)))
         return replace(joint, kind="universal", axes=(across, unit(strut.cross(across))))
     return replace(joint, kind="spherical")
 
 
 def _lower_end(leg: Leg) -> Vector:
-    """Return the first point of a leg with several axes."""
-    points = [joint.point for joint in leg.passive if joint.point is not None]
-    return points[0]
+    """Return the place of the first joint of a leg."""
+    return next(joint.point for joint in leg.passive if joint.point is not None)
 
 
-def _far_from(direction: Vector) -> Vector:
+def _axis_far_from(direction: Vector) -> Vector:
+    """Return the axis that is most nearly square to a direction; of equals to two decimals, the last."""
     return min(AXES[::-1], key=lambda axis: round(abs(axis.dot(direction)), 2))
 
 

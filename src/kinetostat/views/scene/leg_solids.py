@@ -1,6 +1,7 @@
 """Legs as solids: joints by their kind, links by their cross-section, rails and springs.
 
-Where the parts are, and how thick they are, is decided in `anatomy`.
+Where the parts are, and how thick they are, is decided in `anatomy`. Sizes of joints are written in radii of the leg;
+they were chosen by eye, so that joints look like those that one can buy, and say nothing about the machine.
 """
 
 import math
@@ -24,8 +25,6 @@ RAIL_LENGTH = 0.55
 """Length of a rail as a share of the machine's diagonal."""
 COIL_TURNS = 2.5
 """Turns of the spiral that stands for a torsional spring."""
-
-
 BARREL_SHARE = 0.56
 """Length of a cylinder as a share of its leg's length where the machine was loaded."""
 LONGEST_BARREL = 0.88
@@ -83,7 +82,7 @@ def _joint(joint: JointPart, towards: tuple[Vector, Vector], radius: float, mate
     """Return a joint.
 
     Args:
-        joint: its kind, place and axes.
+        joint: kind, place and axes of the joint.
         towards: vectors from its centre to the part before it and to the part after it, base axes.
         radius: the radius of the leg, m.
         material: the material of the leg.
@@ -181,7 +180,7 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
     """Return a rail on its bed, with brackets at its ends, and the carriage.
 
     Args:
-        rail: its axis and where the carriage is.
+        rail: the axis of the rail, and the place of its carriage.
         sizes: the proportions of the machine.
         radius: the radius of the leg, m.
         inward: the direction from the carriage to the rest of the leg.
@@ -191,17 +190,24 @@ def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> 
     length = (end - start).norm()
 
     def part(name: str, box: tuple[float, float, float], material: str, along: float, away: float) -> Solid:
-        """Return a box: depth away from the leg and width across in radii, length along the axis in m."""
-        deep, wide, long = box
-        origin = start + rail.axis * (along - 0.5 * long) + outward * (away * radius)
-        shape = shapes.block(deep * radius, wide * radius, long, 0.1 * radius)
+        """Return a part of the rail.
+
+        Args:
+            name: the name of the part.
+            box: depth away from the leg and width across it in radii, and length along the axis in m.
+            material: the material of the part.
+            along, away: place of its middle from the start of the rail, m, and of its face from the axis, in radii.
+        """
+        depth, width, extent = box
+        origin = start + rail.axis * (along - 0.5 * extent) + outward * (away * radius)
+        shape = shapes.block(depth * radius, width * radius, extent, 0.1 * radius)
         return Solid(f"{rail.name}/{name}", shape, material, upright(origin, rail.axis, outward))
 
-    at = (rail.point - start).dot(rail.axis)
+    carriage = (rail.point - start).dot(rail.axis)
     return [
         part("rail", (1.0, 1.4, length), "steel", 0.5 * length, 1.7),
         part("bed", (1.3, 3.4, length), "base", 0.5 * length, 2.8),
-        part("carriage", (1.8, 3.8, 4.4 * radius), "motor" if rail.driven else "joint", at, 0.9),
+        part("carriage", (1.8, 3.8, 4.4 * radius), "motor" if rail.driven else "joint", carriage, 0.9),
         part("first end", (3.0, 4.2, 1.0 * radius), "base", 0.0, 2.2),
         part("last end", (3.0, 4.2, 1.0 * radius), "base", length, 2.2),
     ]
@@ -222,10 +228,10 @@ def _link(link: LinkPart, radius: float, material: str, profile: Profile | None,
     """Return a link of a leg.
 
     Args:
-        link: its kind and ends.
+        link: kind and ends of the link.
         radius: the radius of a leg, m.
         material: the material of the leg.
-        profile: its cross-section, if the file gives one.
+        profile: the cross-section of the link, if the file gives one.
         span: the length of a telescope where the machine was loaded, m.
     """
     if link.kind == "telescope":
@@ -254,18 +260,19 @@ def _bar(link: LinkPart, radius: float, material: str, profile: Profile | None) 
 def _telescope(link: LinkPart, radius: float, material: str, span: float) -> list[Solid]:
     """Return a cylinder at the start, from which the rod comes."""
     length, along = link.span.norm(), unit(link.span)
-    gap = min(2.0 * radius, 0.12 * length)
+    gap = min(2.0 * radius, 0.12 * length)  # between joint and cylinder, where the stem is seen
     barrel = min(BARREL_SHARE * span, LONGEST_BARREL * length) - gap
-    big = 1.25 * radius
+    barrel_radius = 1.25 * radius
+    rim_radius = 1.14 * barrel_radius
 
-    def part(name: str, shape: Turned, of: str, distance: float) -> Solid:
-        return Solid(f"{link.name}/{name}", shape, of, upright(link.start + along * distance, along))
+    def part(name: str, shape: Turned, part_material: str, distance: float) -> Solid:
+        return Solid(f"{link.name}/{name}", shape, part_material, upright(link.start + along * distance, along))
 
     return [
         part("stem", shapes.shaft(0.7 * radius, gap + 0.2 * radius), "joint", 0.0),
-        part("cylinder", shapes.shaft(big, barrel, 0.2 * radius), material, gap),
-        part("cap", shapes.shaft(1.14 * big, 0.9 * radius, 0.15 * radius), "joint", gap),
-        part("gland", shapes.shaft(1.14 * big, 0.8 * radius, 0.15 * radius), "joint", gap + barrel - 0.7 * radius),
+        part("cylinder", shapes.shaft(barrel_radius, barrel, 0.2 * radius), material, gap),
+        part("cap", shapes.shaft(rim_radius, 0.9 * radius, 0.15 * radius), "joint", gap),
+        part("gland", shapes.shaft(rim_radius, 0.8 * radius, 0.15 * radius), "joint", gap + barrel - 0.7 * radius),
         part("rod", shapes.shaft(0.62 * radius, length - gap - barrel + radius), "steel", gap + barrel - radius),
     ]
 

@@ -1,6 +1,7 @@
 """Overlays of an analysis over its machine: compliance ellipsoids, soft and free directions, load, deflected shape.
 
-The symbols come first, whose sizes the machine decides; after them the machine's answer is turned into them.
+The symbols come first: their sizes are shares of the machine's diagonal, so that they are seen beside its legs. After
+them the answer of the machine is turned into symbols.
 """
 
 import math
@@ -90,9 +91,10 @@ def twist_solids(twists: Sequence[Sequence[float]], point: Vector, sizes: Propor
     for n, twist in enumerate(twists, 1):
         turning, sliding = Vector(*twist[:3]), Vector(*twist[3:])
         if turning.norm() > 0.0:
+            # The arrow stands on the axis of the twist, beside the point. Its foot is omega x v / omega^2 from there.
             foot = point + turning.cross(sliding) * (1.0 / turning.dot(turning))
-            near = foot + turning * ((point - foot).dot(turning) / turning.dot(turning))
-            solids += _direction_solids(f"free twist {n}", "soft rotation", True, unit(turning), near, sizes)
+            nearest = foot + turning * ((point - foot).dot(turning) / turning.dot(turning))
+            solids += _direction_solids(f"free twist {n}", "soft rotation", True, unit(turning), nearest, sizes)
         else:
             solids += _direction_solids(f"free twist {n}", "soft translation", False, unit(sliding), point, sizes)
     return solids
@@ -193,8 +195,8 @@ def loaded_overlays(
 def motions_of(state: LoadedState, response: Response) -> Deflection:
     """Return the motions of a machine from its unloaded pose, of which the response is, to its rest."""
     by_name = dict(zip(state.components, state.displacement, strict=True))
-    turned, moved = ([by_name.get(name, 0.0) for name in COMPONENTS[part]] for part in (slice(3), slice(3, 6)))
-    return Deflection(response.load, Twist(Vector(*turned), Vector(*moved)), state.links)
+    amounts = [by_name.get(name, 0.0) for name in COMPONENTS]
+    return Deflection(response.load, Twist(Vector(*amounts[:3]), Vector(*amounts[3:])), state.links)
 
 
 def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> float:
@@ -241,9 +243,9 @@ def deflection_overlays(
     loads = load_solids(moved.load, machine.tool_point(configuration.platform), sizes)
     if not _finite(moved):
         return loads, 1.0
-    moving = _moving(machine, configuration, sizes)
-    chosen = factor or _exaggeration(moved, moving.reach, sizes.diagonal)
-    return [*loads, *_ghost(moved, moving, chosen)], chosen
+    parts = _moving_parts(machine, configuration, sizes)
+    chosen = factor or _exaggeration(moved, parts.reach, sizes.diagonal)
+    return [*loads, *_ghost(moved, parts, chosen)], chosen
 
 
 def swing_data(
@@ -259,30 +261,29 @@ def swing_data(
         machine, configuration, sizes: as for `machine_scene`.
         moved: small motions, of any size.
     """
-    moving = _moving(machine, configuration, sizes)
-    largest = _largest(moved, moving.reach)
+    parts = _moving_parts(machine, configuration, sizes)
+    largest = _largest(moved, parts.reach)
     if not 0.0 < largest < math.inf:
         return []
     factor = SHOWN_DEFLECTION * sizes.diagonal / largest
     solids = []
-    for there, middle, back in zip(*(_ghost(moved, moving, end) for end in (factor, 0.0, -factor)), strict=True):
-        drawn, first, last = (solid_data(solid) for solid in (middle, there, back))
-        ends = [first["place"], last["place"]]
-        if isinstance(there.shape, Swept) and isinstance(middle.shape, Swept):
-            pairs = zip(there.shape.path, middle.shape.path, strict=True)
+    for first, middle, last in zip(*(_ghost(moved, parts, share) for share in (factor, 0.0, -factor)), strict=True):
+        ends = [solid_data(end)["place"] for end in (first, last)]
+        if isinstance(first.shape, Swept) and isinstance(middle.shape, Swept):
+            pairs = zip(first.shape.path, middle.shape.path, strict=True)
             ends = [[a - b for a, b in zip(*pair, strict=True)] for pair in pairs]
-        solids.append({**drawn, "ends": ends})
+        solids.append({**solid_data(middle), "ends": ends})
     return solids
 
 
 @dataclass(frozen=True)
-class _Moving:
+class _MovingParts:
     """Solids and sizes of the parts that a machine moves when it deflects.
 
     Attributes:
         body: platform and tool.
-        point: the tool point.
-        reach: the reach of the platform from there, m.
+        point: the tool point, base frame, m.
+        reach: greatest distance of a joint of the platform from that point, m.
         radii: the radii of the links by leg, m.
     """
 
@@ -292,12 +293,12 @@ class _Moving:
     radii: Mapping[str, float]
 
 
-def _moving(machine: Machine, configuration: Configuration, sizes: Proportions) -> _Moving:
+def _moving_parts(machine: Machine, configuration: Configuration, sizes: Proportions) -> _MovingParts:
     point, legs = machine.tool_point(configuration.platform), [anatomy(leg) for leg in configuration.legs]
     _, platform = plates(configuration, legs, sizes.leg)
     body = [*platform.solids(), *tool_solids(machine, configuration, platform, sizes.leg)]
     reach = max((joint - point).norm() for joint in platform.joints)
-    return _Moving(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
+    return _MovingParts(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
 
 
 def _finite(moved: Deflection) -> bool:
@@ -316,10 +317,10 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
     largest = _largest(moved, reach)
     if not 0.0 < largest < math.inf:
         return 1.0
-    wanted = SHOWN_DEFLECTION * diagonal / largest
-    power = 10.0 ** math.floor(math.log10(wanted))
-    # A little more than wanted is allowed, so that a factor that is round already does not fall to the next one.
-    return max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted * 1.0001), default=power)
+    # A little more is allowed, so that a factor that is round already does not fall to the next one by round-off.
+    most = 1.0001 * SHOWN_DEFLECTION * diagonal / largest
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most)
 
 
 def _largest(moved: Deflection, reach: float) -> float:
@@ -328,16 +329,16 @@ def _largest(moved: Deflection, reach: float) -> float:
     return max([*links, moved.motion.translational.norm() + moved.motion.rotational.norm() * reach])
 
 
-def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
+def _ghost(moved: Deflection, parts: _MovingParts, factor: float) -> list[Solid]:
     """Return the deflected machine: its links as bent wires, and its platform at its displaced place."""
     wires = []
     for n, link in enumerate(moved.links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
-        path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * moving.radii[link.leg]
+        path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * parts.radii[link.leg]
         if len(set(path)) == len(path):  # a link without a length is no wire
             wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
-    motion = exaggerated_displacement(moved.motion, moving.point, factor)
-    body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
+    motion = exaggerated_displacement(moved.motion, parts.point, factor)
+    body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in parts.body]
     return [*wires, *body]
 
 
