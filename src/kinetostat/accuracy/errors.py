@@ -13,15 +13,18 @@ which is exact for what enters linearly.
 Source: theory (45) and (49).
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from kinetostat.accuracy.closing import Screws, at_points, free_screws, in_lengths, independent_columns
-from kinetostat.accuracy.rows import HomeRows, LegRow, Unit, home_rows, random_coordinates
+from kinetostat.accuracy.rows import ActuatorReading, HomeRows, LegRow, Unit, home_rows, random_coordinates
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine
@@ -30,12 +33,15 @@ from kinetostat.numerics.motions import Motions, logarithm
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
 
 SHARED_STEP = 1e-5
-"""Step of central differences, rad or in units of the machine's length; their error is its square."""
+"""Step of central differences, rad or in units of the machine's length: their error is its square, 1e-10, and round-off
+adds about 1e-16 over the step."""
 SHARED_KINDS = ("length", "angle")
 """Kinds of the numbers of a family that are shared errors."""
 SHARED_TABLE = "geometry."
+"""Beginning of the paths of numbers of a family that are shared errors."""
 ZEROS, BASE, PLATFORM, LENGTHS, LINKS, TILTS, OFFSETS = range(7)
-"""Ranks of errors: where only some of them can be told apart, those of the lower ranks are listed."""
+"""Ranks of errors: where only some of them can be told apart, those of the lower ranks are listed. What people measure
+and set comes first."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +70,9 @@ class Insertion:
     Attributes:
         leg: number of the leg.
         behind: number of the leg's motions that come before it.
-        twist: per unit of the error, in home place [6].
-        factor: computes the factor of the twist [n] at coordinates of the leg [n x coordinates]; None for 1.
+        twist: the screw motion per unit of the error, in home place [6].
+        factor: function that computes the factor of the twist [n] at coordinates of the leg [n x coordinates]; None
+            if the factor is 1.
     """
 
     leg: int
@@ -74,7 +81,7 @@ class Insertion:
     factor: Callable[[Array], Array] | None = None
 
     def amount(self, coordinates: Array) -> Array:
-        """The factor of the twist [n] at coordinates of the leg [n x coordinates]."""
+        """Return the factor of the twist [n] at coordinates of the leg [n x coordinates]."""
         return np.ones(len(coordinates)) if self.factor is None else self.factor(coordinates)
 
 
@@ -90,38 +97,39 @@ def leg_error_sources(rows: HomeRows) -> list[Source]:
     """
     sources: list[Source] = []
     for number, row in enumerate(rows.legs):
-        every = [source for _, source in sorted(_candidates(number, row, rows), key=lambda entry: entry[0])]
-        sources += _independent_sources(row, rows, every)
+        by_rank = sorted(_candidates(number, row, rows), key=lambda candidate: candidate[0])
+        sources += _independent_sources(row, rows, [source for _, source in by_rank])
         sources += _moving_sources(row, rows, list(_clearances(number, row)))[0]
     return sources
 
 
 def effects(row: LegRow, rows: HomeRows, sources: Sequence[Source], coordinates: Array) -> Array:
-    """The work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
-    at = row.chain.place(coordinates)
-    tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
-    screws = free_screws(row, rows, at, tool)
+    """Return the work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
+    place = row.chain.place(coordinates)
+    platform_point = place.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
+    screws = free_screws(row, rows, place, platform_point)
     wrenches = Screws(screws, independent_columns(screws)).wrenches
     columns = []
     for _, insertions in sources:
-        ends = sum(
-            at.before[i.behind].twist(np.broadcast_to(i.twist, (len(tool), 6))) * i.amount(coordinates)[:, None]
+        twists = sum(
+            place.before[i.behind].twist(np.broadcast_to(i.twist, (len(coordinates), 6)))
+            * i.amount(coordinates)[:, None]
             for i in insertions
         )
-        moved = in_lengths(at_points(np.asarray(ends), tool), rows.length)
-        columns.append(np.einsum("nim,ni->nm", wrenches, moved).ravel())
+        displacements = in_lengths(at_points(np.asarray(twists), platform_point), rows.length)
+        columns.append(np.einsum("nim,ni->nm", wrenches, displacements).ravel())
     return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
 def _moving_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
-    """The errors that move the platform at any of the random coordinates, and their `effects`."""
+    """Return the errors that move the platform at any of the random coordinates, and their `effects`."""
     columns = effects(row, rows, sources, random_coordinates(row, rows.length))
     moving = np.flatnonzero(np.linalg.norm(columns, axis=0) > SEEN_BY_LEG / rows.length)
     return [sources[int(number)] for number in moving], columns[:, moving]
 
 
 def _independent_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> list[Source]:
-    """The errors whose effects do not follow from the effects of those before them, in the order of the leg."""
+    """Return the errors whose effects do not follow from the effects of those before them, in the order of the leg."""
     moving, columns = _moving_sources(row, rows, sources)
     independent = [moving[number] for number in independent_columns(columns[None])]
     return sorted(independent, key=lambda source: source[1][0].behind)
@@ -129,36 +137,36 @@ def _independent_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source])
 
 def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int, Source]]:
     """Generate every error that the joints and the end of a leg may have, each with its rank."""
-    before: Vector | None = None
+    last_point: Vector | None = None
     for place, unit in enumerate(row.units):
-        named = _JointErrors(number, row.name, unit)
+        joint = _JointErrors(number, row.name, unit)
         if unit.drive:
-            yield from named.drive(row)
-        point = unit.point or before or ZERO
-        if place == 0 or unit.point is None or before is None:
+            yield from ((ZEROS, source) for source in joint.drive(row, unit.drive))
+        if place == 0 or unit.point is None or last_point is None:
             rank = BASE if place == 0 else LINKS
             where = "on the base" if place == 0 else "on its link"
-            yield from ((rank, named.shift(name, axis, where)) for name, axis in _named_directions(None))
-        elif (unit.point - before).norm() > NO_LINK * rows.length:
-            along = (unit.point - before) * (1.0 / (unit.point - before).norm())
-            yield LENGTHS, named.length(along, row.units[place - 1].name)
-            yield from ((LINKS, named.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
+            yield from ((rank, joint.shift(name, axis, where)) for name, axis in _named_directions(None))
+        elif (unit.point - last_point).norm() > NO_LINK * rows.length:
+            along = (unit.point - last_point) * (1.0 / (unit.point - last_point).norm())
+            yield LENGTHS, joint.length(along, row.units[place - 1].name)
+            yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
         elif unit.kind != "ball":
-            yield from ((OFFSETS, named.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+            yield from ((OFFSETS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+        point = unit.point or last_point or ZERO
         if unit.kind != "ball":
             yield from (
-                (TILTS, named.tilt(name, axis, point)) for name, axis in _named_directions(_axis_without_tilt(unit))
+                (TILTS, joint.tilt(name, axis, point)) for name, axis in _named_directions(_axis_without_tilt(unit))
             )
         if unit.kind == "universal":
-            yield from ((OFFSETS, source) for source in named.between_axes(point))
+            yield from ((OFFSETS, source) for source in joint.between_axes(point))
         if unit.bars:
-            yield from ((LENGTHS, source) for source in named.bars(unit.bars, row.coordinate[unit.first]))
-        before = unit.point or before
+            yield from ((LENGTHS, source) for source in joint.bars(unit.bars, row.coordinate[unit.first]))
+        last_point = unit.point or last_point
     axes = [Vector(*column) for column in rows.rotation.T.tolist()]
-    named, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
+    last_joint, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
     for name, axis in zip("xyz", axes, strict=True):
-        yield PLATFORM, named.shift(f"platform.{name}", axis, "on the platform", end)
-        yield TILTS, named.tilt(f"platform.r{name}", axis, before or Vector(*rows.point.tolist()), end)
+        yield PLATFORM, last_joint.shift(f"platform.{name}", axis, "on the platform", end)
+        yield TILTS, last_joint.tilt(f"platform.r{name}", axis, last_point or Vector(*rows.point.tolist()), end)
 
 
 def _clearances(number: int, row: LegRow) -> Iterator[Source]:
@@ -166,19 +174,18 @@ def _clearances(number: int, row: LegRow) -> Iterator[Source]:
     for unit in row.units:
         if unit.drive or unit.bars:
             continue
-        named = _JointErrors(number, row.name, unit)
+        joint = _JointErrors(number, row.name, unit)
         for name, axis in _named_directions(unit.axes[0] if unit.kind == "slide" else None):
-            yield named.clearance(name, axis)
+            yield joint.clearance(name, axis)
 
 
 def _axis_without_tilt(unit: Unit) -> Vector | None:
-    """The axis about which a tilt changes nothing; None for a parallelogram, whose near side may tilt about any
-    axis."""
+    """Return the axis about which a tilt changes nothing; None for a parallelogram, whose side may tilt about any."""
     return unit.axes[0] if unit.bars is None else None
 
 
 def _named_directions(axis: Vector | None) -> list[tuple[str, Vector]]:
-    """Name the base axes or, for an axis, two directions across it: base axes where they are, else u (level) and v."""
+    """Name the base axes or, for an axis, two directions across it: two base axes if possible, else u (level) and v."""
     if axis is None:
         return list(zip("xyz", AXES, strict=True))
     level = [pair for pair in zip("xyz", AXES, strict=True) if abs(pair[1].dot(axis)) < PARALLEL_AXES]
@@ -190,7 +197,7 @@ def _named_directions(axis: Vector | None) -> list[tuple[str, Vector]]:
 
 
 def _direction(axis: Vector) -> str:
-    """The name of a base axis, or the components of another direction."""
+    """Return the name of a base axis, or the components of another direction."""
     for name, base in zip("xyz", AXES, strict=True):
         if abs(axis.dot(base)) > 1.0 - PARALLEL_AXES:
             return name
@@ -198,18 +205,24 @@ def _direction(axis: Vector) -> str:
 
 
 def _slide(axis: Vector) -> Array:
-    """The screw of a unit displacement along an axis [6]."""
+    """Return the screw of a unit displacement along an axis [6]."""
     return np.array(Joint(axis).twist(ZERO).components(), dtype=float)
 
 
 def _turn(axis: Vector, point: Vector) -> Array:
-    """The screw of a unit rotation about an axis through a point [6]."""
+    """Return the screw of a unit rotation about an axis through a point [6]."""
     return np.array(Joint(axis, point).twist(ZERO).components(), dtype=float)
 
 
 @dataclass(frozen=True)
 class _JointErrors:
-    """The errors of one joint of a leg, each with its words and the screw motion that it puts into the leg."""
+    """The errors of one joint of a leg, each with its words and the screw motion that it puts into the leg.
+
+    Attributes:
+        number: number of the leg.
+        leg: name of the leg.
+        unit: the joint.
+    """
 
     number: int
     leg: str
@@ -225,27 +238,27 @@ class _JointErrors:
         return self.leg if "leg" in self.leg else f'leg "{self.leg}"'
 
     def shift(self, name: str, axis: Vector, where: str, behind: int | None = None) -> Source:
-        """A joint that lies elsewhere on its link, or the platform elsewhere on the last one."""
+        """Return the error of a joint that lies elsewhere on its link, or of the platform elsewhere on the last one."""
         words = f"position of the {self.title} {where} along {_direction(axis)}"
         # A joint that lies further along the platform leaves the platform so much behind.
         return self._source(name, "length", words, _slide(axis if behind is None else -axis), behind)
 
     def length(self, along: Vector, before: str) -> Source:
-        """A link that is longer."""
+        """Return the error of a link that is longer."""
         words = f"length of {self._of} from its {before} to its {self.unit.name}"
         return self._source("length", "length", words, _slide(along))
 
     def tilt(self, name: str, axis: Vector, point: Vector, behind: int | None = None) -> Source:
-        """A joint whose axes are turned on the link before it, or the platform on the last joint."""
-        what = "near side of the" if self.unit.bars is not None else "axis of the"
+        """Return the error of a joint whose axes are turned on the link before it, or of the platform on the joint."""
         if behind is not None:
             words = f"direction of the {self.title} on the platform about {_direction(axis)}"
             return self._source(name, "angle", words, -_turn(axis, point), behind)
-        words = f"direction of the {what} {self.title} about {_direction(axis)}"
+        part = "near side" if self.unit.bars is not None else "axis"
+        words = f"direction of the {part} of the {self.title} about {_direction(axis)}"
         return self._source(f"r{name}", "angle", words, _turn(axis, point))
 
     def between_axes(self, point: Vector) -> Iterator[Source]:
-        """A universal joint whose axes are not perpendicular or do not meet."""
+        """Generate the errors of a universal joint whose axes are not perpendicular or do not meet."""
         normal = self.unit.axes[0].cross(self.unit.axes[1])
         normal, behind = normal * (1.0 / normal.norm()), self.unit.first + 1
         words = f"angle between the axes of the {self.title}"
@@ -254,39 +267,36 @@ class _JointErrors:
         yield self._source("offset", "length", words, _slide(normal), behind)
 
     def bars(self, bars: Parallelogram, coordinate: int) -> Iterator[Source]:
-        """Bars that are both longer, or longer on one side than on the other."""
+        """Generate the errors of bars that are both longer, or longer on one side than on the other."""
         along, span = bars.along, float((bars.far - bars.near).norm())
-        level, upright = float(bars.side.dot(along)), float(bars.normal.dot(bars.side.cross(along)))
+        cosine, sine = float(bars.side.dot(along)), float(bars.normal.dot(bars.side.cross(along)))
 
-        def spread(coordinates: Array) -> Array:
+        def rotation_per_difference(coordinates: Array) -> Array:
+            """Return the width over the distance of the bars [n]: close bars turn the far side more."""
             angle = coordinates[:, coordinate] / span
-            return np.asarray(1.0 / (upright * np.cos(angle) + level * np.sin(angle)))
+            return np.asarray(1.0 / (sine * np.cos(angle) + cosine * np.sin(angle)))
 
         behind = self.unit.first + 1
         words = f"length of both bars of the {self.title}"
         yield self._source("length", "length", words, _slide(along), behind)
         words = f"length of the bar of the {self.title} at +side less that at -side"
         twist = _turn(bars.normal, bars.far) / float(bars.width)
-        yield self._source("difference", "length", words, twist, behind, spread)
+        yield self._source("difference", "length", words, twist, behind, rotation_per_difference)
 
-    def drive(self, row: LegRow) -> Iterator[tuple[int, Source]]:
-        """Zero and gain of an actuator."""
-        drive = self.unit.drive
-        if drive is None:
-            return
-        at, home, sense = drive.coordinate, drive.home, drive.sense
+    def drive(self, row: LegRow, drive: ActuatorReading) -> Iterator[Source]:
+        """Generate zero and gain of the joint's actuator."""
 
-        def travel(coordinates: Array) -> Array:
-            return np.asarray(home + sense * coordinates[:, at])
+        def actuator_coordinate(coordinates: Array) -> Array:
+            return np.asarray(drive.home + drive.sense * coordinates[:, drive.coordinate])
 
         twist = row.twists[self.unit.first] * drive.sense
         kind = "length" if drive.slides else "angle"
-        yield ZEROS, self._source("zero", kind, f"zero of the {self.title}", twist, group="zeros")
+        yield self._source("zero", kind, f"zero of the {self.title}", twist, group="zeros")
         words = f"gain of the {self.title}"
-        yield ZEROS, self._source("gain", "share", words, twist, factor=travel, group="gains")
+        yield self._source("gain", "share", words, twist, factor=actuator_coordinate, group="gains")
 
     def clearance(self, name: str, axis: Vector) -> Source:
-        """A joint that is free to move a little where it should hold."""
+        """Return the error of a joint that is free to move a little where it should hold."""
         words = f"clearance of the {self.title} along {_direction(axis)}"
         return self._source(f"clearance.{name}", "length", words, _slide(axis), group="clearances")
 
@@ -300,7 +310,8 @@ class _JointErrors:
         factor: Callable[[Array], Array] | None = None,
         group: str = "geometry",
     ) -> Source:
-        error = MachineError(f"legs.{self.leg}.{self.unit.name}.{name}", kind, group, words, self.leg)
+        path = f"legs.{self.leg}.{self.unit.name}.{name}"
+        error = MachineError(path=path, kind=kind, group=group, words=words, leg=self.leg)
         return error, (Insertion(self.number, self.unit.first if behind is None else behind, twist, factor),)
 
 
@@ -308,22 +319,23 @@ def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
     """List the lengths and angles of the table [geometry] of a family; none of a machine written leg by leg.
 
     Args:
-        machine: with numbers.
+        machine: the machine with numbers.
         rows: the machine at its home place.
     """
     if machine.family.chains:
         return []
-    given, sources = values(machine), []
+    numbers, sources = values(machine), []
     fields = {leaf: p for p in parameters(machine.family) if p.path.startswith(SHARED_TABLE) for leaf in p.leaves}
     for path, field in fields.items():
         kind = field.quantity.kind
         if kind not in SHARED_KINDS:
             continue
         step = SHARED_STEP * (rows.length if kind == "length" else 1.0)
-        more, less = (home_rows(with_values(machine, {path: float(given[path]) + s * step})) for s in (1.0, -1.0))
+        more, less = (home_rows(with_values(machine, {path: float(numbers[path]) + s * step})) for s in (1.0, -1.0))
         insertions = tuple(_shared_insertions(rows, more, less, 2.0 * step))
         if insertions and all(np.isfinite(insertion.twist).all() for insertion in insertions):
-            sources.append((MachineError(path, kind, "shared", field.quantity.meaning, ""), insertions))
+            error = MachineError(path=path, kind=kind, group="shared", words=field.quantity.meaning, leg="")
+            sources.append((error, insertions))
     return sources
 
 
@@ -349,12 +361,57 @@ def _shared_insertions(rows: HomeRows, more: HomeRows, less: HomeRows, step: flo
 
 
 def _axis_motion(motion: int, unit: Unit, more: Unit, less: Unit) -> Array:
-    """The screw motion that takes the axis of a motion from one place to another [6]."""
-    which = motion - unit.first
-    axis = 0 if unit.bars else which
+    """Return the screw motion that takes the axis of a motion from one place to another [6].
+
+    Args:
+        motion: number of the motion in the leg.
+        unit, more, less: its joint as drawn, with more, and with less of a number.
+    """
+    place = motion - unit.first
+    axis = 0 if unit.bars else place
     turning = less.axes[axis].cross(more.axes[axis])
-    points = [end.bars.far if end.bars and which else end.point for end in (unit, more, less)]
-    if points[0] is None or points[1] is None or points[2] is None or unit.kind == "slide":
+    point, more_point, less_point = (
+        joint.bars.far if joint.bars and place else joint.point for joint in (unit, more, less)
+    )
+    if point is None or more_point is None or less_point is None or unit.kind == "slide":
         return np.array([*turning.components(), 0.0, 0.0, 0.0], dtype=float)
-    shift = points[0].cross(turning) + points[1] - points[2]
+    shift = point.cross(turning) + more_point - less_point
     return np.array([*turning.components(), *shift.components()], dtype=float)
+
+
+@dataclass(frozen=True)
+class FlexibleSpring:
+    """Motion of the tool at n poses by the compliance of a spring.
+
+    Attributes:
+        twist: twist of the tool per unit of the deformation, at the tool point, base axes, SI [n x 6].
+        compliance: compliance of the spring, m/N or rad/(N·m) [n].
+    """
+
+    twist: Array
+    compliance: Array
+
+    def deflection(self, wrenches: Array) -> Array:
+        """Return the twist of the tool by its deformation under wrenches at the tool point [n x 6], SI [n x 6]."""
+        load = np.einsum("ni,ni->n", self.twist, wrenches)
+        return np.asarray(self.twist * (self.compliance * load)[:, None])
+
+
+def flexible_springs(response: Response, count: int) -> Iterator[tuple[FlexibleSpring, MachineError]]:
+    """Generate the springs that deflect, each with the relative error of its compliance.
+
+    Args:
+        response: response of the machine at the poses.
+        count: number of poses.
+    """
+    of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
+    parts = Counter(spring.of for _, spring in of_legs)
+    numbers = zip(of_legs, response.statics.flexibility, response.statics.compliance, strict=True)
+    for (leg, spring), twist, compliance in numbers:
+        size = stacked_columns([compliance], count)[:, 0]
+        if np.isfinite(size).all() and (size > 0.0).any():
+            part = (spring.of if parts[spring.of] == 1 else spring.name).removeprefix(f"{leg} ").replace(".", " ")
+            words = f"compliance of the {part} of {leg}, relative"
+            path = f"legs.{leg}.{part}.compliance"
+            error = MachineError(path=path, kind="share", group="compliances", words=words, leg=leg)
+            yield FlexibleSpring(stacked_columns(twist.components(), count), size), error

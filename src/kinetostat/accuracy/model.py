@@ -26,9 +26,17 @@ from kinetostat.accuracy.closing import (
     legs_in_place,
     tool_at,
 )
-from kinetostat.accuracy.errors import Insertion, MachineError, Source, leg_error_sources, shared_error_sources
+from kinetostat.accuracy.errors import (
+    FlexibleSpring,
+    Insertion,
+    MachineError,
+    Source,
+    flexible_springs,
+    leg_error_sources,
+    shared_error_sources,
+)
 from kinetostat.accuracy.rows import Errors, HomeRows, LegRow, home_rows, like_rows, random_coordinates
-from kinetostat.arrays import Array, Codes, Integers
+from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
@@ -42,25 +50,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
 
 LOAD = "load."
-"""Prefix of the fields of [load], which press joints and move no leg of the drawn machine."""
-
-
-@dataclass(frozen=True)
-class FlexibleSpring:
-    """Motion of the tool at n poses by the compliance of a spring.
-
-    Attributes:
-        twist: twist of the tool per unit of the deformation, at the tool point, base axes, SI [n x 6].
-        compliance: compliance of the spring, m/N or rad/(N·m) [n].
-    """
-
-    twist: Array
-    compliance: Array
-
-    def deflection(self, wrenches: Array) -> Array:
-        """The twist of the tool by its deformation under wrenches at the tool point [n x 6], SI [n x 6]."""
-        load = np.einsum("ni,ni->n", self.twist, wrenches)
-        return np.asarray(self.twist * (self.compliance * load)[:, None])
+"""Beginning of the paths of loads, which press joints and move no leg of the drawn machine."""
 
 
 @dataclass(frozen=True)
@@ -89,18 +79,16 @@ class DrawnMachine:
     leg_compliances: tuple[Array, ...]
 
     def at_poses(self, rows: Integers) -> "DrawnMachine":
-        """The machine at some of the poses [rows]."""
-        state = self.state.at(rows)
-        springs = tuple(FlexibleSpring(spring.twist[rows], spring.compliance[rows]) for spring in self.springs)
+        """Return the machine at some of the poses [rows]."""
         return DrawnMachine(
-            self.status[rows],
-            state,
-            self.tool[rows],
-            self.axes[rows],
-            self.actuators[rows],
-            self.load[rows],
-            springs,
-            tuple(compliance[rows] for compliance in self.leg_compliances),
+            status=self.status[rows],
+            state=self.state.at(rows),
+            tool=self.tool[rows],
+            axes=self.axes[rows],
+            actuators=self.actuators[rows],
+            load=self.load[rows],
+            springs=tuple(FlexibleSpring(spring.twist[rows], spring.compliance[rows]) for spring in self.springs),
+            leg_compliances=tuple(compliance[rows] for compliance in self.leg_compliances),
         )
 
 
@@ -111,10 +99,10 @@ class ErrorsBehind:
     Attributes:
         leg: number of the leg.
         behind: number of the leg's motions that come before them.
-        numbers: of the errors, k of them.
+        numbers: numbers of the errors, k of them.
         twists: the small screw motion in home place per unit of each [k x 6].
-        factors: what each twist is multiplied by at the poses [n x k].
-        steady: whether all of these factors are 1.
+        factors: factors of the twists at the poses [n x k].
+        are_constant: whether all of these factors are 1.
     """
 
     leg: int
@@ -122,20 +110,20 @@ class ErrorsBehind:
     numbers: tuple[int, ...]
     twists: Array
     factors: Array
-    steady: bool
+    are_constant: bool
 
     def motion(self, values: Array) -> Array | None:
-        """Their screw motion [1 or n x 6] at values of all errors [1 or n x errors]; None if none is there."""
+        """Return their screw motion [1 or n x 6] at values of all errors [1 or n x errors]; None if all are 0."""
         amounts = values[:, self.numbers]
         if not amounts.any():
             return None
-        return np.asarray((amounts if self.steady else amounts * self.factors) @ self.twists)
+        return np.asarray((amounts if self.are_constant else amounts * self.factors) @ self.twists)
 
     def among(self, wanted: Collection[int]) -> "ErrorsBehind":
-        """Those of them that are wanted."""
-        kept = [place for place, number in enumerate(self.numbers) if number in wanted]
-        numbers = tuple(self.numbers[place] for place in kept)
-        return replace(self, numbers=numbers, twists=self.twists[kept], factors=self.factors[:, kept])
+        """Return those of them whose numbers are wanted."""
+        places = [place for place, number in enumerate(self.numbers) if number in wanted]
+        numbers = tuple(self.numbers[place] for place in places)
+        return replace(self, numbers=numbers, twists=self.twists[places], factors=self.factors[:, places])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,12 +133,12 @@ class ErrorModel:
     Attributes:
         machine: the machine as drawn.
         drawn: the machine without errors at the poses.
-        errors: every number that may be wrong.
+        errors: the numbers that may be wrong.
         sources: the screw motions that errors put into the legs, in the order of `errors`; compliances, which are the
             last errors, put none there.
         rows: the legs at the home place.
         tool_home: the tool point at the home place, m [3].
-        independent: by leg, the free screws that do not follow from those before them wherever the leg is.
+        independent: for each leg, numbers of its free screws that do not follow from those before them, wherever it is.
     """
 
     machine: Machine
@@ -176,19 +164,19 @@ class ErrorModel:
         return sum(6 - len(screws) for screws in self.independent) + len(self.rows.absent) > 6
 
     def at_poses(self, rows: Integers) -> "ErrorModel":
-        """The model at some of its poses [rows]."""
+        """Return the model at some of its poses [rows]."""
         return replace(self, drawn=self.drawn.at_poses(rows), _last_state={})
 
     def leg_errors(self, values: Array) -> Errors:
-        """The screw motions that errors put into each leg at the poses, one for all of them where they agree.
+        """Return the screw motions that errors put into each leg at the poses, one for all of them where they agree.
 
         Args:
-            values: SI [errors], or others at each pose [n x errors].
+            values: values of the errors, SI [errors], or others at each pose [n x errors].
         """
         motions: Errors = [{} for _ in self.rows.legs]
-        each = np.atleast_2d(np.asarray(values, dtype=float))
+        values_at_poses = np.atleast_2d(np.asarray(values, dtype=float))
         for errors in self._errors_behind:
-            motion = errors.motion(each)
+            motion = errors.motion(values_at_poses)
             if motion is not None:
                 others = motions[errors.leg].get(errors.behind)
                 motions[errors.leg][errors.behind] = motion if others is None else others + motion
@@ -197,20 +185,25 @@ class ErrorModel:
     @cached_property
     def _errors_behind(self) -> tuple[ErrorsBehind, ...]:
         """The errors of all legs by the motions behind which they stand, leg by leg."""
-        standing: dict[tuple[int, int, int], dict[int, Insertion]] = {}
+        groups: dict[tuple[int, int, int], dict[int, Insertion]] = {}
         for number, (_, insertions) in enumerate(self.sources):
             for i in insertions:
-                again = 0  # an error may stand twice behind one motion
-                while number in standing.setdefault((i.leg, i.behind, again), {}):
-                    again += 1
-                standing[i.leg, i.behind, again][number] = i
+                repetition = 0  # an error may stand twice behind one motion
+                while number in groups.setdefault((i.leg, i.behind, repetition), {}):
+                    repetition += 1
+                groups[i.leg, i.behind, repetition][number] = i
         result = []
-        for (leg, behind, _), these in sorted(standing.items(), key=itemgetter(0)):
-            coordinates, there = self.drawn.state.coordinates[leg], these.values()
-            factors = np.stack([i.amount(coordinates) for i in there], axis=1)
-            steady = all(i.factor is None for i in there)
-            twists = np.array([i.twist for i in there])
-            result.append(ErrorsBehind(leg, behind, tuple(these), twists, factors, steady))
+        for (leg, behind, _), insertion_of_error in sorted(groups.items(), key=itemgetter(0)):
+            coordinates, group = self.drawn.state.coordinates[leg], insertion_of_error.values()
+            errors_behind = ErrorsBehind(
+                leg=leg,
+                behind=behind,
+                numbers=tuple(insertion_of_error),
+                twists=np.array([i.twist for i in group]),
+                factors=np.stack([i.amount(coordinates) for i in group], axis=1),
+                are_constant=all(i.factor is None for i in group),
+            )
+            result.append(errors_behind)
         return tuple(result)
 
     def closed_state(self, values: Array) -> ClosedLegs:
@@ -233,7 +226,7 @@ class ErrorModel:
         """Motion of the tool per unit of each error, with the actuators held, theory (46).
 
         Args:
-            values: errors [errors] at which the rates are taken; none if None.
+            values: errors [errors] at which the rates are taken; the drawn machine if None.
 
         Returns:
             Twists of the tool point, rotation first, base axes, rad and m per SI unit of the error [n x 6 x errors];
@@ -247,7 +240,7 @@ class ErrorModel:
         """Displacement of the tool by errors of any size, theory (48); compliances add to first order.
 
         Args:
-            values: of the errors, SI [errors], or others at each pose [n x errors].
+            values: values of the errors, SI [errors], or others at each pose [n x errors].
 
         Returns:
             Rotation vectors of the platform and displacements of the tool point from the drawn machine, base axes, rad
@@ -256,9 +249,9 @@ class ErrorModel:
         drawn, state = self.drawn, self.closed_state(values)
         motion = (state.platform @ drawn.state.platform.inverse()).amounts()
         motion[:, 3:] = tool_at(state.platform, self.tool_home) - drawn.tool
-        each = np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
+        values_at_poses = np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
         for number, spring in enumerate(drawn.springs, len(self.sources)):
-            motion = motion + spring.deflection(drawn.load) * each[:, number, None]
+            motion = motion + spring.deflection(drawn.load) * values_at_poses[:, number, None]
         status = np.where(np.isin(drawn.status, REGULAR) & ~state.settled, int(Status.NOT_CONVERGED), drawn.status)
         return np.where(np.isin(status, REGULAR)[:, None], motion, np.nan), status
 
@@ -266,8 +259,8 @@ class ErrorModel:
         """Compute `displacement` and `rates` at errors [errors] together [n x 6], [n x 6 x errors].
 
         Args:
-            values: of the errors, SI.
-            wanted: errors whose rates are needed; the other rates are 0.
+            values: values of the errors, SI.
+            wanted: numbers of the errors whose rates are needed; the other rates are 0.
         """
         rates = self._rates_at(self.closed_state(values), self.leg_errors(values), wanted)
         return self.displacement(values)[0], rates
@@ -276,64 +269,67 @@ class ErrorModel:
         """Deflection of the tool under wrenches per relative error of each spring's compliance [n x 6 x springs].
 
         Args:
-            wrenches: at the tool point, base axes, N·m and N [n x 6]; the sum over all springs is the deflection.
+            wrenches: wrenches at the tool point, base axes, N·m and N [n x 6]; the sum over all springs is the
+                deflection.
         """
         parts = [spring.deflection(wrenches) for spring in self.drawn.springs]
         return np.stack(parts, axis=2) if parts else np.zeros((len(self), 6, 0))
 
     def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
-        tool, length = tool_at(state.platform, self.tool_home), self.rows.length
-        every = self._errors_behind if wanted is None else [errors.among(wanted) for errors in self._errors_behind]
+        """Return `rates` at a state with errors of the legs; only those of the wanted errors, or of all if None."""
+        tool = tool_at(state.platform, self.tool_home)
         by_leg: dict[int, list[ErrorsBehind]] = {}
-        for of_motion in every:
-            if of_motion.numbers:
-                by_leg.setdefault(of_motion.leg, []).append(of_motion)
+        for group in self._errors_behind:
+            group = group if wanted is None else group.among(wanted)
+            if group.numbers:
+                by_leg.setdefault(group.leg, []).append(group)
         with np.errstate(all="ignore"):
-            groups = like_rows(self.rows, self.independent, len(self))
-            at = legs_in_place(self.rows, groups, state.coordinates, errors, tool, self.drawn.leg_compliances)
+            like = like_rows(self.rows, self.independent, len(self))
+            placed = legs_in_place(self.rows, like, state.coordinates, errors, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
-            for leg, of_leg in by_leg.items():
-                wrenches, before = (
-                    at.holding.at_origin(leg, tool, length),
-                    [at.displacement(leg, e.behind) for e in of_leg],
-                )
-                bodies = Motions(
-                    *(np.stack([getattr(body, part) for body in before]) for part in ("rotation", "translation"))
-                )
-                beside = [np.broadcast_to(errors[leg].get(e.behind, np.zeros(6)), (len(self), 6)) for e in of_leg]
-                works = _work_beside(_work_in_body(wrenches, bodies), np.stack(beside))
-                for of_motion, felt in zip(of_leg, works, strict=True):
-                    work = np.swapaxes(felt, 1, 2) @ of_motion.twists.T * of_motion.factors[:, None]
-                    result[:, :, of_motion.numbers] += at.holding.shares[leg] @ work
-        result[:, 3:] *= length
+            for leg, groups in by_leg.items():
+                wrenches = placed.holding.at_origin(leg, tool, self.length)
+                carriers = [placed.displacement(leg, group.behind) for group in groups]
+                present = [errors[leg].get(group.behind, np.zeros(6)) for group in groups]
+                present = [np.broadcast_to(error, (len(self), 6)) for error in present]
+                works = _work_by_errors(wrenches, carriers, np.stack(present))
+                for group, work in zip(groups, works, strict=True):
+                    work_of_errors = np.swapaxes(work, 1, 2) @ group.twists.T * group.factors[:, None]
+                    result[:, :, group.numbers] += placed.holding.shares[leg] @ work_of_errors
+        result[:, 3:] *= self.length
         result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
         sound = np.isin(self.drawn.status, REGULAR) & state.settled
         return np.where(sound[:, None, None], result, np.nan)
 
 
-def _work_in_body(wrenches: Array, place: Motions) -> Array:
-    """Work of wrenches at the base origin [n x 6 x m] on screws fixed in a body, or in each of several."""
-    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
-    moments = moments + cross(forces, place.translation[..., None, :])
-    return np.concatenate([np.swapaxes(part @ place.rotation, -2, -1) for part in (moments, forces)], axis=-2)
+def _work_by_errors(wrenches: Array, carriers: Sequence[Motions], errors: Array) -> Array:
+    """Return the work of wrenches on screws that are added to errors of a leg [groups x n x 6 x m].
 
+    By a change of an error e, exp(e) changes on the left by screws of the body that carries it. The error is small, so
+    that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices for these.
 
-def _work_beside(wrenches: Array, error: Array) -> Array:
-    """Work of wrenches [... x 6 x m] on the screws by which exp(e) changes, on the left, per unit that is added to e.
-
-    The error e is small [... x 6], so that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices.
+    Args:
+        wrenches: wrenches of the leg at the base origin [n x 6 x m].
+        carriers: for each group of errors, the displacement of the body that carries it [n].
+        errors: the errors of each group [groups x n x 6].
     """
-    if not error.any():
-        return wrenches
-    once = _bracket(error, wrenches)
-    return np.asarray(wrenches + once / 2.0 + _bracket(error, once) / 6.0)
+    rotation, translation = (
+        np.stack([getattr(body, part) for body in carriers]) for part in ("rotation", "translation")
+    )
+    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
+    moments = moments + cross(forces, translation[..., None, :])
+    in_body = np.concatenate([np.swapaxes(part @ rotation, -2, -1) for part in (moments, forces)], axis=-2)
+    if not errors.any():
+        return in_body
+    first = _bracket(errors, in_body)
+    return np.asarray(in_body + first / 2.0 + _bracket(errors, first) / 6.0)
 
 
 def _bracket(screw: Array, wrenches: Array) -> Array:
-    """Work of wrenches [... x 6 x m] on the brackets of a screw [... x 6] with others."""
+    """Return the work of wrenches [... x 6 x m] on the brackets of a screw [... x 6] with others."""
     moments, forces = np.swapaxes(wrenches[..., :3, :], -2, -1), np.swapaxes(wrenches[..., 3:, :], -2, -1)
-    turning, moving = screw[..., None, :3], screw[..., None, 3:]
-    parts = cross(moments, turning) + cross(forces, moving), cross(forces, turning)
+    rotation, translation = screw[..., None, :3], screw[..., None, 3:]
+    parts = cross(moments, rotation) + cross(forces, translation), cross(forces, rotation)
     return np.concatenate([np.swapaxes(part, -2, -1) for part in parts], axis=-2)
 
 
@@ -345,49 +341,77 @@ def error_model(
     Args:
         machine: as drawn, or its state, as `state_of` returns it.
         columns: coordinates of the pose and loads that vary, by leaf path ("pose.x", "load.gravity_angle"), SI [n].
-        count: n.
+        count: number of poses, n.
         load: wrench at the tool point under which compliances count, base axes, N·m and N [6] or [n x 6]; that of the
             machine's file if None.
 
     Raises:
         InputError: a column is neither of the pose nor of the loads, or the machine has no place at its home place.
     """
-    given = state_of(machine)
-    machine, others = given.machine, [path for path in columns if not path.startswith((POSE, LOAD))]
+    state = state_of(machine)
+    others = [path for path in columns if not path.startswith((POSE, LOAD))]
     if others:
         raise InputError(
-            f'"{others[0]}" is not a coordinate of the pose of {machine.name}, nor a load; errors are of one machine.'
+            f'"{others[0]}" is not a coordinate of the pose of {state.machine.name}, nor a load; errors are of one '
+            "machine."
         )
-    posed = states_at(machine, columns, count) if columns else given
-    with np.errstate(all="ignore"):  # poses without a place
-        response, stands = posed.free, stand(posed.machine, posed.joints)
-    status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
-    rows = home_rows(machine)
+    rows = home_rows(state.machine)
     if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):
-        raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
-    platform, axes = _displacement(rows, response, count)
-    with np.errstate(all="ignore"):
-        coordinates = tuple(coordinates_toward(row, platform, rows.length) for row in rows.legs)
-    actuators = stacked_columns([a.coordinate for a in stands], count)
-    _mark_other_placements(rows, coordinates, actuators, status)
-    springs, compliance_errors = _flexible_springs(response, count)
-    tool_home = rows.point + rows.rotation @ np.array(machine.tables["tool"].offset, dtype=float)
-    if response.configuration.plane is not None:
+        raise InputError(
+            f"{state.machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok."
+        )
+    tool_home = rows.point + rows.rotation @ np.array(state.machine.tables["tool"].offset, dtype=float)
+    if rows.configuration.plane is not None:
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
-    tool = tool_at(platform, tool_home)
-    state = ClosedLegs(platform, coordinates, np.ones(count, dtype=bool))
+    posed = states_at(state.machine, columns, count) if columns else state
+    with np.errstate(all="ignore"):  # poses without a place
+        flexible = list(flexible_springs(posed.free, count))
+        drawn = _drawn_machine(rows, posed, count, tool_home, load)
+    sources = (*leg_error_sources(rows), *shared_error_sources(state.machine, rows))
+    return ErrorModel(
+        machine=state.machine,
+        drawn=replace(drawn, springs=tuple(spring for spring, _ in flexible)),
+        errors=(*(error for error, _ in sources), *(error for _, error in flexible)),
+        sources=sources,
+        rows=rows,
+        tool_home=tool_home,
+        independent=tuple(_independent_screws(row, rows) for row in rows.legs),
+    )
+
+
+def _drawn_machine(
+    rows: HomeRows, posed: MachineState, count: int, tool_home: Array, load: npt.ArrayLike | None
+) -> DrawnMachine:
+    """Place the machine without errors at n poses; its springs are left out.
+
+    Args:
+        rows: the machine at its home place.
+        posed: its state at the poses.
+        count: number of poses, n.
+        tool_home: the tool point at the home place, m [3].
+        load: see `error_model`.
+    """
+    response = posed.free
+    platform, axes = _displacement(rows, response, count)
+    coordinates = tuple(coordinates_toward(row, platform, rows.length) for row in rows.legs)
+    actuators = stacked_columns([actuator.coordinate for actuator in stand(posed.machine, posed.joints)], count)
+    status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
+    elsewhere = _is_elsewhere(rows, coordinates, actuators) & np.isin(status, REGULAR)
     wrench = stacked_columns(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
-    wrench = np.asarray(wrench, dtype=float)
-    leg_compliances = _leg_compliances(response, rows, count)
-    drawn = DrawnMachine(status, state, tool, axes, actuators, wrench, springs, leg_compliances)
-    sources = (*leg_error_sources(rows), *shared_error_sources(machine, rows))
-    errors = (*(error for error, _ in sources), *compliance_errors)
-    independent_screws = tuple(_independent_screws(row, rows) for row in rows.legs)
-    return ErrorModel(machine, drawn, errors, sources, rows, tool_home, independent_screws)
+    return DrawnMachine(
+        status=np.where(elsewhere, int(Status.NOT_CONVERGED), status),
+        state=ClosedLegs(platform, coordinates, np.ones(count, dtype=bool)),
+        tool=tool_at(platform, tool_home),
+        axes=axes,
+        actuators=actuators,
+        load=np.asarray(wrench, dtype=float),
+        springs=(),
+        leg_compliances=_leg_compliances(response, rows, count),
+    )
 
 
 def _displacement(rows: HomeRows, response: Response, count: int) -> tuple[Motions, Array]:
-    """Displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
+    """Return the displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
     axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
     columns = np.stack([stacked_columns(axis.components(), count) for axis in axes], axis=2)
@@ -396,14 +420,15 @@ def _displacement(rows: HomeRows, response: Response, count: int) -> tuple[Motio
     return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), columns
 
 
-def _mark_other_placements(rows: HomeRows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
-    """Mark poses at which a leg that is followed from the home place has its actuator elsewhere than the machine."""
+def _is_elsewhere(rows: HomeRows, coordinates: Sequence[Array], actuators: Array) -> Mask:
+    """Return whether a leg that is followed from the home place has its actuator elsewhere than the machine [n]."""
+    result = np.zeros(len(actuators), dtype=bool)
     for row, joints in zip(rows.legs, coordinates, strict=True):
         for drive in (unit.drive for unit in row.units if unit.drive):
-            off = actuators[:, drive.number] - drive.home - drive.sense * joints[:, drive.coordinate]
-            off = off / rows.length if drive.slides else np.arctan2(np.sin(off), np.cos(off))
-            elsewhere = ~(np.abs(off) < ONE_PLACEMENT) & np.isin(status, REGULAR)
-            status[elsewhere] = int(Status.NOT_CONVERGED)
+            difference = actuators[:, drive.number] - drive.home - drive.sense * joints[:, drive.coordinate]
+            distance = difference / rows.length if drive.slides else np.arctan2(np.sin(difference), np.cos(difference))
+            result |= ~(np.abs(distance) < ONE_PLACEMENT)  # NaN, too
+    return result
 
 
 def _independent_screws(row: LegRow, rows: HomeRows) -> tuple[int, ...]:
@@ -413,7 +438,7 @@ def _independent_screws(row: LegRow, rows: HomeRows) -> tuple[int, ...]:
 
 
 def _leg_compliances(response: Response, rows: HomeRows, count: int) -> tuple[Array, ...]:
-    """The compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
+    """Return the compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
     result = []
     for leg in response.legs:
         soft = np.zeros((count, 6, 6))
@@ -423,21 +448,3 @@ def _leg_compliances(response: Response, rows: HomeRows, count: int) -> tuple[Ar
             soft += np.where(np.isfinite(size), size, 0.0)[:, :, None] * screw[:, :, None] * screw[:, None]
         result.append(soft)
     return tuple(result)
-
-
-def _flexible_springs(response: Response, count: int) -> tuple[tuple[FlexibleSpring, ...], list[MachineError]]:
-    """The springs that deflect, and the relative error of the compliance of each."""
-    flexible, names = [], []
-    of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
-    for (leg, spring), twist, compliance in zip(
-        of_legs, response.statics.flexibility, response.statics.compliance, strict=True
-    ):
-        size = stacked_columns([compliance], count)[:, 0]
-        if not (np.isfinite(size).all() and (size > 0.0).any()):
-            continue
-        alone = sum(other.of == spring.of for _, other in of_legs) == 1
-        part = (spring.of if alone else spring.name).removeprefix(f"{leg} ").replace(".", " ")
-        words = f"compliance of the {part} of {leg}, relative"
-        flexible.append(FlexibleSpring(stacked_columns(twist.components(), count), size))
-        names.append(MachineError(f"legs.{leg}.{part}.compliance", "share", "compliances", words, leg))
-    return tuple(flexible), names
