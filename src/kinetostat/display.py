@@ -126,10 +126,10 @@ class Display:
         scale = self.scale(unit)
         return with_unit(number(value and value * scale.factor, endless, digits or self.digits), scale.unit)
 
-    def show_deflection(self, value: float | None, unit: str, endless: str = "free") -> str:
-        """Return a small motion, in m or rad, with its unit, e.g. "12.3 µm"."""
+    def show_deflection(self, value: float | None, unit: str) -> str:
+        """Return a small motion, in m or rad, with its unit, e.g. "12.3 µm"; "free" if it is infinite."""
         scale = self.deflection(unit)
-        return with_unit(number(value and value * scale.factor, endless, self.digits), scale.unit)
+        return with_unit(number(value and value * scale.factor, "free", self.digits), scale.unit)
 
     def names(self, units: Sequence[str]) -> str:
         """Return the units in which values of these SI units are shown, by commas."""
@@ -239,19 +239,19 @@ def _scales(units: str) -> dict[str, Scale]:
         UnitError: one of them is not a unit of any result.
     """
     words = [word.strip() for word in units.split(",") if word.strip()]
-    whole = SI in (word.lower() for word in words)
-    chosen = {si: _as_printed(si) if whole else unit for si, unit in UNIT_OF.items()}
-    named = {}
+    in_si = SI in (word.lower() for word in words)
+    units_of = {si: _as_printed(si) if in_si else unit for si, unit in UNIT_OF.items()}
+    chosen = {}
     for word in words:
         if word.lower() not in (SI, "engineering"):
             unit = _as_printed(word)
-            named[multiple_of_unit(unit, UNIT_OF, EXAMPLE)[0]] = unit
-    for stiff, soft in DUAL.items():
-        for given, other in ((stiff, soft), (soft, stiff)):
-            if given in named and other not in named:
-                chosen[other] = _reciprocal(named[given])
-    chosen |= named
-    return {si: Scale(1.0 / multiple_of_unit(unit, [si], EXAMPLE)[1], unit) for si, unit in chosen.items()}
+            chosen[multiple_of_unit(unit, UNIT_OF, EXAMPLE)[0]] = unit
+    for stiffness, compliance in DUAL.items():
+        for si, dual in ((stiffness, compliance), (compliance, stiffness)):
+            if si in chosen and dual not in chosen:
+                units_of[dual] = _reciprocal(chosen[si])
+    units_of |= chosen
+    return {si: Scale(1.0 / multiple_of_unit(unit, [si], EXAMPLE)[1], unit) for si, unit in units_of.items()}
 
 
 @cache

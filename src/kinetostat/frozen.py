@@ -87,8 +87,8 @@ Fields = Sequence["dataclasses.Field[Any]"]
 
 def _parameters(fields: Fields) -> tuple[Fields, Fields]:
     """Return the fields that the constructor takes: in their order, and by name alone."""
-    taken = [field for field in fields if field.init]
-    return [field for field in taken if not field.kw_only], [field for field in taken if field.kw_only]
+    arguments = [field for field in fields if field.init]
+    return [field for field in arguments if not field.kw_only], [field for field in arguments if field.kw_only]
 
 
 def _is_optional(field: "dataclasses.Field[Any]") -> bool:
@@ -130,33 +130,33 @@ def _text(self: Any) -> str:
     return f"{type(self).__qualname__}({', '.join(shown)})"
 
 
-def _method(name: str, parameters: Iterable[str], body: Iterable[str], given: Mapping[str, Any], cls: type) -> Any:
-    """Compile a method that finds its constants in `given`, and all other names in the module of its class."""
+def _method(name: str, parameters: Iterable[str], body: Iterable[str], constants: Mapping[str, Any], cls: type) -> Any:
+    """Compile a method that knows constants by their names, and finds all other names in the module of its class."""
     lines = "".join(f"  {line}\n" for line in body)
-    text = f"def make({', '.join(given)}):\n def {name}({', '.join(parameters)}):\n{lines} return {name}\n"
-    place: dict[str, Any] = {}
-    exec(text, vars(sys.modules[cls.__module__]) if cls.__module__ in sys.modules else {}, place)
-    return place["make"](**given)
+    text = f"def make({', '.join(constants)}):\n def {name}({', '.join(parameters)}):\n{lines} return {name}\n"
+    scope: dict[str, Any] = {}
+    exec(text, vars(sys.modules[cls.__module__]) if cls.__module__ in sys.modules else {}, scope)
+    return scope["make"](**constants)
 
 
 def _constructor(cls: type) -> Callable[..., None]:
     """Compile the `__init__` of a class: it sets each field, past the refusal of changes."""
     fields: Fields = dataclasses.fields(cls)
     ordered, named = _parameters(fields)
-    given: dict[str, Any] = {"_set": object.__setattr__, "_factory": FACTORY}
+    constants: dict[str, Any] = {"_set": object.__setattr__, "_factory": FACTORY}
     body = []
-    me = "_self" if any(field.name == "self" for field in fields) else "self"
+    instance = "_self" if any(field.name == "self" for field in fields) else "self"
     for i, field in enumerate(fields):
         value = field.name if field.init else ""
         if field.default_factory is not dataclasses.MISSING:
-            given[f"_make_{i}"] = field.default_factory
+            constants[f"_make_{i}"] = field.default_factory
             value = f"_make_{i}() if {value} is _factory else {value}" if value else f"_make_{i}()"
         if value:
-            body.append(f"_set({me}, {field.name!r}, {value})")
+            body.append(f"_set({instance}, {field.name!r}, {value})")
     if hasattr(cls, "__post_init__"):
-        body.append(f"{me}.__post_init__()")
-    names = [me, *(field.name for field in ordered), *(["*"] if named else []), *(field.name for field in named)]
-    method = _method("__init__", names, body or ["pass"], given, cls)
+        body.append(f"{instance}.__post_init__()")
+    names = [instance, *(field.name for field in ordered), *(["*"] if named else []), *(field.name for field in named)]
+    method = _method("__init__", names, body or ["pass"], constants, cls)
     method.__defaults__ = tuple(_default(field) for field in ordered if _is_optional(field))
     method.__kwdefaults__ = {field.name: _default(field) for field in named if _is_optional(field)} or None
     method.__annotations__ = {field.name: field.type for field in [*ordered, *named]} | {"return": None}

@@ -306,13 +306,13 @@ def _answer_grid(
             raise InputError(CARRYING_ALONE)
         answered: Carrying = question.answer(machine, ranges, progress, quantities, carrying)
         return answered
-    wanted = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)
+    grid_question = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)
     with compute_with(Crew(options.workers, options.cluster)) as compute:
-        if options.output and not wanted.fits_memory:
-            return _answer_into_folder(options, wanted, word, progress, compute)
+        if options.output and not grid_question.fits_memory:
+            return _answer_into_folder(options, grid_question, word, progress, compute)
         if options.output:
             _check_folder(options.output, options.resume)
-        return answer(wanted, progress, compute)
+        return answer(grid_question, progress, compute)
 
 
 def _check_folder(folder: Path, resume: bool) -> None:

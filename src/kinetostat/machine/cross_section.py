@@ -277,6 +277,20 @@ def _numbers_in_place(value: object, rigidity_name: str, where: str) -> tuple[ob
 
 
 def _rigidity(table: Mapping[str, object], rigidity_name: str, where: str) -> tuple[float, Known]:
+    """One of the rigidities of the cross-section that a table describes, and what else it says of the link."""
+    shape, numbers = _shape_and_numbers(table, where)
+    data = SimpleNamespace(**numbers)
+    known = map(float, (linear_density_of(shape, data), least_bending_of(shape, data), data.expansion))
+    rigid = rigidity_of(shape, data, shear=False)
+    return float(getattr(rigid, rigidity_name)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
+
+
+def _shape_and_numbers(table: Mapping[str, object], where: str) -> tuple[str, dict[str, float]]:
+    """The shape of a cross-section, and its sizes and its material as numbers, SI.
+
+    Raises:
+        InputError: a field is missing, unknown or out of bounds.
+    """
     rest = dict(table)
     shape = choice(rest.pop("shape", None), SHAPES, f"{where}: shape")
     numbers = {
@@ -300,10 +314,7 @@ def _rigidity(table: Mapping[str, object], rigidity_name: str, where: str) -> tu
     if shape == "tube" and not numbers["inner_diameter"] < numbers["outer_diameter"]:
         inner, outer = numbers["inner_diameter"], numbers["outer_diameter"]
         raise InputError(f"{where}: inner_diameter is {inner:g} m; it must be less than outer_diameter, {outer:g} m.")
-    data = SimpleNamespace(**numbers)
-    known = map(float, (linear_density_of(shape, data), least_bending_of(shape, data), data.expansion))
-    rigid = rigidity_of(shape, data, shear=False)
-    return float(getattr(rigid, rigidity_name)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
+    return shape, numbers
 
 
 def _size(value: object, kind: str, where: str, may_be_zero: bool = False) -> float:

@@ -19,7 +19,8 @@ from kinetostat.units import KINDS, RIGID, UnitError
 
 KEPT_FAMILIES = 64
 """Families that caches keep, so that machines with one plan share parameters, tables and compiled programs."""
-FULL_TURN = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi * (1.0 + 1e-9)
+"""Greatest plausible angle, rad: a turn with the round-off of degrees."""
 MOST_TIMES = 100.0
 """Greatest plausible ratio of a length to the longest of all others."""
 CONTRAST = 1e22
@@ -199,7 +200,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
         InputError: there is no such field, or several; the message lists what is near.
     """
     known = {parameter.path: parameter for parameter in parameters(family)}
-    given, text = text, numbered_entry(text)
+    as_written, text = text, numbered_entry(text)
     for exact in (text, f"{POSE}{text}"):
         if exact in known:
             return known[exact]
@@ -212,7 +213,7 @@ def find_field(family: HasFields, text: str) -> Parameter:
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
     hint = f"did you mean {named_entry(near[0])}?" if near else rest
-    raise InputError(f"{shorten(given)} is not a field of family {family.name}; {hint}")
+    raise InputError(f"{shorten(as_written)} is not a field of family {family.name}; {hint}")
 
 
 def values(machine: HasNumbers) -> dict[str, Scalar]:
@@ -233,9 +234,11 @@ def with_values(machine: AnyMachine, changes: Mapping[str, Any]) -> AnyMachine:
     new = {**values(machine), **{path: column(value) for path, value in changes.items()}}
     tables = {}
     for table, fields in machine.family.every_table.items():
-        placed = _scalars_of(table, fields)
-        made = {name: new[p[0]] if single else tuple([new[path] for path in p]) for name, single, p in placed}
-        tables[table] = fields(**made)
+        numbers = {
+            name: new[paths[0]] if single else tuple([new[path] for path in paths])
+            for name, single, paths in _scalars_of(table, fields)
+        }
+        tables[table] = fields(**numbers)
     new_machine: Any = machine
     return replace(new_machine, tables=tables)
 
@@ -255,20 +258,21 @@ def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, flo
     Raises:
         InputError: an unknown field, a value that is none or out of bounds, or a list of another length than the field.
     """
-    read: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for name, written in given.items():
         # Numbers and arrays of NumPy become those of Python.
         value = written.tolist() if hasattr(written, "tolist") else written
         if isinstance(value, str) or not isinstance(value, Iterable):
             parameter = find(family, name)
-            read.update(dict.fromkeys(parameter.leaves, read_number(parameter, value)))
+            numbers.update(dict.fromkeys(parameter.leaves, read_number(parameter, value)))
             continue
         parameter, entries = find_field(family, name), list(value)
         if len(entries) != len(parameter.leaves):
             allowed = f"{len(parameter.leaves)} values" if len(parameter.leaves) > 1 else "one value"
             raise InputError(f"{parameter.shown} is {shorten(entries)}; give {allowed}.")
-        read.update((leaf, read_number(parameter, v, leaf)) for leaf, v in zip(parameter.leaves, entries, strict=True))
-    return read
+        pairs = zip(parameter.leaves, entries, strict=True)
+        numbers.update((leaf, read_number(parameter, entry, leaf)) for leaf, entry in pairs)
+    return numbers
 
 
 def read_number(parameter: Parameter, value: object, path: str = "") -> float:
@@ -312,12 +316,17 @@ def check_contrast(machine: HasNumbers, origin: str) -> None:
     Raises:
         InputError: names the softest and the stiffest.
     """
-    stiff = [p for p in parameters(machine.family) if p.quantity.stiff]
-    given = values(machine)
-    known = [(float(given[leaf]), leaf, p) for p in stiff for leaf in p.leaves if 0.0 < float(given[leaf]) < math.inf]
-    if not known:
+    numbers = values(machine)
+    elastic = [
+        (float(numbers[leaf]), leaf, parameter)
+        for parameter in parameters(machine.family)
+        if parameter.quantity.stiff
+        for leaf in parameter.leaves
+        if 0.0 < float(numbers[leaf]) < math.inf
+    ]
+    if not elastic:
         return
-    (soft, softest, low), (hard, stiffest, high) = min(known, key=_first), max(known, key=_first)
+    (soft, softest, low), (hard, stiffest, high) = min(elastic, key=_first), max(elastic, key=_first)
     if hard > CONTRAST * soft:
         raise InputError(
             f'"{origin}": {softest} is {low.quantity.show(soft)} and {stiffest} {high.quantity.show(hard)}; '
@@ -334,7 +343,7 @@ def doubts(machine: HasNumbers) -> Iterator[str]:
     """A sentence for each implausible number: an angle beyond a turn, one length beyond all, no stiffness."""
     numbers = list(_numbers(machine))
     for path, field, kind, value in numbers:
-        if kind == "angle" and abs(value) > FULL_TURN * (1.0 + 1e-9):
+        if kind == "angle" and abs(value) > FULL_TURN:
             yield f'{path} is {value:g} rad, more than a turn; if degrees are meant, write "{value:g} deg".'
         others = [abs(v) for _, other, k, v in numbers if k == kind == "length" and other != field]
         if 0.0 < MOST_TIMES * max(others, default=0.0) < abs(value):
@@ -345,10 +354,11 @@ def doubts(machine: HasNumbers) -> Iterator[str]:
 
 def _numbers(machine: HasNumbers) -> Iterator[tuple[str, str, str, float]]:
     """Path, field, kind and value of every finite number; once for all entries of a field that are alike."""
-    given = values(machine)
+    scalars = values(machine)
     fields = {p.path: p for p in parameters(machine.family)}
     entries = {leaf for p in fields.values() if p.quantity.count for leaf in p.leaves}
     for field in (p for p in fields.values() if p.path not in entries):
-        finite = {leaf: float(given[leaf]) for leaf in field.leaves if math.isfinite(given[leaf])}
-        alike = {field.path: next(iter(finite.values()))} if len(set(finite.values())) == 1 else finite
-        yield from ((path, field.path, field.quantity.kind, value) for path, value in alike.items())
+        finite = {leaf: float(scalars[leaf]) for leaf in field.leaves if math.isfinite(scalars[leaf])}
+        if len(set(finite.values())) == 1:
+            finite = {field.path: next(iter(finite.values()))}
+        yield from ((path, field.path, field.quantity.kind, value) for path, value in finite.items())

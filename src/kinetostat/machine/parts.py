@@ -66,10 +66,10 @@ def built_in_bar(
         link: E I and G J (N·m²) and the length (m) of the bar.
     """
     bending, torsion, length = link
-    ways = (("bending x", bending, 3.0), ("bending y", bending, 3.0), ("torsion", torsion, 1.0))
+    deflections = (("bending x", bending, 3.0), ("bending y", bending, 3.0), ("torsion", torsion, 1.0))
     return tuple(
-        Spring(f"{name} {way}", Joint(axis, point), in_series(k, rigidity, length, factor))
-        for (way, rigidity, factor), axis, k in zip(ways, axes, stiffness, strict=True)
+        Spring(f"{name} {deflection}", Joint(axis, point), in_series(k, rigidity, length, factor))
+        for (deflection, rigidity, factor), axis, k in zip(deflections, axes, stiffness, strict=True)
     )
 
 

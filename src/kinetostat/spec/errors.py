@@ -29,7 +29,7 @@ class InputError(ValueError):
         super().__init__(_LONG.sub(lambda word: cut(word[0], LONGEST_WORD), printable))
 
 
-def shorten(value: object, longest: int = 60) -> str:
+def shorten(value: object) -> str:
     """Return a value as people wrote it, cut to a bounded length."""
     try:
         text = f'"{value}"' if isinstance(value, str) else repr(value)
@@ -37,7 +37,7 @@ def shorten(value: object, longest: int = 60) -> str:
         return "a number of thousands of digits"
     except Exception:  # an object of somebody else's class, which may not be able to show itself
         return f"an object of the class {type(value).__name__}"
-    return cut(text, longest)
+    return cut(text)
 
 
 def cut(text: str, longest: int = 60) -> str:

@@ -8,7 +8,7 @@ and cannot be pickled.
 import copyreg
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import cache
 from typing import Any
@@ -94,35 +94,33 @@ def family_text(family: Family) -> str | None:
     """Say which family of kinetostat this is, the same in every process; None of any other, whose code may change."""
     if family.recipe is None:
         return family.name if family_named(family.name) is family and family.name not in _REGISTERED else None
-    recipe, given = family.recipe
-    parts = [family_text(part) if isinstance(part, Family) else repr(part) for part in given]
+    recipe, arguments = family.recipe
+    parts = [family_text(part) if isinstance(part, Family) else repr(part) for part in arguments]
     if not recipe.__module__.startswith(f"{PACKAGE}.") or None in parts:
         return None
     return f"{recipe.__module__}.{recipe.__qualname__}({parts})"
 
 
 def _of_machine(machine: Machine) -> tuple[Any, ...]:
+    """A function that makes a machine again, and its arguments, as pickle takes them."""
     content = {field.name: getattr(machine, field.name) for field in fields(machine)}
     return _machine, ({**content, "tables": {name: dict(vars(table)) for name, table in machine.tables.items()}},)
 
 
 def _machine(content: Mapping[str, Any]) -> Machine:
     """Put a machine together again."""
-    known = content["family"].every_table
-    return Machine(**{**content, "tables": {name: known[name](**kept) for name, kept in content["tables"].items()}})
+    classes = content["family"].every_table
+    tables = {name: classes[name](**numbers) for name, numbers in content["tables"].items()}
+    return Machine(**{**content, "tables": tables})
 
 
 def _of_family(family: Family) -> tuple[Any, ...]:
+    """The recipe by which a family is made again, or the look-up of its name, as pickle takes them."""
     if family.recipe is not None:
-        return _family_by_recipe, family.recipe
+        return family.recipe
     if family_named(family.name) is not family:
         raise InputError(f'family "{family.name}" cannot be pickled before it is registered; call register(family).')
     return _family_by_name, (family.name,)
-
-
-def _family_by_recipe(recipe: Callable[..., Family], given: tuple[Any, ...]) -> Family:
-    """Make a family by its recipe."""
-    return recipe(*given)
 
 
 def _family_by_name(name: str) -> Family:

@@ -106,7 +106,8 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
 
 def chains(plan: Plan, **tables: Any) -> Chains:
     """All legs at the home pose."""
-    legs = tuple(tuple(chain_at_home(plan, leg, tables)) for leg in plan.legs)
+    parts = [_parts_at_home(plan, leg, tables) for leg in plan.legs]
+    legs = tuple(tuple(step for moving, link in row for step in (*moving, *link)) for row in parts)
     home = Displacement(IDENTITY, Vector(*tables["platform"].point))
     return Chains(
         legs=legs,
@@ -157,13 +158,8 @@ def _with_line(element: Joint | Spring, point: Vector, axis: Vector | None = Non
     return replace(element, point=point, axis=axis or element.axis)
 
 
-def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
-    """The elements of a leg at the home pose, from base to platform."""
-    return [step for moving, link in _parts_at_home(plan, leg, tables) for step in (*moving, *link)]
-
-
 def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[tuple[list[Step], list[Step]]]:
-    """The elements of each joint of a leg, and those of the link behind it."""
+    """The elements of each joint of a leg at the home pose, from base to platform, and those of the link behind it."""
     data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
     parts: list[tuple[list[Step], list[Step]]] = []
     for i, joint in enumerate(leg.joints):
