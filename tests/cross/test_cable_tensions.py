@@ -7,8 +7,7 @@ from scipy.optimize import linprog
 from kinetostat import analyze, evaluate, evaluate_grid, load, state_of, tensions, under_load, workspace
 from kinetostat.engine.batch import evaluate as evaluate_points
 from kinetostat.engine.points import PointTable
-from kinetostat.equilibrium.cables import cables_of
-from kinetostat.equilibrium.catenary import leaving_points
+from kinetostat.equilibrium.cables import cables_of, leaving_points
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.report import REPORT_QUESTIONS, Answers
 from kinetostat.studies.sensitivity import sensitivity

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kinetostat.equilibrium.catenary import Hanging, hanging_cables, leaving_points
+from kinetostat.equilibrium.cables import Hanging, hanging_cables, leaving_points
 
 WEIGHT, RIGIDITY = 0.064 * 9.81, 50528.43 * 9.736
 SPANS = [(9.13, 3.39), (3.0, 5.0), (8.0, -2.0), (0.4, 4.0), (12.0, 0.0)]

@@ -8,14 +8,19 @@ Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
+from kinetostat.algebra.screw import Twist
+from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.elastic_legs import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
+from kinetostat.kinetostatics.loading import DeflectedLink, leg_links
+from kinetostat.machine.leg import Leg
 from kinetostat.numerics.iteration import largest, with_rows
 from kinetostat.numerics.motions import Motions, brackets_by, cross, exponential, logarithm, skew_of, still
 
@@ -101,15 +106,15 @@ class LegTerms:
             return result
 
         return LegTerms(
-            Motions(self.end.rotation[rows], self.end.translation[rows]),
-            self.rates[rows],
-            of_machine(self.driven),
-            self.loads[rows],
-            of_machine(self.holding),
-            self.carrying[rows],
-            self.left[rows],
-            self.geometric[rows],
-            of_machine(self.by_given),
+            end=Motions(self.end.rotation[rows], self.end.translation[rows]),
+            rates=self.rates[rows],
+            driven=of_machine(self.driven),
+            loads=self.loads[rows],
+            holding=of_machine(self.holding),
+            carrying=self.carrying[rows],
+            left=self.left[rows],
+            geometric=self.geometric[rows],
+            by_given=of_machine(self.by_given),
         )
 
 
@@ -129,8 +134,8 @@ def leg_terms(
         coordinates: the coordinates of the leg [n x coordinates].
         wrench: the wrench that the platform exerts on the leg, at the origin [n x 6].
         amounts: the amounts that are given: of all actuators of the machine, then of its links that grow [n x amounts].
-        gravity: [n x 3].
-        placed: where its parts are, if that is known.
+        gravity: acceleration of free fall, m/s² [n x 3].
+        placed: the chain of the leg at these coordinates, if it has been placed.
         symmetric: whether `geometric` and `by_given` shall be those of the symmetric part alone.
     """
     placed = placed or leg.chain.place(coordinates, amounts)
@@ -156,15 +161,15 @@ def leg_terms(
         loads, stiffness = np.where(carries, loads, 0.0), np.where(carries, stiffness, 0.0)
     work = np.einsum("nfc,nc->nf", screws, wrench)
     return LegTerms(
-        placed.end,
-        leg.chain.rates(placed),
-        np.swapaxes(screws, 1, 2) @ drives,
-        loads,
-        (work - weight) @ drives,
-        stiffness,
-        loads + (weight - work) @ follows,
-        follows.T @ change @ follows,
-        follows.T @ change @ drives,
+        end=placed.end,
+        rates=leg.chain.rates(placed),
+        driven=np.swapaxes(screws, 1, 2) @ drives,
+        loads=loads,
+        holding=(work - weight) @ drives,
+        carrying=stiffness,
+        left=loads + (weight - work) @ follows,
+        geometric=follows.T @ change @ follows,
+        by_given=follows.T @ change @ drives,
     )
 
 
@@ -243,9 +248,10 @@ class Balance:
     """The equations at a state; unknown are the twist of the platform, and of each leg its coordinates and wrench.
 
     Attributes:
+        mechanism: the mechanism.
         state: where everything is.
-        legs: what each adds.
-        left: what is left of the equations [n x unknowns].
+        legs: what each leg contributes.
+        left: what is left of the equations, 0 at rest [n x unknowns].
         load: the load on the platform at the origin [n x 6].
         load_change: change of this load by a twist of the platform [n x 6 x 6].
     """
@@ -315,6 +321,7 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     """Evaluate the equations of equilibrium at a state."""
     ways = mechanism.ways
     load, change = platform_load(mechanism, state.platform)
+    poses = len(load)
     amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
     terms: dict[int, LegTerms] = {}
     gaps: dict[int, Array] = {}
@@ -323,13 +330,46 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
         coordinates, wrenches = (
             np.concatenate([of[k] for k in legs.numbers]) for of in (state.coordinates, state.wrenches)
         )
-        alike = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (len(legs.numbers), 1)))
-        gap = closing_gap(state.platform.at(np.tile(np.arange(len(load)), len(legs.numbers))), alike.end)
+        count = len(legs.numbers)
+        alike = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (count, 1)))
+        gap = closing_gap(state.platform.at(np.tile(np.arange(poses), count)), alike.end)
         for place, number in enumerate(legs.numbers):
-            rows = slice(len(load) * place, len(load) * (place + 1))
+            rows = slice(poses * place, poses * (place + 1))
             terms[number], gaps[number] = alike.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
     numbers = range(len(mechanism.legs))
-    left = [part for k in numbers for part in (terms[k].left, gaps[k])]
+    left_of_legs = [part for k in numbers for part in (terms[k].left, gaps[k])]
     carried = sum(state.wrenches, np.zeros_like(load))
-    residuals = np.concatenate([(carried - load) @ ways, *left], axis=1)
-    return Balance(mechanism, state, tuple(terms[k] for k in numbers), residuals, load, change)
+    return Balance(
+        mechanism=mechanism,
+        state=state,
+        legs=tuple(terms[k] for k in numbers),
+        left=np.concatenate([(carried - load) @ ways, *left_of_legs], axis=1),
+        load=load,
+        load_change=change,
+    )
+
+
+def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> tuple[DeflectedLink, ...]:
+    """All links of a machine at one pose, with the exact motions of their ends.
+
+    Args:
+        equations: the equations at the state of rest of one pose.
+        legs: the legs of the machine without loads.
+        origin: its tool point there, m.
+    """
+    mechanism, state = equations.mechanism, equations.state
+    length = float(mechanism.length[0])
+    links: list[DeflectedLink] = []
+    given = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
+        placed = elastic.chain.place(coordinates, given).before
+        bodies = [placed[number] for number in elastic.motion_counts]
+        links += leg_links(leg, partial(_point_motion, bodies, origin, length))
+    return tuple(links)
+
+
+def _point_motion(bodies: Sequence[Motions], origin: Vector, length: float, body: int, point: Vector) -> Twist:
+    """Motion of a point (m) of one of the bodies, rad and m."""
+    start = np.array([(point - origin).components()], dtype=float) / length
+    rotation = Vector(*bodies[body].amounts()[0, :3].tolist())
+    return Twist(rotation, Vector(*(length * (bodies[body].point(start) - start))[0].tolist()))

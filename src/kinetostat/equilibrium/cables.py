@@ -4,7 +4,12 @@ Straight cables pull along lines that follow from the pose of the platform alone
 weight, or leave the base over pulleys, pull along lines that depend on their tensions as well. A machine has cables if
 each of its legs is an actuated slide between two joints that only pulls (or only pushes).
 
-Source: theory (76) to (80).
+A cable of uniform weight hangs in a vertical plane. From its platform end, along its unstretched length, the horizontal
+part of its tension stays the same and the vertical part grows by its weight, so that its shape is known in closed form.
+Here its tension at the platform is given; its slope there and its unstretched length follow by Newton's method.
+
+Source: theory (76)-(80); M. Irvine, Cable Structures (1981), section 1.2; pulleys: A. Pott, "Influence of pulley
+kinematics on cable-driven parallel robots", Latest Advances in Robot Kinematics (2012).
 """
 
 from collections.abc import Collection
@@ -14,7 +19,6 @@ from functools import cached_property
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Mask
-from kinetostat.equilibrium.catenary import Hanging, hanging_cables, leaving_points
 from kinetostat.equilibrium.leg_reader import SIGNS
 from kinetostat.equilibrium.state import check_loads
 from kinetostat.frozen import dataclass
@@ -29,14 +33,163 @@ from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.numerics.polytopes import capacity, wrench_closure
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import SETTLED_CABLE
+from kinetostat.tolerances import HANGING, SETTLED_CABLE, SURELY_HANGING, UNRESISTED
 
-MOST_CHANGES = 60
-"""Steps at most that find directions and tensions of hanging cables: each changes little of what the last has."""
+MOST_NEWTON_STEPS = 30
+"""Most steps of Newton's method for slope and length of a cable: three or four unless it hangs like a chain."""
+MOST_TENSION_STEPS = 60
+"""Most steps in which directions and tensions of hanging cables follow from each other: each changes hardly more than a
+hundredth of what the last one has changed, so that some seven do unless cables hang like chains."""
+
+
+@dataclass(frozen=True)
+class Hanging:
+    """Cables in their vertical planes; each array [n x cables].
+
+    Attributes:
+        across, up: parts of the tension at the platform end, horizontally to the base end and upwards, N.
+        weight: weight per metre of unstretched cable, N/m.
+        rigidity: EA, N.
+        length: unstretched, between both ends, m.
+    """
+
+    across: Array
+    up: Array
+    weight: Array
+    rigidity: Array
+    length: Array
+
+    @property
+    def tension(self) -> Array:
+        """Tension at the platform end, N."""
+        return np.hypot(self.across, self.up)
+
+    @property
+    def base_tension(self) -> Array:
+        """Tension at the base end, N."""
+        return np.hypot(self.across, self.up + self.weight * self.length)
+
+    @property
+    def base_slope(self) -> Array:
+        """Angle by which the cable rises at its base end, rad."""
+        return np.arctan2(self.up + self.weight * self.length, self.across)
+
+    @property
+    def spans(self) -> tuple[Array, Array]:
+        """Horizontal distance of both ends, and height of the base end above the other, m."""
+        compliance = self.length / self.rigidity
+        level = self.across * (compliance + self._slope_change)
+        return level, 0.5 * self._sum_of_ups * compliance + self.length * self._mean_sine
+
+    @property
+    def _sum_of_ups(self) -> Array:
+        """Sum of the vertical parts of both end tensions, N."""
+        return 2.0 * self.up + self.weight * self.length
+
+    @property
+    def _mean_sine(self) -> Array:
+        """Sum of the vertical parts of both end tensions over the sum of these: a sine between those of both slopes."""
+        return self._sum_of_ups / (self.tension + self.base_tension)
+
+    @property
+    def _slope_change(self) -> Array:
+        """Difference of the inverse hyperbolic sines of both slopes over the weight of a metre, however small."""
+        whole_weight = self.weight * self.length
+        rising = whole_weight * (1.0 + self._mean_sine) / (self.up + self.tension)
+        falling = whole_weight * (1.0 - self._mean_sine) / (self.base_tension - (self.up + whole_weight))
+        return np.asarray(np.log1p(np.where(self._mean_sine > 0.0, rising, falling)) / self.weight)
+
+    @property
+    def compliance(self) -> Array:
+        """Rates of both spans by `across` and `up`, m/N [n x cables x 2 x 2]."""
+        stretching, tensions = self.length / self.rigidity, self.tension * self.base_tension
+        turning = self.length * (self.tension - self.up * self._mean_sine) / tensions
+        mixed = -self.across * self.length * self._mean_sine / tensions
+        first, last = stretching + self._slope_change - turning, stretching + turning
+        return np.stack([np.stack([first, mixed], axis=-1), np.stack([mixed, last], axis=-1)], axis=-2)
+
+    @property
+    def stiffness(self) -> Array:
+        """Stiffness in its plane, N/m [n x cables x 2 x 2]."""
+        return np.asarray(np.linalg.inv(self.compliance))
+
+    @property
+    def stiffness_share(self) -> Array:
+        """Share of the stiffness EA/L of a straight cable that it has along the line of its ends."""
+        level, rise = self.spans
+        chord = np.stack([level, rise], axis=-1) / np.hypot(level, rise)[..., None]
+        along = np.einsum("nma,nmab,nmb->nm", chord, self.stiffness, chord)
+        return np.asarray(along * self.length / self.rigidity)
+
+    @property
+    def sag(self) -> Array:
+        """Greatest distance of the cable from the line of its ends, m."""
+        level, rise = self.spans
+        # The farthest point is where the cable runs along that line: up + w s = across * rise / level.
+        part = np.clip((self.across * rise / np.maximum(level, UNRESISTED) - self.up) / self.weight, 0.0, self.length)
+        x, z = replace(self, length=np.maximum(part, UNRESISTED)).spans
+        return np.abs(z * level - x * rise) / np.hypot(level, rise)
+
+
+def hanging_cables(level: Array, rise: Array, tension: Array, weight: Array, rigidity: Array) -> Hanging:
+    """Find the cables that hang between two points with given tensions at the platform [n x cables each].
+
+    Args:
+        level, rise: horizontal distance of the points, and height of the base end above the other, m.
+        tension: tension at the platform end, N.
+        weight: weight per metre of unstretched cable, N/m; greater than 0.
+        rigidity: EA, N.
+
+    Returns:
+        The cables; NaN where none hangs so.
+    """
+    level = np.maximum(level, HANGING * np.abs(rise))  # a cable that hangs straight down, but for round-off
+    slope, length = np.arctan2(rise, level), np.hypot(level, rise) / (1.0 + tension / rigidity)
+    with np.errstate(all="ignore"):
+        for _ in range(MOST_NEWTON_STEPS):
+            across, up = tension * np.cos(slope), tension * np.sin(slope)
+            cable = Hanging(across, up, weight, rigidity, length)
+            missing = np.stack([level, rise], axis=-1) - np.stack(cable.spans, axis=-1)
+            by_slope = np.einsum("nmab,nmb->nma", cable.compliance, np.stack([-up, across], axis=-1))
+            direction = cable.base_slope
+            unit = np.stack([np.cos(direction), np.sin(direction)], axis=-1)
+            by_length = unit * (1.0 + cable.base_tension / rigidity)[..., None]
+            rates = np.stack([by_slope, by_length], axis=-1)
+            regular = np.abs(np.linalg.det(rates)) > 0.0
+            step = np.linalg.solve(np.where(regular[..., None, None], rates, np.eye(2)), missing[..., None])[..., 0]
+            slope, length = slope + step[..., 0], np.abs(length + step[..., 1])
+            if not (np.abs(step).max(axis=-1) > HANGING * np.hypot(level, rise)).any():
+                break
+    converged = np.abs(step).max(axis=-1) <= SURELY_HANGING * np.hypot(level, rise)
+    length = np.where(converged, length, np.nan)
+    return Hanging(tension * np.cos(slope), tension * np.sin(slope), weight, rigidity, length)
+
+
+def leaving_points(guides: Array, ends: Array, radius: Array, slope: Array) -> tuple[Array, Array]:
+    """Find where cables leave pulleys that swivel about the vertical through their guides.
+
+    A cable comes up through its guide, runs over the wheel, whose centre lies by its radius nearer to the platform, and
+    leaves it along its own slope.
+
+    Args:
+        guides: where cables enter their pulleys [n x cables x 3], m.
+        ends: their ends at the platform [n x cables x 3], m.
+        radius: radius of the wheels, m [n].
+        slope: angles by which the cables rise where they leave [n x cables], rad.
+
+    Returns:
+        The points where they leave [n x cables x 3], m, and lengths that lie on the wheels [n x cables], m.
+    """
+    ahead = (ends - guides) * [1.0, 1.0, 0.0]
+    ahead = ahead / np.maximum(np.sqrt((ahead * ahead).sum(axis=2, keepdims=True)), UNRESISTED)
+    forward = radius[:, None] * (1.0 + np.sin(slope))
+    points = guides + forward[:, :, None] * ahead
+    points[:, :, 2] += radius[:, None] * np.cos(slope)
+    return points, radius[:, None] * (0.5 * np.pi + slope)
 
 
 def cable_signs(machine: Machine) -> tuple[float, ...]:
-    """Return 1 for each leg that is a cable, or -1 for one that only pushes; nothing if a leg is anything else."""
+    """Return 1 for each leg that is a cable, or -1 for one that only pushes; an empty tuple if any leg is neither."""
     if machine.family.chains is None:
         return ()
     chains, signs = machine.chains(), []
@@ -69,7 +222,7 @@ class Cables:
         box: half the sizes of the box of wrenches that must be held about the load [n x d].
         stiffness: stiffness of each straight cable with its winch, N/m [n x cables].
         wound: length of each cable that lies on its pulley, m [n x cables].
-        shape: how the cables hang; None for straight ones.
+        shape: their shapes as they hang; None for straight ones.
     """
 
     near: Array
@@ -105,9 +258,9 @@ class Cables:
         Args:
             required: wrenches that must be held instead of the load, in its units [k x d].
         """
-        shape = (*self.wrenches.shape[::2],)
-        least, most = (np.broadcast_to(bound[:, None], shape) for bound in (self.least, self.most))
-        wanted = self.load[:, None] if required is None else np.broadcast_to(required, (shape[0], *required.shape))
+        poses, _, cables = self.wrenches.shape
+        least, most = (np.broadcast_to(bound[:, None], (poses, cables)) for bound in (self.least, self.most))
+        wanted = self.load[:, None] if required is None else np.broadcast_to(required, (poses, *required.shape))
         return capacity(self.wrenches, least, most, -wanted, self.box)
 
 
@@ -196,7 +349,7 @@ def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> 
         radius: radius of the pulleys, m [n].
     """
     hung = cables
-    for _ in range(MOST_CHANGES):
+    for _ in range(MOST_TENSION_STEPS):
         last, hung = hung, _cables_with_tensions_of(hung, cables, up, weight, radius)
         changes = hung.directions - last.directions, hung.near - last.near
         if max(np.nan_to_num(np.abs(change)).max() for change in changes) < SETTLED_CABLE:

@@ -14,7 +14,9 @@ from functools import partial
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.admissible import (
+from kinetostat.equilibrium.balance import Balance, State, balance, potential, state_after
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.tangent import (
     Admissible,
     admissible,
     gaps_of,
@@ -23,8 +25,6 @@ from kinetostat.equilibrium.admissible import (
     tangent_matrices,
     within,
 )
-from kinetostat.equilibrium.balance import Balance, State, balance, potential, state_after
-from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT

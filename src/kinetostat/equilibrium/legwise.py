@@ -15,10 +15,9 @@ from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Eliminated, Row, conjugate, definite, elimination, right_inverse, semidefinite_root
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
-from kinetostat.equilibrium.cut import Cut
+from kinetostat.equilibrium.cut import Cut, loads_of_rods, pull_of, wrench_of_rods
 from kinetostat.equilibrium.elastic_legs import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.pulls import loads_of_rods, pull_of, wrench_of_rods
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.machine.leg import Spring
@@ -211,7 +210,7 @@ def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) ->
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
     coordinates = of_scalars(row)
     placed = leg.chain.place(coordinates, amounts)
-    return placed, leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, True)
+    return placed, leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, symmetric=True)
 
 
 def _gap(platform: Motions, end: Motions) -> Array:

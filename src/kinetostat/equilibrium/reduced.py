@@ -18,11 +18,10 @@ from kinetostat.algebra.solve import Eliminated, Row, definite, elimination
 from kinetostat.algebra.symmetric import greatest_eigenvalue
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
-from kinetostat.equilibrium.cut import Cut, cut
+from kinetostat.equilibrium.cut import Cut, RodPull, cut, loads_of_rods, pull_of, sum_of_dyads, wrench_of_rods
 from kinetostat.equilibrium.legwise import LegwiseTangent
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import greatest_loads, status_with_load_limits, status_with_rest
-from kinetostat.equilibrium.pulls import RodPull, loads_of_rods, pull_of, sum_of_dyads, wrench_of_rods
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints

@@ -35,12 +35,11 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable, ImmutableAnswer
 
 if TYPE_CHECKING:
-    from kinetostat.equilibrium import actuation, balance, links, solving, tangent
+    from kinetostat.equilibrium import actuation, balance, solving, tangent
     from kinetostat.equilibrium import limit as load_limits
     from kinetostat.equilibrium import mechanism as mechanisms
     from kinetostat.equilibrium.balance import Balance
-    from kinetostat.equilibrium.limit import LoadLimit
-    from kinetostat.equilibrium.links import Strut
+    from kinetostat.equilibrium.limit import LoadLimit, Strut
     from kinetostat.equilibrium.mechanism import Mechanism
     from kinetostat.equilibrium.tangent import Stability
     from kinetostat.kinematics import closure
@@ -49,7 +48,6 @@ else:
     actuation = LateModule("kinetostat.equilibrium.actuation")
     balance = LateModule("kinetostat.equilibrium.balance")
     load_limits = LateModule("kinetostat.equilibrium.limit")
-    links = LateModule("kinetostat.equilibrium.links")
     mechanisms = LateModule("kinetostat.equilibrium.mechanism")
     solving = LateModule("kinetostat.equilibrium.solving")
     tangent = LateModule("kinetostat.equilibrium.tangent")
@@ -223,7 +221,7 @@ class MachineState(Immutable):
             return ()
         configuration, joints = self.configuration, None if self.joints is None else self.joints.coordinates
         members = located_members(self.machine, configuration, joints)
-        return tuple(links.struts(configuration.legs, members, self.free.reference, self.at_rest))
+        return tuple(load_limits.struts(configuration.legs, members, self.free.reference, self.at_rest))
 
     @cached_property
     def actuator_loads(self) -> list[tuple[Spring, float]]:

@@ -15,9 +15,8 @@ from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.limit import LoadLimit
-from kinetostat.equilibrium.links import Strut, loaded_links
+from kinetostat.equilibrium.balance import Balance, balance, free_state, loaded_links
+from kinetostat.equilibrium.limit import LoadLimit, Strut
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of

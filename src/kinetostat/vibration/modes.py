@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.elastic_legs import idle_motions
+from kinetostat.equilibrium.tangent import starts_of, tangent_matrices, within
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of

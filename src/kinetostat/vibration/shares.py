@@ -15,10 +15,9 @@ import numpy as np
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
-from kinetostat.equilibrium.balance import Balance
+from kinetostat.equilibrium.balance import Balance, loaded_links
 from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
-from kinetostat.equilibrium.links import loaded_links
+from kinetostat.equilibrium.tangent import starts_of, tangent_matrices
 from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.tolerances import LEAST_DIVISOR
