@@ -144,7 +144,7 @@ def read_display(given: object) -> Display:
     """Read a table [display] of a machine file.
 
     Args:
-        given: what the file says: a table with `units` (text or a list of texts) and `digits`, both optional.
+        given: the table as written, with `units` (text or a list of texts) and `digits`, both optional.
 
     Raises:
         UnitError: it is not such a table, a unit is unknown, or the number of digits is out of bounds.

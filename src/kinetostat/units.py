@@ -197,7 +197,7 @@ def written_value(value: float, kind: str, like: object = None) -> str | float:
     Args:
         value: SI; infinity is "rigid".
         kind: a key of `KINDS`.
-        like: what stood in the file before, whose unit is kept where it can be; a bare number stays a bare number.
+        like: the entry that stood in the file before: its unit is kept if it can be, and a bare number stays bare.
     """
     if math.isinf(value):
         return RIGID

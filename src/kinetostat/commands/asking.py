@@ -18,10 +18,10 @@ from kinetostat.commands.common import (
     Parser,
     direction,
     drawings_of,
-    give,
     list_written,
     load_machine,
     note_damage,
+    print_result,
     say_stopped,
     search_bar,
     takes_figures,
@@ -63,9 +63,9 @@ def add_question(
     """Add the command of a question; its options follow when it is used.
 
     Args:
-        commands: to which it is added.
-        word: of the question.
-        run: runs it with its options and returns the exit code; `ask` if None.
+        commands: the commands to which it is added.
+        word: the word of the question.
+        run: runs the command with its options and returns the exit code; `ask` if None.
         more: adds options that the command alone has.
     """
     summary, where = QUESTIONS[word]
@@ -183,8 +183,8 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     """Write the files of an answer where the options name a place, and print it.
 
     Args:
-        options: of the command.
-        answer: of a kind that has a description.
+        options: the options of the command.
+        answer: an answer of a kind that has a description.
         to_files: whether `--output` is a list of files instead of a folder.
 
     Returns:
@@ -204,7 +204,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
         raise InputError(description.undrawn)
     if output and (answered or not message):
         written = (_write_named_files if to_files else write_folder)(options, description, answer)
-    code = give(
+    code = print_result(
         options,
         answered,
         lambda: json_of(description, answer),

@@ -198,8 +198,8 @@ def write_figures(options: argparse.Namespace, drawings: "Mapping[str, Callable[
     """Draw figures and write them in the formats asked for; a bar says which one is being drawn.
 
     Args:
-        options: of the command, with `--output` and `--formats`.
-        drawings: functions that draw them, by the name of the file without its suffix.
+        options: the options of the command, with `--output` and `--formats`.
+        drawings: functions that draw the figures, by the name of the file without its suffix.
 
     Returns:
         The files.
@@ -254,7 +254,7 @@ def print_json(data: object) -> None:
     print(json.dumps(data, ensure_ascii=plain, allow_nan=False, indent=1))
 
 
-def give(
+def print_result(
     options: argparse.Namespace,
     answered: bool,
     as_data: "Callable[[], object]",
@@ -265,7 +265,7 @@ def give(
     """Print a result and the files that were written, and list these in their folder.
 
     Args:
-        options: of the command; with `--json` the result is printed as data.
+        options: the options of the command; with `--json` the result is printed as data.
         answered: whether there is a result.
         as_data: gives the result as plain data.
         show: prints the result on a terminal.
@@ -293,7 +293,7 @@ def list_written(output: object, written: "Sequence[Path]") -> None:
     """Note the checksums of written files in their folder, if it is the output or has such a list already.
 
     Args:
-        output: of the command, a folder or something else.
+        output: the output of the command, a folder or something else.
         written: the files.
     """
     if not written:
@@ -309,8 +309,8 @@ def note_damage(folder: Path, repaired: str, unchecked: bool, changed: "Sequence
     """Print on stderr what was damaged in the folder of a study and has been computed again.
 
     Args:
-        folder: of the study.
-        repaired: what it was, in words; empty if nothing was damaged.
+        folder: the folder of the study.
+        repaired: the damage that was repaired, in words; empty if there was none.
         unchecked: whether the folder was begun without checksums.
         changed: names of its files that were missing or not as they had been written, and have been written again.
     """

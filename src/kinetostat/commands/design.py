@@ -9,11 +9,11 @@ from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
     drawings_of,
-    give,
     judge_requirements,
     load_machine,
     no_answer,
     note_damage,
+    print_result,
     progress_bar,
     search_bar,
     takes_figures,
@@ -170,7 +170,7 @@ def _validate(options: argparse.Namespace) -> int:
             tell(console, VALIDATION, validation, full=True)
 
     agreed = all(validation.difference <= AGREED for validation in validations)
-    return give(options, agreed, lambda: [json_of(VALIDATION, validation) for validation in validations], show)
+    return print_result(options, agreed, lambda: [json_of(VALIDATION, validation) for validation in validations], show)
 
 
 def _refuse_other_options(options: argparse.Namespace) -> None:
@@ -258,8 +258,8 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
     """Write the files of a result, print it, and judge the requirements of its machine; return the exit code.
 
     Args:
-        options: of the command.
-        result: of the search.
+        options: the options of the command.
+        result: the result of the search.
         changed: names of files in its folder that were damaged.
         keys: the only keys of its JSON that are printed; all if empty.
     """
@@ -280,5 +280,7 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
         data = json_of(RESULT, result)
         return {key: data.get(key) for key in keys} if keys else data
 
-    code = give(options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message)
+    code = print_result(
+        options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message
+    )
     return judge_requirements(result.machine, printing=not options.json) if result.solved else code

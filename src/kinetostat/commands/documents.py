@@ -17,10 +17,10 @@ from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
     as_wanted,
-    give,
     list_written,
     load_machine,
     no_answer,
+    print_result,
     progress_bar,
     search_bar,
     takes_figures,
@@ -230,7 +230,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     with search_bar("drawing") as drawing:
         written = write_all(reproduction, options.output, options.formats, drawing)
     list_written(options.output, written)
-    return give(
+    return print_result(
         options,
         reproduction.explained,
         lambda: json_of(REPRODUCTION, reproduction),

@@ -178,7 +178,7 @@ def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]
     """The actuated joints of a machine written leg by leg, in the order of its joint coordinates.
 
     Args:
-        chains: its legs at the home pose; floats.
+        chains: the legs of the machine at the home pose; floats.
         names: the names of the legs.
     """
     actuators, place = [], 0

@@ -5,22 +5,26 @@ The table [limits] is in `limits`. The texts are those of help, forms and the JS
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Annotated, Any
 
 from kinetostat.machine.limits import Limits
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import LEAST_OF_KIND, Field, Quantity, made_table, quantities, table
+from kinetostat.spec.fields import (
+    LEAST_OF_KIND,
+    Field,
+    Quantity,
+    along_axes,
+    inertia_tensor,
+    made_table,
+    quantities,
+    table,
+)
 from kinetostat.tolerances import ROUND_OFF_OF_INERTIA
 
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 NO_VECTOR = (0.0, 0.0, 0.0)
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-along_axes = partial(Quantity, count=3, apart=True)
-"""A quantity with a component along each of x, y and z."""
-inertia_tensor = partial(Quantity, "inertia", count=6, apart=True)
-"""Moments and products of inertia: xx, yy, zz, xy, xz, yz."""
 Moment = Annotated[Three, along_axes("moment", "moment about x, y, z")]
 Force = Annotated[Three, along_axes("force", "force along x, y, z")]
 

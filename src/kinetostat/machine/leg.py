@@ -46,8 +46,8 @@ class RevolutePlace:
     """The place of a revolute at a pose, base frame.
 
     Attributes:
-        axis, point: of the revolute; a unit vector, and m.
-        motion: the displacement, from the home pose, of what follows it.
+        axis, point: the axis of the revolute, a unit vector, and a point of it, m.
+        motion: the displacement, from the home pose, of what follows the revolute.
     """
 
     axis: Vector
@@ -60,8 +60,8 @@ class Turn:
     """An angle by its cosine and sine: what closed forms find, and all that placing a revolute needs.
 
     Attributes:
-        cosine, sine: of the angle.
-        placement: where the revolute then is, if the closed form knows it; otherwise the joints before it say so.
+        cosine, sine: cosine and sine of the angle.
+        placement: the place of the revolute, if the closed form knows it; otherwise the joints before it give it.
     """
 
     cosine: Scalar
@@ -76,11 +76,11 @@ class Joint:
     Attributes:
         axis: unit vector.
         point: on the axis, m; None for a slide.
-        name: of the joint it belongs to; a Hooke joint is two of these with one name, a spherical joint three.
-        pitch: of a screw, m/rad; 0 for a revolute.
-        carriage: of a slide, a point that travels with it, base frame, m: where its load is given; None if not said.
-        foot: of a slide, the point of its rail from which its coordinate counts, base frame, m; None for the base
-            origin. A rail that leans turns about it.
+        name: name of the joint it belongs to; a Hooke joint is two of these with one name, a spherical joint three.
+        pitch: advance of a screw, m/rad; 0 for a revolute.
+        carriage: a point that travels with a slide, at which its load is given, base frame, m; None if it has none.
+        foot: the point of a slide's rail from which its coordinate counts, base frame, m; None for the base origin. A
+            rail that leans turns about it.
     """
 
     axis: Vector
@@ -161,9 +161,10 @@ class Spring:
         part: the joint or link that it stands for, together with others of the same part; its own name if empty.
         actuated: whether it is an actuator.
         hinge: whether it is a flexure hinge: a joint that resists, where others are free.
-        preload: what it carries where it is not deformed, N or N·m, positive where it pulls its ends together; of a
-            flexure hinge at the home pose.
-        returns: how much more a flexure hinge, or the row of springs that it is, carries per travel from there, SI.
+        preload: its load where it is not deformed, N or N·m, positive where it pulls its ends together; a flexure hinge
+            is not deformed at the home pose.
+        returns: stiffness of a flexure hinge, or of the row of springs that it is, against travel from the home pose,
+            SI.
         acts: "pulls" or "pushes" if it carries loads of one sign only, as a cable does; otherwise empty.
     """
 
@@ -256,7 +257,7 @@ def rows_about_one_point(centres: Sequence[Sequence[float] | None]) -> tuple[tup
     """Return the numbers of joints in a row that turn about one point, two or more: universal and ball joints.
 
     Args:
-        centres: of the joints of a leg in order, m; None for what does not turn about a point.
+        centres: centres of the joints of a leg in order, m; None for a joint that does not turn about a point.
     """
     rows: list[list[int]] = []
     before: Sequence[float] | None = None
@@ -275,14 +276,14 @@ class Leg:
     Attributes:
         name: unique within the machine.
         chain: its elements in order.
-        lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
-        idle: which of its passive freedoms, counted from the base, depend on the others: the spin of a strut between
+        lines: lines of force, if the leg is known to carry forces along them and nothing else.
+        idle: numbers of the passive freedoms, from the base, that depend on the others: the spin of a strut between
             two spherical joints, for instance. Irrelevant where `lines` are given.
         centred: passive freedoms in a row that turn about one point, counted likewise: universal and ball joints,
             however they are written. Only machines written leg by leg state them.
-        number: of the actuated legs of a family, from 1, in the order of its fields; None for a leg that is not one of
-            them, and in machines written leg by leg.
-        short: what a drawing writes beside it; its name if empty.
+        number: number of an actuated leg of a family, from 1, in the order of its fields; None for any other leg, and
+            in machines written leg by leg.
+        short: the text that a drawing writes beside it; its name if empty.
     """
 
     name: str
@@ -401,9 +402,9 @@ def two_force_leg(
     Source: theory (2); row a_i of A over rho_i in eqs. 1-4.
 
     Args:
-        name: of the leg.
+        name: the name of the leg.
         base_joint, platform_joint: centres of the universal and of the spherical joint, base frame, m.
-        stiffness: of the actuator, N/m.
+        stiffness: the stiffness of the actuator, N/m.
         axial: EA of the leg's cross-section, N: the leg is stretched over its whole length.
     """
     span = platform_joint - base_joint

@@ -187,8 +187,8 @@ def two_centres(points: Sequence[Vector], axes: Sequence[Sequence[Vector]]) -> T
     """The passive axes of a leg by the points that they pass through; None unless these are two, of a pair and a ball.
 
     Args:
-        points: from the base to the platform, m, base frame.
-        axes: unit vectors of the axes through each of them.
+        points: the points in order from the base to the platform, m, base frame.
+        axes: unit vectors of the axes through each point.
     """
     if sorted(map(len, axes)) != [PAIR, BALL]:
         return None

@@ -83,10 +83,10 @@ class Beam:
 
     Attributes:
         name: the name of the link.
-        start, end: of its axis, base frame, m.
-        up: not along the link; the cross-section's z axis lies in the plane of both.
+        start, end: ends of its axis, base frame, m.
+        up: a vector that is not along the link; the cross-section's z axis lies in the plane of both.
         rigidity: the rigidity of its cross-section.
-        placed: its axes and its length, m: known without the ends once it has been displaced.
+        placed: its axes and its length, m, of a link that has been displaced; None: they follow from the ends.
     """
 
     name: str
@@ -296,11 +296,11 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     springs: list[tuple[Joint, float]] = []
     turns = _principal(turning, ROUND_OFF_OF_BLOCK * float(np.trace(turning)))
     for value, axis in turns:
-        moved = coupling @ axis / value
-        moving = moving - value * np.outer(moved, moved)
-        pitch = float(axis @ moved)
-        pitch = pitch if abs(pitch) > NO_PITCH * np.linalg.norm(moved) else 0.0
-        foot = point + Vector(*np.cross(axis, moved).tolist())
+        translation = coupling @ axis / value  # of the point, per unit turn
+        moving = moving - value * np.outer(translation, translation)
+        pitch = float(axis @ translation)
+        pitch = pitch if abs(pitch) > NO_PITCH * np.linalg.norm(translation) else 0.0
+        foot = point + Vector(*np.cross(axis, translation).tolist())
         springs.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
     # Subtracting the turns' share loses as many digits as the root of the ratio of the largest to the smallest turn.
     lost = math.sqrt(turns[0][0] / turns[-1][0]) if turns else 1.0

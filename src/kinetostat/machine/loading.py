@@ -334,8 +334,8 @@ def changed(machine: Machine, values: Mapping[str, Given] | None = None, **field
     """The machine with other numbers: `machine.with_values` as a function.
 
     Args:
-        machine: which stays as it is.
-        values: as `Machine.with_values` takes them.
+        machine: the machine, which stays as it is.
+        values: values of fields, as `Machine.with_values` takes them.
         fields: the same as keywords.
 
     Raises:

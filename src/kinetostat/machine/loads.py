@@ -50,7 +50,7 @@ def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
 
     Args:
         machine: says which links there are, their densities, and the mass of the platform.
-        configuration: its configuration, at its pose.
+        configuration: the configuration of the machine at its pose.
     """
     platform = machine.tables["tool"].mass
     links = [Mass(link.name, _known_mass(link), link.leg) for link in _members(machine, configuration)]
@@ -178,7 +178,7 @@ def platform_masses(machine: Machine, platform: Displacement) -> list[PlatformMa
 
     Args:
         machine: the machine with its table [tool].
-        platform: its placement, base frame.
+        platform: the placement of the platform, base frame.
     """
     tool = machine.tables["tool"]
     payload = machine.tool_point(platform) + platform.rotation.apply(Vector(*tool.payload_centre))
@@ -204,7 +204,7 @@ def load_on_platform(machine: Machine, platform: Displacement) -> Wrench:
 
     Args:
         machine: the machine with its loads.
-        platform: its placement.
+        platform: the placement of the platform.
 
     Returns:
         The wrench at the tool point, base axes (N·m, N).
@@ -226,7 +226,7 @@ def loads_left_out(machine: Machine, configuration: Configuration) -> str:
 
     Args:
         machine: the machine with its loads.
-        configuration: its configuration.
+        configuration: the configuration of the machine.
     """
     weights = [part.mass for part in moving_masses(machine, configuration) if part.name != PLATFORM and part.mass]
     parts = []

@@ -37,7 +37,7 @@ class Closure:
     Attributes:
         leg: name of the leg.
         span: distance of the two joints at this pose, m.
-        shortest, longest: what its links can bridge, m.
+        shortest, longest: the least and the greatest distance that its links can bridge, m.
     """
 
     leg: str
@@ -193,10 +193,10 @@ class Family:
         tables: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
         configure: makes the machine at its pose from one instance per table, by keyword.
         planar: whether its platform moves in the x-y plane only.
-        chains: where a pose has to be solved for, from the tables to the legs at the home pose, so that joint
-            coordinates can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
-        literals: what its machine files say beside numbers, by table.
-        links: those with a mass, of a family in closed form.
+        chains: makes the legs at the home pose from the tables, for a family whose poses have to be solved for: joint
+            coordinates are then found that close them (`kinematics.closure`), and `configure` takes these as `joints`.
+        literals: the entries of its machine files that are not numbers, by table.
+        links: the links with a mass, of a family in closed form.
         members: gives all links that can move of a machine written leg by leg, from its tables.
         loads: names of the loads at other points of the platform that its files have, see `named_loads`.
         own_drives: paths of the tables that single drives have of their own ("servo.leg 1"), each with the fields that
@@ -259,7 +259,7 @@ class Machine(Immutable):
 
     Attributes:
         name: the name for people.
-        family: its kind.
+        family: the kind of machine.
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
         written: the file it was read from; None where it was made of data. Comparisons leave it out.

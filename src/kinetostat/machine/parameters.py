@@ -253,7 +253,7 @@ def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, flo
 
     Args:
         family: the family whose fields they are.
-        given: by name of the field, as `find` takes it.
+        given: values by name of the field, as `find` takes it.
 
     Raises:
         InputError: an unknown field, a value that is none or out of bounds, or a list of another length than the field.

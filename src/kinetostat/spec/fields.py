@@ -9,7 +9,7 @@ command reads a machine.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
@@ -189,6 +189,12 @@ def positive(value: object, kind: str, name: str) -> float:
         return Quantity(kind, "", positive=True).number(value)
     except UnitError as error:
         raise InputError(f"{name} is {shorten(value)}: {error}.") from None
+
+
+along_axes = partial(Quantity, count=3, apart=True)
+"""A quantity with a component along each of x, y and z."""
+inertia_tensor = partial(Quantity, "inertia", count=6, apart=True)
+"""Moments and products of inertia: xx, yy, zz, xy, xz, yz."""
 
 
 @dataclass(frozen=True)

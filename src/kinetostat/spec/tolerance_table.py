@@ -151,7 +151,7 @@ class StandardClass:
     """The greatest distance of a number from its nominal value, by a class of a standard.
 
     Attributes:
-        text, spread: as of `PlusMinus`.
+        text, spread: see `PlusMinus`.
         name: a grade of ISO 286-1, which has lengths only, or a class of ISO 2768-1: f, m, c or v.
         size: nominal size that was written with it, m; 0 if none was.
     """
@@ -186,7 +186,7 @@ Deviation = PlusMinus | StandardClass
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A line of the table: what it is about, how far those numbers may be off, what it costs to make them so.
+    """A line of the table: its subject, how far those numbers may deviate, and the cost of making them so.
 
     Attributes:
         about: a group, or a path in which * stands for anything.
@@ -209,7 +209,7 @@ class Tolerance:
 
 
 Tolerances = dict[str, Tolerance]
-"""By what they are about, in the order of the file: of two that are about the same number, the later one holds."""
+"""Tolerances by their subjects, in the order of the file: of two about the same number, the later one holds."""
 
 
 def take_tolerances(document: Document, settings: Sequence[str], origin: str) -> tuple[Document, list[str], Tolerances]:
@@ -250,7 +250,7 @@ def read_tolerances(written: object, origin: str = "") -> Tolerances:
 
     Args:
         written: values by what they are about; tables in it are parts of a path.
-        origin: what stands before the message: the name of the file.
+        origin: beginning of the message, which names the file.
 
     Raises:
         InputError: names the line, its value, what is allowed, and how to write it.

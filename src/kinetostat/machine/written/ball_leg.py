@@ -43,7 +43,7 @@ class BallLeg:
     """A leg of six joints with a ball at one end, and two revolutes about another point among the others.
 
     Attributes:
-        leg: its name.
+        leg: the name of the leg.
         backwards: whether the ball is at the base, so that the leg is read from the platform.
         pair_first: whether, read so, the two revolutes about one point come before the single joint.
         upright: whether the axes of the pair, and its second axis and the arm, are at right angles.
@@ -175,10 +175,10 @@ def _ball_turns(
     Source: theory (75).
 
     Args:
-        ball: its joints at the home pose.
-        arm: the rotation of what is before it.
-        centre: its centre at the pose, m.
-        motion: the displacement of what follows it.
+        ball: the joints of the ball at the home pose.
+        arm: the rotation of the link before the ball.
+        centre: the centre of the ball at the pose, m.
+        motion: the displacement of the link behind the ball.
 
     Returns:
         The turns with their placements, and the square of what they miss.
@@ -251,10 +251,10 @@ def to_distance(
 
     Args:
         joint: a revolute or a slide.
-        point: where the point is before, m.
-        home: where it is at the home pose, where the joint need not move: this chooses one of the two solutions.
+        point: the point before the joint moves, m.
+        home: the point at the home pose, where the joint need not move: this chooses one of the two solutions.
         centre: the centre, m.
-        square: of the distance, m².
+        square: the square of the distance, m².
         aligned: 1 if the joint slides along the line from the centre to the point, -1 if against it.
 
     Returns:

@@ -14,13 +14,11 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import RIGID, Element, Joint, revolutes
 from kinetostat.machine.link import Parallelogram, any_up
 from kinetostat.spec.errors import choice
-from kinetostat.spec.fields import Field, Quantity
+from kinetostat.spec.fields import Field, Quantity, along_axes
 from kinetostat.units import UnitError, parse
 
-AXIS = Field(
-    Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
-)
-POINT = Field(Quantity("length", "a point of the joint, base frame, at the home pose", count=3, apart=True))
+AXIS = Field(along_axes("direction", "direction of the joint, of any length, base axes at the home pose"))
+POINT = Field(along_axes("length", "a point of the joint, base frame, at the home pose"))
 
 
 @dataclass(frozen=True)
@@ -45,8 +43,8 @@ class JointType:
     """A type of joint.
 
     Attributes:
-        meaning: what its numbers mean.
-        fields: what is written about it, by name.
+        meaning: the meaning of its numbers, in words.
+        fields: the fields that a file writes for it, by name.
         elements: makes what the chain of a leg has for a joint, base to platform, from its name and its numbers.
         stiffness: kind of quantity of its stiffness, for a type of one freedom, which may have an actuator or a spring
             of its own; None for all others.
@@ -54,8 +52,8 @@ class JointType:
         seat: directions in which its bearings may have a stiffness: those of `SEAT` in which it does not move.
         bearings_travel: whether bearings given by `seat` go with the body that it moves, as those of a carriage do;
             those of other joints stay on the base side, and so does the matrix of any joint.
-        in_plane: where its axis must point in a planar machine, "normal" to the plane or "along" it, "always" if it has
-            none; empty if a planar machine cannot have it.
+        in_plane: direction that its axis must have in a planar machine, "normal" to the plane or "along" it; "always"
+            if it has no axis, and empty if a planar machine cannot have it.
     """
 
     meaning: str
@@ -220,9 +218,7 @@ JOINT_TYPES = {
         "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
         {
             "point": POINT,
-            "far": Field(
-                Quantity("length", "middle of the far short side, base frame, at the home pose", count=3, apart=True)
-            ),
+            "far": Field(along_axes("length", "middle of the far short side, base frame, at the home pose")),
             "axis": AXIS,
             "width": Field(Quantity("length", "of the short sides", positive=True)),
             "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),

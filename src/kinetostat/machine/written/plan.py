@@ -104,7 +104,7 @@ class LinkPlan:
         cross_section: name of its cross-section, or empty.
         up: direction in which the cross-section's z axis points, base axes at the home pose; None to leave the choice.
         compliance: the compliance of model "matrix", as for a joint, at the link's end.
-        weight: what the file gives of its mass, its centre and its inertia: keys of `tables.WEIGHT`.
+        weight: the fields that the file gives about its mass: keys of `tables.WEIGHT`.
     """
 
     name: str
@@ -120,7 +120,7 @@ class Copies(Immutable):
     """Copies of a leg, as a file has them.
 
     Attributes:
-        count: how many legs there are.
+        count: number of legs, all copies together.
         angles: the angles by which they are turned about the z axis of the base, as written; empty for equal steps.
         mirrored: whether every other one is the mirror image of the one before.
     """
@@ -160,15 +160,16 @@ class CopyPlacement:
 
 @dataclass(frozen=True, eq=False)
 class LegPlan(Immutable):
-    """A leg: its joints from base to platform, and those of its links that are flexible, by name.
+    """A leg as a file writes it, or one of its copies.
 
     Attributes:
         name: unique within the machine.
-        joints, links: its joints and links.
+        joints: its joints from base to platform.
+        links: its links that are flexible or have a mass of their own, by name.
         idle, centred: see `leg.Leg`.
         inverse: closed form of its joint coordinates, if it has one.
         copy_of: name of the leg of the file that it is a copy of; empty if it is not a copy.
-        copies: what the file says about that leg's copies.
+        copies: the copies of that leg, as the file has them.
         placement: the way the copy lies; None if it is not a copy.
     """
 

@@ -5,7 +5,7 @@ from kinetostat.machine.series import label
 from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, LOAD_OF_STIFFNESS, SEAT, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import JointPlan, Plan
 from kinetostat.machine.written.struts import AXIAL
-from kinetostat.spec.fields import Field, Quantity, made_table
+from kinetostat.spec.fields import Field, Quantity, along_axes, inertia_tensor, made_table
 
 POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
 """Kinds of quantity of the coordinates of a pose."""
@@ -26,14 +26,9 @@ MATERIAL_FIELDS = {
 
 WEIGHT = {
     "mass": Field(Quantity("mass", "of the link, in the place of what its cross-section weighs")),
-    "centre_of_mass": Field(Quantity("length", "of that mass, base frame at the home pose", count=3, apart=True)),
+    "centre_of_mass": Field(along_axes("length", "of that mass, base frame at the home pose")),
     "inertia": Field(
-        Quantity(
-            "inertia",
-            "of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz",
-            count=6,
-            apart=True,
-        )
+        inertia_tensor("of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz")
     ),
 }
 """Fields of a link about its mass; each needs those before it."""
@@ -41,7 +36,7 @@ WEIGHT = {
 
 def tables_of(plan: Plan) -> dict[str, type]:
     """The tables of the plan's machine files, by dotted name."""
-    point = Quantity("length", "platform point P at the home pose, base frame", count=3, apart=True)
+    point = along_axes("length", "platform point P at the home pose, base frame")
     tables = {"platform": made_table("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
         tables[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
