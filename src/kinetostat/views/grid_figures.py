@@ -1,4 +1,4 @@
-"""Figures of answers at many poses: curves, contour maps, regions where the same legs carry, quantities along a path.
+"""Figures of answers over a grid: curves, contour maps, and regions where the same legs carry.
 
 Nothing is computed here.
 """
@@ -16,14 +16,10 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from kinetostat.arrays import Array, Integers
+from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
-from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
-from kinetostat.machine.machine import setting_of
-from kinetostat.machine.parameters import named_entry
 from kinetostat.studies.datasets import LOADS_LEFT_OUT, failures
-from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import STYLE, fill_regions, look_of, missing_line, new_figure, region_colours, slim_bar
@@ -44,10 +40,14 @@ MOST_COLOURED_COUNTS = 12
 """Number of whole values up to which each has a colour; more colours cannot be told apart, and contours are drawn."""
 LEGEND_ROW = 0.17
 """Height of a line of the legend below a map, inches."""
-NO_RESULT_COLOUR = "#dddddd"
-"""Colour behind poses that have no result."""
-MOST_DOTS = 60
-"""Number of poses up to which each is marked with a dot."""
+MAP_SIZE, ROOM_BESIDE_MAPS = (2.75, 2.45), (0.3, 0.4)
+"""Width and height of a map among others with its numbers and its colour bar, and of the labels of all, inches."""
+SQUARE_HEIGHT = 1.4
+"""Height of a map among others without its numbers, if it is square, inches."""
+CURVES_SIZE = (3.4, 3.0)
+"""Width and height of a panel of curves, inches."""
+CARRYING_WIDTH, ROOM_BESIDE_CARRYING = 3.6, 1.5
+"""Width of the map of legs that carry without its numbers, and height of its title, labels and numbers, inches."""
 
 
 def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
@@ -57,15 +57,15 @@ def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
         dataset: over the grid.
         title: the title of the figure; the name of the machine if empty.
     """
-    shown: dict[int, tuple[Callable[..., Figure], str, str]] = {
+    by_dimensions: dict[int, tuple[Callable[..., Figure], str, str]] = {
         1: (grid_curves, "sweep", "The quantities over the parameter that varies."),
         2: (contour_maps, "map", "The quantities over the two parameters that vary."),
     }
-    if dataset["status"].ndim not in shown:
+    if dataset["status"].ndim not in by_dimensions:
         return {}
-    draw, file, caption = shown[dataset["status"].ndim]
-    named = partial(draw, dataset, quantities_of(dataset), title=title or dataset.attrs["machine"])
-    return {"map": Drawing(caption, named, file=file)}
+    function, file, caption = by_dimensions[dataset["status"].ndim]
+    draw = partial(function, dataset, quantities_of(dataset), title=title or dataset.attrs["machine"])
+    return {"map": Drawing(caption, draw, file=file)}
 
 
 def stored_figures(stored: StoredGrid) -> dict[str, Drawing]:
@@ -94,7 +94,8 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     across, up = dataset["status"].dims
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    with new_figure((2.75 * columns + 0.3, 2.45 * rows + 0.4), title, *setting_lines(dataset)) as figure:
+    (width, height), (beside, above) = MAP_SIZE, ROOM_BESIDE_MAPS
+    with new_figure((width * columns + beside, height * rows + above), title, *setting_lines(dataset)) as figure:
         mpl.rcParams["axes.grid"] = False
         panels = figure.subplots(rows, columns, squeeze=False).flat
         x, x_label = axis_values(dataset, str(across))
@@ -107,7 +108,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
             _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
             thin_numbers(panel)
-        trim_height(figure, figure.axes[0], 1.4 * rows)
+        trim_height(figure, figure.axes[0], SQUARE_HEIGHT * rows)
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
     with mpl.rc_context(STYLE):
@@ -126,7 +127,8 @@ def grid_curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure
     """
     (across,) = dataset["status"].dims
     units = list(dict.fromkeys(dataset[name].attrs["units"] for name in names))
-    with new_figure((3.4 * len(units) + 0.2, 3.0), title, *setting_lines(dataset)) as figure:
+    width, height = CURVES_SIZE
+    with new_figure((width * len(units) + 0.2, height), title, *setting_lines(dataset)) as figure:
         for panel, unit in zip(figure.subplots(1, len(units), squeeze=False).flat, units, strict=True):
             shown = [name for name in names if dataset[name].attrs["units"] == unit]
             _curve_panel(panel, dataset, str(across), shown)
@@ -141,7 +143,7 @@ def setting_lines(dataset: xr.Dataset) -> tuple[str, str, str]:
 
 
 def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
-    """Fill a panel with bands of colour; return its lines, whose values can be written once the layout is fixed."""
+    """Fill a panel with bands of colour; return its lines, whose values can be written when the layout is fixed."""
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
     panel.set_facecolor("#eeeeee")
@@ -244,72 +246,10 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
         panel.set(xlabel=x_label, ylabel=y_label)
         set_axis_scales(panel, dataset, across, up)
         if panel.get_aspect() == 1.0:
-            figure.set_figheight(1.5 + LEGEND_ROW * len(named) + 3.6 * float(np.ptp(y) / np.ptp(x)))
+            height = CARRYING_WIDTH * float(np.ptp(y) / np.ptp(x))
+            figure.set_figheight(ROOM_BESIDE_CARRYING + LEGEND_ROW * len(named) + height)
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
         patches += [Patch(color="#eeeeee", label="no result")] if (codes < 0).any() else []
         setting = "\n".join(line for line in setting_lines(dataset) if line)
         figure.legend(handles=patches, loc="outside lower center", ncols=1, title=setting, title_fontsize=6.5)
     return figure
-
-
-def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
-    """Return the one figure of quantities along a path."""
-    return {"path": Drawing("Quantities along the poses.", partial(path_figure, answers))}
-
-
-def path_figure(answers: PoseAnswers, title: str = "{}") -> Figure:
-    """Draw quantities along a path, a panel for each unit; poses without a result are grey.
-
-    Args:
-        answers: the answers at the poses, which are taken as neighbours in the order in which they are given.
-        title: over the figure, with braces for the name of the machine.
-    """
-    names = list(answers.values)
-    groups = {unit: [n for n in names if QUANTITIES[n].unit == unit] for unit in (QUANTITIES[n].unit for n in names)}
-    fields = [pair for pair in zip(answers.poses.fields, answers.poses.values, strict=True) if np.ptp(pair[1]) > 0.0]
-    kinds = list(dict.fromkeys(field.quantity.kind for field, _ in fields))
-    rows = len(groups) + len(kinds)
-    with new_figure(
-        (6.6, 0.7 + 1.9 * len(groups) + 1.25 * len(kinds)), title.format(answers.machine.name), *_notes(answers)
-    ) as figure:
-        ratios = [1.9] * len(groups) + [1.25] * len(kinds)
-        panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios).flat)
-        for panel, (unit, members) in zip(panels, groups.items(), strict=False):
-            every = (v for name in members for v in answers.values[name])
-            scale = answers.machine.display.fitting(unit, every)
-            curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
-            _draw_panel(panel, answers, curves, scale.label(plain_name(group_of(members) or members[0])))
-        for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
-            shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
-            scale = answers.machine.display.scale(shown[0][0].unit)
-            _draw_panel(
-                panel, answers, {named_entry(f.shown): values * scale.factor for f, values in shown}, scale.label(kind)
-            )
-        panels[-1].set_xlabel("pose")
-    return figure
-
-
-def _draw_panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: str) -> None:
-    numbers = np.arange(1, answers.poses.count + 1)
-    _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
-    marker = "." if len(numbers) <= MOST_DOTS else ""
-    for place, (name, values) in enumerate(curves.items()):
-        finite = np.where(np.isfinite(values), values, np.nan)
-        panel.plot(numbers, finite, marker=marker, label=name, **look_of(place))
-    panel.set_ylabel(label)
-    panel.margins(x=0.0)
-    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def _shade(panel: Axes, numbers: Integers) -> None:
-    """Shade the poses of these numbers; neighbours share one strip."""
-    for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
-        if len(run):
-            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=NO_RESULT_COLOUR, linewidth=0.0)
-
-
-def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
-    """The lines below the title: numbers that differ from the file, loads left out, and poses without a result."""
-    counts = {status: len(numbers) for status, numbers in answers.failures.items()}
-    missing = missing_line(counts, answers.poses.count, " (grey)")
-    return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing

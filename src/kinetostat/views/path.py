@@ -1,18 +1,24 @@
-"""Quantities at the poses of a file: the question, and the description of its answer. Nothing is computed here."""
+"""Quantities at the poses of a file: the question, the description of its answer, and its figure.
+
+Nothing is computed here.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kinetostat.arrays import Array, Integers
 from kinetostat.display import DASH, number
 from kinetostat.engine.batch import Progress
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import data_name
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
+from kinetostat.late import LateModule
+from kinetostat.machine.machine import Machine, setting_of
+from kinetostat.machine.parameters import data_name, named_entry
 from kinetostat.studies.evaluation import PoseAnswers, answers_at
 from kinetostat.studies.poses import read_poses
 from kinetostat.studies.quantities import usual_quantities
@@ -22,6 +28,7 @@ from kinetostat.views.question import (
     LOADS_LEFT_OUT,
     NAME,
     Description,
+    Drawing,
     Field,
     Lines,
     Option,
@@ -30,17 +37,32 @@ from kinetostat.views.question import (
 )
 from kinetostat.views.tables import FittedTable, numeric_table
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from kinetostat.views import figures
+else:
+    figures = LateModule("kinetostat.views.figures")
+
 USUAL_QUANTITY = "free_stiffness"
+"""Quantity that is computed where nobody names one: what a tool feels."""
+FIGURE_WIDTH, QUANTITY_HEIGHT, COORDINATE_HEIGHT, ROOM_ABOVE_AND_BELOW = 6.6, 1.9, 1.25, 0.7
+"""Width of the figure, height of a panel of quantities and of one of coordinates, and of title and notes, inches."""
+NO_RESULT_COLOUR = "#dddddd"
+"""Colour behind poses that have no result."""
+MOST_DOTS = 60
+"""Number of poses up to which each is marked with a dot: more would run into a line."""
 
 
 def _lines(answer: PoseAnswers) -> Lines:
     count, failures = answer.poses.count, answer.failures
-    inside = count - sum(len(numbers) for numbers in failures.values())
-    yield "Poses", f"{inside:,} of {count:,} poses have a result."
+    answered = count - sum(len(numbers) for numbers in failures.values())
+    yield "Poses", f"{answered:,} of {count:,} poses have a result."
     for status, numbers in failures.items():
-        first, several = numbers[0] + 1, len(numbers) > 1
-        which = f"{len(numbers):,} poses, the first is {first}" if several else f"pose {first}"
-        yield "No result", f"{status.word.replace('_', ' ')}: {which}. {status.sentence}"
+        first = numbers[0] + 1
+        poses = f"{len(numbers):,} poses, the first is {first}" if len(numbers) > 1 else f"pose {first}"
+        yield "No result", f"{status.word.replace('_', ' ')}: {poses}. {status.sentence}"
     if failures and answer.poses.unit_doubt:
         yield "Units", answer.poses.unit_doubt
 
@@ -101,6 +123,83 @@ def _head(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
+def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
+    """Return the one figure of quantities along a path."""
+    return {"path": Drawing("Quantities along the poses.", partial(path_figure, answers))}
+
+
+def path_figure(answers: PoseAnswers, title: str = "{}") -> "Figure":
+    """Draw quantities along a path, a panel for each unit, and the coordinates that vary below; grey without a result.
+
+    Args:
+        answers: the answers at the poses, which are taken as neighbours in the order in which they are given.
+        title: over the figure, with braces for the name of the machine.
+    """
+    quantities, coordinates = _quantity_panels(answers), _coordinate_panels(answers)
+    heights = [QUANTITY_HEIGHT] * len(quantities) + [COORDINATE_HEIGHT] * len(coordinates)
+    size = (FIGURE_WIDTH, ROOM_ABOVE_AND_BELOW + sum(heights))
+    with figures.new_figure(size, title.format(answers.machine.name), *_notes(answers)) as figure:
+        panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for panel, (label, curves) in zip(panels, quantities + coordinates, strict=True):
+            _draw_panel(panel, answers, curves, label)
+        panels[-1].set_xlabel("pose")
+    return figure
+
+
+Curves = dict[str, Array]
+"""Values at each pose, in the unit of the axis, by the name in the legend."""
+
+
+def _quantity_panels(answers: PoseAnswers) -> list[tuple[str, Curves]]:
+    """Return label and curves of a panel for each unit of the quantities."""
+    members: dict[str, list[str]] = {}
+    for name in answers.values:
+        members.setdefault(QUANTITIES[name].unit, []).append(name)
+    panels = []
+    for unit, names in members.items():
+        scale = answers.machine.display.fitting(unit, (v for name in names for v in answers.values[name]))
+        label = scale.label(plain_name(group_of(names) or names[0]))
+        panels.append((label, {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in names}))
+    return panels
+
+
+def _coordinate_panels(answers: PoseAnswers) -> list[tuple[str, Curves]]:
+    """Return label and curves of a panel for each kind of field that varies along the path."""
+    panels: dict[str, Curves] = {}
+    for field, values in zip(answers.poses.fields, answers.poses.values, strict=True):
+        if np.ptp(values) > 0.0:
+            scale = answers.machine.display.scale(field.unit)
+            curves = panels.setdefault(scale.label(field.quantity.kind), {})
+            curves[named_entry(field.shown)] = values * scale.factor
+    return list(panels.items())
+
+
+def _draw_panel(panel: "Axes", answers: PoseAnswers, curves: Curves, label: str) -> None:
+    numbers = np.arange(1, answers.poses.count + 1)
+    _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
+    marker = "." if len(numbers) <= MOST_DOTS else ""
+    for place, (name, values) in enumerate(curves.items()):
+        finite = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(numbers, finite, marker=marker, label=name, **figures.look_of(place))
+    panel.set_ylabel(label)
+    panel.margins(x=0.0)
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _shade(panel: "Axes", numbers: Integers) -> None:
+    """Shade the poses of these numbers; neighbours share one strip."""
+    for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
+        if len(run):
+            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=NO_RESULT_COLOUR, linewidth=0.0)
+
+
+def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
+    """The lines below the title: numbers that differ from the file, loads left out, and poses without a result."""
+    counts = {status: len(numbers) for status, numbers in answers.failures.items()}
+    missing = figures.missing_line(counts, answers.poses.count, " (grey)")
+    return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing
+
+
 PATH = Description(
     title="Along the poses",
     fields=(
@@ -114,7 +213,7 @@ PATH = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures="views.grid_figures.path_figures",
+    figures=path_figures,
     makers={"csv": _csv, "nc": "studies.datasets.as_dataset"},
     state=lambda _answer: "",
     answered=lambda answer: answer.answered,

@@ -70,29 +70,38 @@ LINES_OF_THE_POSE = ("Pose", "Margin")
 
 def summary_section(answers: Answers, validation: Validation | str, portrait: Figure) -> Section:
     """Write the summary, with the requirements and a picture of the machine."""
-    points = tuple((typeset(text), "") for text in _findings(answers, validation))
+    findings = Bullets(tuple((typeset(text), "") for text in _findings(answers, validation)))
+    blocks = (*_answer_blocks(answers), *_requirements(answers), portrait, findings, _directions(answers))
+    return Section("Summary", blocks)
+
+
+def _answer_blocks(answers: Answers) -> Iterator[Block]:
+    """Give the answer: pose, what holds under the loads and without them, the vibration, and the error as built."""
     state = answers.of("under_load")
-    loaded = state is not None and state.has_rest
-    free = [(label, text) for label, text in first_lines(answers.analysis) if not loaded or label in LINES_OF_THE_POSE]
-    at_rest = [*loaded_lines(state)] if loaded else []
-    lines = [*free[:1], *at_rest, *free[1:]]
-    answer: list[Block] = [Paragraph(typeset(text), f"{label}:") for label, text in lines]
-    answer[1:1] = [verdict_of(state)] if state else []
-    answer += [_demands(answers, state)] if loaded else []
-    for label, name in (("Vibration", "vibration"), ("As built", "budget")):
-        part = answers.of(name)
-        answer += [Paragraph(typeset(part.message), f"{label}:")] if part else []
-    return Section("Summary", (*answer, *_requirements(answers), portrait, Bullets(points), _directions(answers)))
+    at_rest = state is not None and state.has_rest
+    lines = [(head, text) for head, text in first_lines(answers.analysis) if not at_rest or head in LINES_OF_THE_POSE]
+    pose, *others = [Paragraph(typeset(text), f"{head}:") for head, text in lines]
+    yield pose
+    if state is not None:
+        yield verdict_of(state)
+    if at_rest:
+        yield from (Paragraph(typeset(text), f"{head}:") for head, text in loaded_lines(state))
+    yield from others
+    if at_rest:
+        yield _demands(answers, state)
+    for head, name in (("Vibration", "vibration"), ("As built", "budget")):
+        if answer := answers.of(name):
+            yield Paragraph(typeset(answer.message), f"{head}:")
 
 
 def _demands(answers: Answers, state: LoadedState) -> Table:
     """Return a table of the displacements and errors of a loaded machine beside the requirements of its file."""
     display, vibration, error = answers.machine.display, answers.of("vibration"), answers.of("budget")
-    moved, turned = state.tool_motion
-    across, about = (_verdicts(answers, prefix, "xyz") for prefix in ("displacement_", "displacement_r"))
+    displacement, rotation = map(display.show_deflection, state.tool_motion, ("m", "rad"))
+    along, about = (_verdicts(answers, prefix, "xyz") for prefix in ("displacement_", "displacement_r"))
     rows = [
-        ("displacement of the tool", display.show_deflection(moved, "m"), across),
-        ("rotation of the platform", display.show_deflection(turned, "rad"), about),
+        ("displacement of the tool", displacement, along),
+        ("rotation of the platform", rotation, about),
         *_actuator_demands(answers, state),
     ]
     if vibration and vibration.modes:
