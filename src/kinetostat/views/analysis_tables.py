@@ -21,10 +21,16 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.analysis_parts import Along, LoadCase
 from kinetostat.studies.attribution import Softest, by_part, largest_contributors
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
+from kinetostat.units import load_unit, motion_unit
 from kinetostat.views.tables import FittedTable, numeric_table
 
 BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
 """Blocks of C, each with the word for its directions and the unit of its stiffness."""
+MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
+"""SI units of the blocks of K and C: rotation, coupling, translation."""
+ROTATION_NAMES = COMPONENTS[:3]
+MOST_NAMED = 4
+"""Parts of unknown mass that are named at most, on one line."""
 
 
 def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
@@ -60,13 +66,12 @@ def stiffness_sentence(components: Sequence[str], compliances: Sequence[float], 
         display: units and digits.
     """
     sentences = []
-    for _, word, unit in BLOCKS:
-        of_block = [
-            (name, compliance)
+    for block, word, unit in BLOCKS:
+        values = [
+            f"{name[-1]} {display.number(reciprocal(compliance), unit, 'rigid')}"
             for name, compliance in zip(components, compliances, strict=True)
-            if (name in COMPONENTS[:3]) == (word == "about")
+            if (name in ROTATION_NAMES) == (block == "rotation")
         ]
-        values = [f"{name[-1]} {display.number(reciprocal(c), unit, 'rigid')}" for name, c in of_block]
         sentences.append(f"{word} {', '.join(values)} {display.scale(unit).unit}")
     return "; ".join(sentences)
 
@@ -87,40 +92,34 @@ def _direction_name(direction: Softest) -> str:
     """Name the softest direction: an axis, a vector, or the plane or space of all that are equally soft."""
     if len(direction.directions) == 3:
         return "any direction"
-    vectors = [_axis_name(way) for way in direction.directions]
-    return vectors[0] if len(vectors) == 1 else f"any direction between {' and '.join(vectors)}"
+    names = [_axis_name(vector) for vector in direction.directions]
+    return names[0] if len(names) == 1 else f"any direction between {' and '.join(names)}"
 
 
-def _axis_name(way: Sequence[float]) -> str:
+def _axis_name(vector: Sequence[float]) -> str:
     """Return an axis by its name, any other unit vector by its components; a direction has no sign."""
-    largest = max(range(3), key=lambda i: abs(way[i]))
-    rounded = [round(c * math.copysign(1.0, way[largest]), 2) + 0.0 for c in way]
+    largest = max(range(3), key=lambda i: abs(vector[i]))
+    rounded = [round(c * math.copysign(1.0, vector[largest]), 2) + 0.0 for c in vector]
     return "xyz"[largest] if abs(rounded[largest]) == 1.0 else f"({', '.join(f'{c:g}' for c in rounded)})"
 
 
 def _load_sentence(analysis: Analysis, load: LoadCase) -> str:
     """Say how far the load moves the tool, and which actuator carries most."""
     display = analysis.machine.display
-    motions = [*zip(load.components, load.deflection.tolist(), strict=True)]
-    turned, moved = (math.hypot(*(m for c, m in motions if (c in ROTATION_NAMES) is turns)) for turns in (True, False))
+    amounts = [*zip(load.components, load.deflection.tolist(), strict=True)]
+    rotation = math.hypot(*(amount for name, amount in amounts if name in ROTATION_NAMES))
+    displacement = math.hypot(*(amount for name, amount in amounts if name not in ROTATION_NAMES))
     sentence = (
-        f"Under the load the {analysis.machine.reference} moves {display.show_deflection(moved, 'm')} and turns "
-        f"{display.show_deflection(turned, 'rad')}"
+        f"Under the load the {analysis.machine.reference} moves {display.show_deflection(displacement, 'm')} and turns "
+        f"{display.show_deflection(rotation, 'rad')}"
     )
-    most = []
-    for turning, unit in ((False, "N"), (True, "N·m")):
+    greatest = []
+    for turning in (False, True):
         springs = [spring for spring in load.springs if spring.actuated and spring.turning is turning]
         if springs:
             worst = max(springs, key=lambda spring: abs(spring.load))
-            most.append(f"{worst.name} carries {display.show(worst.load, unit)}")
-    return f"{sentence}; {', '.join(most)}, the most of all actuators." if most else f"{sentence}."
-
-
-MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
-"""SI units of the blocks of K and C: rotation, coupling, translation."""
-ROTATION_NAMES = COMPONENTS[:3]
-MOST_NAMED = 4
-"""Parts of unknown mass that are named."""
+            greatest.append(f"{worst.name} carries {display.show(worst.load, load_unit(turning))}")
+    return f"{sentence}; {', '.join(greatest)}, the most of all actuators." if greatest else f"{sentence}."
 
 
 def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
@@ -262,14 +261,17 @@ def _point_text(point: Array, display: Display) -> str:
 
 def load_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
     """Return the load and the deflection of the reference point."""
-    units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in load.components]
-    motions = ", ".join(dict.fromkeys(display.deflection(motion).unit for _, motion in units))
-    title = f"Load ({display.names([loaded for loaded, _ in units])}) and the deflection under it ({motions})"
+    turning = [name in ROTATION_NAMES for name in load.components]
+    units, scales = (
+        [load_unit(turns) for turns in turning],
+        [display.deflection(motion_unit(turns)) for turns in turning],
+    )
+    motions = ", ".join(dict.fromkeys(scale.unit for scale in scales))
+    title = f"Load ({display.names(units)}) and the deflection under it ({motions})"
     table = numeric_table(title, "", load.components)
-    table.add_row("load", *(display.number(c, unit) for c, (unit, _) in zip(load.wrench, units, strict=True)))
-    pairs = zip(load.deflection, units, strict=True)
-    moved = (motion * display.deflection(unit).factor for motion, (_, unit) in pairs)
-    table.add_row("deflection", *(number(motion, "free", display.digits) for motion in moved))
+    table.add_row("load", *(display.number(c, unit) for c, unit in zip(load.wrench, units, strict=True)))
+    pairs = zip(load.deflection, scales, strict=True)
+    table.add_row("deflection", *(number(motion * scale.factor, "free", display.digits) for motion, scale in pairs))
     return table
 
 
@@ -278,10 +280,9 @@ def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTabl
     table = numeric_table("Actuators under this load", "", ["load", "deformation"])
     for spring in load.springs:
         if spring.actuated:
-            units = ("N·m", "rad") if spring.turning else ("N", "m")
-            table.add_row(
-                spring.name, display.show(spring.load, units[0]), display.show_deflection(spring.deformation, units[1])
-            )
+            load_shown = display.show(spring.load, load_unit(spring.turning))
+            deformation = display.show_deflection(spring.deformation, motion_unit(spring.turning))
+            table.add_row(spring.name, load_shown, deformation)
     return table
 
 
@@ -294,7 +295,7 @@ def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) ->
     table = numeric_table(title, "joint", heads)
     for reaction in load.reactions:
         pairs = zip(reaction.wrench, turns, strict=True)
-        table.add_row(reaction.joint, *(display.number(c, "N·m" if turning else "N") for c, turning in pairs))
+        table.add_row(reaction.joint, *(display.number(c, load_unit(turning)) for c, turning in pairs))
     return table
 
 

@@ -40,6 +40,8 @@ MOST_LISTED_PARTS = 12
 """Single tolerances that are listed, which fill a screen; all of them with --full, and in JSON."""
 PER_METRE = 1e-6
 """Ratios are read in µm/m."""
+SAME_TOLERANCE = 0.01
+"""Change of a tolerance, as a share of it, up to which it is kept: nobody writes it on a drawing."""
 
 
 def _lines(answer: Budget) -> Lines:
@@ -72,7 +74,7 @@ def _allocation_sentence(answer: Budget) -> str:
     allocation = answer.allocation
     if allocation is None:
         return ""
-    times, evenly = (number(c / allocation.before, digits=3) for c in (allocation.cost, allocation.evenly))
+    times, evenly = (number(cost / allocation.before, digits=3) for cost in (allocation.cost, allocation.evenly))
     return (
         f"The present tolerances give {answer.machine.display.show_deflection(allocation.present, 'm')}. The new ones "
         f"cost {times} times as much; if all were changed by one factor, {evenly} times as much. Half of a tolerance "
@@ -99,14 +101,13 @@ def shown_measures(answer: Budget, full: bool = False) -> list[str]:
         answer: an answer with measures.
         full: whether parasitic components are shown one by one.
     """
+    units = dict(zip(answer.measures, answer.units, strict=True))
+    greatest = {name: float(np.nanmax(answer.size("worst", name))) for name in units}
     shown = []
-    for name, unit in zip(answer.measures, answer.units, strict=True):
-        of_unit = [m for m, u in zip(answer.measures, answer.units, strict=True) if u == unit]
-        most = max(float(np.nanmax(answer.size("worst", m))) for m in of_unit)
-        parasitic = name.startswith("parasitic ")
-        single = parasitic and f"parasitic {'rotation' if unit == 'rad' else 'position'}" != name
-        nothing = float(np.nanmax(answer.size("worst", name))) <= ROUND_OFF_SHARE * most
-        if not parasitic or not (nothing or (single and not full)):
+    for name, unit in units.items():
+        is_component = name not in ("parasitic rotation", "parasitic position")
+        is_nothing = greatest[name] <= ROUND_OFF_SHARE * max(greatest[other] for other in units if units[other] == unit)
+        if not name.startswith("parasitic ") or not (is_nothing or (is_component and not full)):
             shown.append(name)
     return shown
 
@@ -166,8 +167,8 @@ def _parts_table(answer: Budget, full: bool) -> FittedTable:
             part.words, limit_of(part.kind, part.limit, answer.machine.display), *map(_percent, rows[:, place])
         )
     if len(shown) < len(order):
-        left = rows[:, order[len(shown) :]].sum(axis=1)
-        table.add_row(f"{len(order) - len(shown)} further ones (--full)", "", *map(_percent, left))
+        remainders = rows[:, order[len(shown) :]].sum(axis=1)
+        table.add_row(f"{len(order) - len(shown)} further ones (--full)", "", *map(_percent, remainders))
     return table
 
 
@@ -204,7 +205,7 @@ def _allocation_table(answer: Budget) -> FittedTable:
 def _advice(factor: float) -> str:
     if math.isinf(factor):
         return "no effect"
-    return "tighten" if factor < 0.99 else "loosen" if factor > 1.01 else "keep"
+    return "tighten" if factor < 1.0 - SAME_TOLERANCE else "loosen" if factor > 1.0 + SAME_TOLERANCE else "keep"
 
 
 def _new_tolerance(answer: Budget, line: str, factor: float) -> str:

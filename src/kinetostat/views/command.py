@@ -33,34 +33,38 @@ RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
-    """Give a row for each actuator at a single pose, else a row for each pose."""
-    display = answer.machine.display
-    if len(answer.coordinates) == 1:
-        heads = ["commanded", "without loads", "difference"]
-        table = numeric_table("Where each actuator must stand", "actuator", heads)
-        rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
-        for name, unit, commanded, unloaded in rows:
-            shown = (
-                f"{coordinate_text(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded)
-            )
-            table.add_row(name, *shown, display.show_deflection(float(commanded - unloaded), unit))
-        yield table
-        return
+    yield _single_pose_table(answer) if len(answer.coordinates) == 1 else _poses_table(answer)
+
+
+def _single_pose_table(answer: Command) -> FittedTable:
+    """Return a row for each actuator: its coordinates with and without the loads, and their difference."""
+    display, heads = answer.machine.display, ["commanded", "without loads", "difference"]
+    table = numeric_table("Where each actuator must stand", "actuator", heads)
+    rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
+    for name, unit, commanded, unloaded in rows:
+        ends = (coordinate_text(float(value), unit, display) for value in (commanded, unloaded))
+        difference = display.show_deflection(float(commanded - unloaded), unit)
+        table.add_row(name, *(f"{end} {display.scale(unit).unit}" for end in ends), difference)
+    return table
+
+
+def _poses_table(answer: Command) -> FittedTable:
+    """Return a row for each pose: commands, errors without and with them, and the status where it is not always ok."""
+    display, all_settled = answer.machine.display, bool(answer.settled.all())
     pairs = zip(answer.actuators, answer.units, strict=True)
-    lost = not answer.settled.all()
     heads = [*(display.scale(unit).label(name) for name, unit in pairs), "error before", "error left"]
-    heads += ["status"] if lost else []
-    table = numeric_table("Commands: where each actuator must stand", "pose", heads)
+    table = numeric_table(
+        "Commands: where each actuator must stand", "pose", heads + ([] if all_settled else ["status"])
+    )
     for i, row in enumerate(answer.coordinates):
-        settled = bool(answer.settled[i])
-        cells = [
-            coordinate_text(float(v), unit, display) if settled else DASH
-            for v, unit in zip(row, answer.units, strict=True)
-        ]
-        errors = [display.show_deflection(float(e[i]), "m") if settled else DASH for e in (answer.before, answer.left)]
-        status = [Status(int(answer.status[i])).word.replace("_", " ")] if lost else []
-        table.add_row(str(i + 1), *cells, *errors, *status)
-    yield table
+        cells = [DASH] * len(heads)
+        if answer.settled[i]:
+            pairs = zip(row, answer.units, strict=True)
+            cells = [coordinate_text(float(value), unit, display) for value, unit in pairs]
+            cells += [display.show_deflection(float(errors[i]), "m") for errors in (answer.before, answer.left)]
+        status = [] if all_settled else [Status(int(answer.status[i])).word.replace("_", " ")]
+        table.add_row(str(i + 1), *cells, *status)
+    return table
 
 
 def command_csv(answer: Command, corrections: bool = False) -> str:

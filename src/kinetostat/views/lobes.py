@@ -14,7 +14,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
-from kinetostat.views.vibration import tool_of
+from kinetostat.views.vibration import tool_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ def _lines(answer: Lobes) -> Lines:
             ("Worst", f"The least width is that at {pose_of(with_values(answer.machine, dict(answer.worst)))}.")
         )
     if answer.tool is not None:
-        lines.append(("Tool", tool_of(answer.tool, answer.machine.display)))
+        lines.append(("Tool", tool_sentence(answer.tool, answer.machine.display)))
     if answer.assumed:
         lines.append(("Damping", "Damping is assumed: 2 % of critical in every mode; give a table [damping]."))
     return lines

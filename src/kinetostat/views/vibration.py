@@ -22,10 +22,10 @@ LEAST_SHARE = 0.005
 MOST_PARTS = 12
 """Parts that have a line; where more springs deform, their kinds have one, so that the table stays on a screen."""
 LEAST_PERCENT = 0.0005
-"""Share that is shown as nothing: it would read 0.0 %."""
+"""Share below which a dash is shown: it would read 0.0 %."""
 
 
-def masses_of(answer: Vibration) -> str:
+def mass_sentence(answer: Vibration) -> str:
     """Say how much mass moves, and of which parts no mass is known."""
     text = f"{answer.machine.display.show(answer.moving_mass, 'kg')} move."
     if not answer.uncounted:
@@ -33,7 +33,7 @@ def masses_of(answer: Vibration) -> str:
     return f"{text} Nothing says the mass of {first_names(answer.uncounted)}: they count as massless."
 
 
-def loads_of(answer: Vibration) -> str:
+def _loads_sentence(answer: Vibration) -> str:
     """Say that the loads of the file do not count where the machine vibrates about its free state; empty if they do."""
     loaded = platform_is_loaded(answer.machine) or answer.state.left_out
     if answer.loaded or not loaded:
@@ -41,7 +41,7 @@ def loads_of(answer: Vibration) -> str:
     return "These are vibrations about the free state: loads of the file do not count, but in modes --loaded."
 
 
-def damping_of(answer: Vibration) -> str:
+def damping_sentence(answer: Vibration) -> str:
     """Say how the modes are damped."""
     if answer.assumed:
         return f"{number(100.0 * answer.modes[0].ratio)} % of critical in every mode, assumed; give a table [damping]."
@@ -50,7 +50,7 @@ def damping_of(answer: Vibration) -> str:
     return f"{' to '.join(ends)} % of critical, by the table [damping]."
 
 
-def loops_of(answer: Vibration) -> str:
+def _loops_sentence(answer: Vibration) -> str:
     """Say that servo loops are closed, and whether they hold; empty where they are not closed."""
     if answer.loops is None:
         return ""
@@ -58,7 +58,7 @@ def loops_of(answer: Vibration) -> str:
     return text if answer.loops.stable else f"{text} The loops are unstable: kinetostat servo says what grows."
 
 
-def tool_of(tool: FreeTool | None, display: Display) -> str:
+def tool_sentence(tool: FreeTool | None, display: Display) -> str:
     """Say over which frequencies and in which components a tool is coupled to the machine; empty without one."""
     if tool is None:
         return ""
@@ -68,7 +68,7 @@ def tool_of(tool: FreeTool | None, display: Display) -> str:
     return f"{text}, from {first} to {last}; modes are those of the machine alone."
 
 
-def cut_of(answer: Vibration) -> str:
+def cut_sentence(answer: Vibration) -> str:
     """Say where the real part of the receptance across the cut is least, and the width of cut that follows.
 
     Nothing is said where neither a direction nor a pressure is known.
@@ -102,14 +102,14 @@ def drawn_directions(direction: Sequence[float], components: Collection[str]) ->
     return {name: axis for name, axis in directions.items() if name not in AXES or name in components}
 
 
-def strain_of(modes: Sequence[Mode]) -> list[Mapping[str, float]]:
-    """Shares of the strain energy of each mode by spring, or by kind of spring where there are too many for a table."""
+def _strain_shares(modes: Sequence[Mode]) -> list[Mapping[str, float]]:
+    """Return the strain energy of each mode by spring, or by kind of spring where there are too many for a table."""
     springs = {name for mode in modes for name, share in mode.strain.items() if abs(share) >= LEAST_SHARE}
     return [mode.kinds if len(springs) > MOST_PARTS else mode.strain for mode in modes]
 
 
 def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str]) -> FittedTable:
-    """Return a line for each mode: frequency, damping, how the tool moves, what would ring there alone.
+    """Return a line for each mode: frequency, damping, how the tool moves, mass and spring with the same response.
 
     Args:
         modes: the modes from the lowest on.
@@ -144,9 +144,9 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTabl
     for name in shown:
         table.add_row(name, *(percent(mode.get(name, 0.0)) for mode in shares))
     omitted = order[len(shown) :]
-    left = [sum(mode.get(name, 0.0) for name in omitted) for mode in shares]
-    if any(abs(share) >= LEAST_PERCENT for share in left):
-        table.add_row(omitted[0] if len(omitted) == 1 else f"{len(omitted)} others", *map(percent, left))
+    remainders = [sum(mode.get(name, 0.0) for name in omitted) for mode in shares]
+    if any(abs(share) >= LEAST_PERCENT for share in remainders):
+        table.add_row(omitted[0] if len(omitted) == 1 else f"{len(omitted)} others", *map(percent, remainders))
     return table
 
 
@@ -158,25 +158,22 @@ def percent(share: float) -> str:
 def _lines(answer: Vibration) -> Lines:
     if not answer.modes:
         return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
-    lines = [
+    return [
         ("Pose", f"{pose_of(answer.machine)}."),
         ("Modes", answer.message),
-        ("Masses", masses_of(answer)),
-        ("Damping", damping_of(answer)),
-    ]
-    further_lines = [
-        ("Loads", loads_of(answer)),
-        ("Loops", loops_of(answer)),
-        ("Tool", tool_of(answer.tool, answer.machine.display)),
-        ("Cutting", cut_of(answer)),
-    ]
-    return [*lines, *((word, sentence) for word, sentence in further_lines if sentence)]
+        ("Masses", mass_sentence(answer)),
+        ("Damping", damping_sentence(answer)),
+        ("Loads", _loads_sentence(answer)),
+        ("Loops", _loops_sentence(answer)),
+        ("Tool", tool_sentence(answer.tool, answer.machine.display)),
+        ("Cutting", cut_sentence(answer)),
+    ]  # those that are empty are not shown
 
 
 def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:
     if answer.modes:
         yield mode_table(answer.modes, answer.machine.display, answer.components)
-        yield share_table("Strain energy (%)", strain_of(answer.modes))
+        yield share_table("Strain energy (%)", _strain_shares(answer.modes))
         yield share_table("Kinetic energy (%)", [mode.kinetic for mode in answer.modes])
 
 
@@ -217,6 +214,7 @@ MODE = (
     Field("kinetic_energy", "kinetic", long_name="share of kinetic energy", axes=("part",), forms=("json", "nc")),
 )
 RESPONSE = ("frequency", "moved", "loaded")
+"""Axes of a receptance: its frequency, the component that moves and the one that is loaded."""
 
 VIBRATION = Description(
     title="Vibration",

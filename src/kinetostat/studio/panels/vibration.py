@@ -25,7 +25,7 @@ from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, heading, paragraph, shown_value
 from kinetostat.views.analysis_tables import entry_unit
-from kinetostat.views.vibration import LEAST_SHARE, MOST_PARTS, cut_of, damping_of, masses_of, percent
+from kinetostat.views.vibration import LEAST_SHARE, MOST_PARTS, cut_sentence, damping_sentence, mass_sentence, percent
 
 MODES, RESPONSE = "Modes", "Response"
 CUT = "the cut"
@@ -239,7 +239,7 @@ def about(new: Ringing) -> str:
     answer = new.answer
     if not answer.modes:
         return paragraph(answer.message, "lead")
-    details = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_of(answer)}"
+    details = f"{mass_sentence(answer)} Damping: {damping_sentence(answer)} {cut_sentence(answer)}"
     return paragraph(answer.message, "lead") + paragraph(details.rstrip())
 
 
