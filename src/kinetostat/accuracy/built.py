@@ -13,7 +13,7 @@ import numpy as np
 
 from kinetostat.accuracy.closing import coordinates_toward, in_lengths, independent_columns
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.accuracy.rows import Errors, LegRow
+from kinetostat.accuracy.rows import Errors, HomeRows, LegRow
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
@@ -30,7 +30,8 @@ from kinetostat.numerics.motions import Motions, exponential, still
 from kinetostat.spec.errors import InputError
 
 REACHED = 1e-9
-"""Gap of a leg at the drawn home place, rad or in units of the machine's length, with which it counts as reached."""
+"""Gap of a leg at the drawn home place, rad or in units of the machine's length, up to which it closes there: above
+what Newton's method leaves, and far below any error that can be measured."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,10 @@ class AsBuilt:
     """A machine as built at its home place.
 
     Attributes:
-        configuration: with every leg where it is.
+        configuration: the machine with every leg as built.
         commands: by actuator, the coordinate that is to be commanded there, m or rad.
-        coordinates: by actuator, where it really stands.
-        senses: by actuator, 1 or -1: whether its coordinate grows as its joint moves forward in a file leg by leg.
+        coordinates: by actuator, its real coordinate, m or rad.
+        senses: by actuator, 1 if its coordinate grows as its joint moves forward in a file leg by leg, otherwise -1.
     """
 
     configuration: Configuration
@@ -54,8 +55,8 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
     """Place a machine with its errors.
 
     Args:
-        machine: as drawn.
-        errors: SI, in the order of its `ErrorModel` [errors].
+        machine: the machine as drawn.
+        errors: values of the errors, SI, in the order of its `ErrorModel` [errors].
         model: its errors at its home place (`model_at_home`), where they are known already.
 
     Raises:
@@ -74,14 +75,14 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
 
 
 def compliances_as_built(errors: Array, model: ErrorModel) -> Array:
-    """C of a machine with errors at the tool point, at all poses of a model, base axes, SI [n x 6 x 6].
+    """Return C of a machine with errors at the tool point, at all poses of a model, base axes, SI [n x 6 x 6].
 
     Where all legs reach the drawn place of the platform it stands there; if they do not at some pose, actuators stand
     as drawn at all of them.
 
     Args:
-        errors: SI, in the order of the model [errors].
-        model: of a machine that is not overconstrained.
+        errors: values of the errors, SI, in the order of the model [errors].
+        model: the errors of a machine that is not overconstrained.
     """
     drawn = model.drawn.state
     configuration, _ = _configuration_near(model, np.asarray(errors, dtype=float), drawn.platform, drawn.coordinates)
@@ -95,65 +96,58 @@ def _configuration_near(
     """Place all legs with errors [errors] where their platform is displaced to a target, or near it.
 
     Args:
-        model: of the machine.
-        values: of the errors.
+        model: the errors of the machine.
+        values: values of the errors.
         target: displacement of the platform from its home place [n].
         drawn: coordinates of the legs there without errors; None to have them found.
     """
-    actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
-    links = model.leg_errors(np.where(actuators, 0.0, values))
-    rows = model.rows
+    of_actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
+    link_errors = model.leg_errors(np.where(of_actuators, 0.0, values))
+    rows, platform = model.rows, target
     coordinates = [
-        drawn[number] if drawn and not links[number] else coordinates_toward(row, target, rows.length, links[number])
-        for number, row in enumerate(rows.legs)
+        drawn[number] if drawn and not errors else coordinates_toward(row, target, rows.length, errors)
+        for number, (row, errors) in enumerate(zip(rows.legs, link_errors, strict=True))
     ]
-    every = zip(rows.legs, coordinates, links, strict=True)
-    gaps = [_gap(target, row.chain.place(q, errors=e).end, rows.length) for row, q, e in every]
-    platform = target
-    if max(gaps) > REACHED:
-        platform, coordinates = _driven_legs(model, values, links)
-    places = [row.chain.place(q, errors=e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
-    parts = zip(rows.configuration.legs, rows.legs, places, links, strict=True)
-    legs = [_leg(leg, row, place, link) for leg, row, place, link in parts]
-    softer = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}
-    legs = [replace(leg, chain=tuple(_softer(leg, part, softer) for part in leg.chain)) for leg in legs]
+    places = _places(rows, coordinates, link_errors)
+    if max(_gap(target, place.end, rows.length) for place in places) > REACHED:
+        # Actuators stand as drawn: the platform goes to where the legs close, and joints follow it.
+        platform = model.closed_state(values).platform
+        coordinates = [
+            coordinates_toward(row, platform, rows.length, errors)
+            for row, errors in zip(rows.legs, link_errors, strict=True)
+        ]
+        places = _places(rows, coordinates, link_errors)
+    factors = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}
+    parts = zip(rows.configuration.legs, rows.legs, places, link_errors, strict=True)
     configuration = replace(
-        rows.configuration, platform=_displacement(platform) @ rows.configuration.platform, legs=tuple(legs)
+        rows.configuration,
+        platform=_displacement(platform) @ rows.configuration.platform,
+        legs=tuple(_with_compliances(_leg(leg, row, place, errors), factors) for leg, row, place, errors in parts),
     )
     return configuration, coordinates
 
 
+def _places(rows: HomeRows, coordinates: Sequence[Array], errors: Errors) -> list[PlacedChain]:
+    return [row.chain.place(q, errors=e) for row, q, e in zip(rows.legs, coordinates, errors, strict=True)]
+
+
 def model_at_home(machine: Machine) -> ErrorModel:
-    """The errors of a machine at its home place: that of a family's file, or the home pose of one leg by leg."""
-    return error_model(machine, _home_pose(machine), 1, np.zeros(6))
-
-
-def _home_pose(machine: Machine) -> dict[str, Array]:
-    """The pose at the home place: that of a family's file, or the home pose of a machine leg by leg."""
-    if machine.family.chains is None:
-        return {}
-    chains = machine.chains()
-    home = pose_of(chains.home)
-    return {f"{POSE}{name}": np.array([float(home[name])]) for name in chains.pose}
+    """Return the errors of a machine at its home place: that of a family's file, or the home pose of one leg by leg."""
+    pose = {}
+    if machine.family.chains is not None:
+        chains = machine.chains()
+        home = pose_of(chains.home)
+        pose = {f"{POSE}{name}": np.array([float(home[name])]) for name in chains.pose}
+    return error_model(machine, pose, 1, np.zeros(6))
 
 
 def _gap(target: Motions, end: Motions, length: float) -> float:
-    """Distance of the end of a leg from its target, rad or in units of the length."""
+    """Return the distance of the end of a leg from its target, rad or in units of the length."""
     return float(np.abs(in_lengths(closing_gap(target, end), length)).max())
 
 
-def _driven_legs(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
-    """Place the platform with actuators as drawn, and all joints with it, actuators with their errors."""
-    state = model.closed_state(values)
-    coordinates = [
-        coordinates_toward(row, state.platform, model.rows.length, errors)
-        for row, errors in zip(model.rows.legs, links, strict=True)
-    ]
-    return state.platform, coordinates
-
-
 def _displacement(motion: Motions) -> Displacement:
-    """As scalars: floats at a single pose, else arrays [n]."""
+    """Return a displacement over scalars: floats at a single pose, otherwise arrays [n]."""
     if len(motion.translation) == 1:
         columns = [Vector(*column) for column in motion.rotation[0].T.tolist()]
         return Displacement(Rotation(*columns), Vector(*motion.translation[0].tolist()))
@@ -162,73 +156,80 @@ def _displacement(motion: Motions) -> Displacement:
 
 
 def _leg(leg: Leg, row: LegRow, place: PlacedChain, errors: dict[int, Array]) -> Leg:
-    """A leg with every element displaced by what carries it."""
+    """Return a leg with every element displaced by what carries it; joints by the errors before them, too."""
     chain: list[Element] = []
     for element, behind in zip(leg.chain, row.carried, strict=True):
-        joint = isinstance(element, Parallelogram) or element.freedoms or _moving(element, behind, row)
-        motion = _displacement(_carrying(place, errors, behind) if joint else place.before[behind])
-        moved = element.displaced(motion)
-        if isinstance(moved, Parallelogram) and isinstance(element, Parallelogram):
-            far = _displacement(_carrying(place, errors, behind + 1)).apply(element.far)
-            moved = replace(moved, far=far, fixed_normal=None)
-        if isinstance(moved, Joint) and isinstance(element, Joint) and chain and behind not in errors:
-            moved = _same_centre(leg.chain[len(chain) - 1], chain[-1], element, moved)
-        chain.append(moved)
-    return replace(leg, chain=tuple(chain), lines=(), idle=leg.idle or _idle(chain))
+        is_motion = isinstance(element, Spring) and element.actuated and behind < len(row.twists)
+        is_joint = isinstance(element, Parallelogram) or element.freedoms or is_motion
+        carrier = _carrier_with_error(place, errors, behind) if is_joint else place.before[behind]
+        displaced = element.displaced(_displacement(carrier))
+        if isinstance(displaced, Parallelogram) and isinstance(element, Parallelogram):
+            far = _displacement(_carrier_with_error(place, errors, behind + 1)).apply(element.far)
+            displaced = replace(displaced, far=far, fixed_normal=None)
+        if isinstance(displaced, Joint) and isinstance(element, Joint) and chain and behind not in errors:
+            displaced = _with_same_centre(leg.chain[len(chain) - 1], chain[-1], element, displaced)
+        chain.append(displaced)
+    return replace(leg, chain=tuple(chain), lines=(), idle=leg.idle or _idle_freedoms(chain))
 
 
-def _idle(chain: list[Element]) -> tuple[int, ...]:
-    """The passive freedoms that follow from those before them, such as the spin of a strut, at the first pose."""
+def _idle_freedoms(chain: list[Element]) -> tuple[int, ...]:
+    """Return the passive freedoms that follow from those before them, as the spin of a strut, at the first pose."""
     joints = [joint for element in chain for joint in element.freedoms]
     points = [joint.point for joint in joints if joint.point is not None]
-    about = points[0] if points else ZERO
-    length = max([_first((point - about).norm()) for point in points], default=0.0) or 1.0
-    twists = np.array([[_first(c) for c in joint.twist(about).components()] for joint in joints]).reshape(-1, 6)
-    chosen = independent_columns(in_lengths(twists, length).T[None])
-    return tuple(number for number in range(len(joints)) if number not in chosen)
+    origin = points[0] if points else ZERO
+    length = max([_at_first_pose((point - origin).norm()) for point in points], default=0.0) or 1.0
+    twists = [[_at_first_pose(c) for c in joint.twist(origin).components()] for joint in joints]
+    independent = independent_columns(in_lengths(np.array(twists).reshape(-1, 6), length).T[None])
+    return tuple(number for number in range(len(joints)) if number not in independent)
 
 
-def _first(scalar: Scalar) -> float:
+def _at_first_pose(scalar: Scalar) -> float:
     return float(np.ravel(scalar)[0])
 
 
-def _same_centre(drawn: Element, before: Element, element: Joint, moved: Joint) -> Joint:
-    """A joint about the very point of the one before it, if both have one point in the drawing: round-off apart."""
-    if not (isinstance(drawn, Joint) and isinstance(before, Joint)) or element.point is None:
-        return moved
-    return replace(moved, point=before.point) if drawn.point == element.point else moved
+def _with_same_centre(drawn_before: Element, before: Element, drawn: Joint, joint: Joint) -> Joint:
+    """Return a joint about the very point of the one before it, if both have one point in the drawing.
+
+    Round-off would part the points, and the axes of a Hooke joint then no longer meet.
+
+    Args:
+        drawn_before, before: the element before it, as drawn and as built.
+        drawn, joint: the joint, as drawn and as built.
+    """
+    if not (isinstance(drawn_before, Joint) and isinstance(before, Joint)) or drawn.point is None:
+        return joint
+    return replace(joint, point=before.point) if drawn_before.point == drawn.point else joint
 
 
-def _moving(element: Element, behind: int, row: LegRow) -> bool:
-    """Whether a spring is a motion of the row."""
-    return isinstance(element, Spring) and element.actuated and behind < len(row.twists)
-
-
-def _carrying(place: PlacedChain, errors: dict[int, Array], behind: int) -> Motions:
+def _carrier_with_error(place: PlacedChain, errors: dict[int, Array], behind: int) -> Motions:
+    """Return the displacement of what lies behind so many motions of a leg and the error there."""
     before = place.before[behind]
     return before @ exponential(errors[behind]) if behind in errors else before
 
 
-def _softer(leg: Leg, element: Element, softer: dict[str, float]) -> Element:
-    """A spring with its compliance as built; elements of several springs stay as they are drawn."""
-    if not isinstance(element, Spring):
-        return element
-    names = (element.of, element.name)
-    paths = [f"legs.{leg.name}.{name.removeprefix(f'{leg.name} ').replace('.', ' ')}.compliance" for name in names]
-    factor = next((softer[path] for path in paths if path in softer), 1.0)
-    return replace(element, stiffness=element.stiffness / factor)
+def _with_compliances(leg: Leg, factors: dict[str, float]) -> Leg:
+    """Return a leg with springs as built, by the factors of compliances; elements of several springs stay as drawn."""
+    chain: list[Element] = []
+    for element in leg.chain:
+        if isinstance(element, Spring):
+            names = [name.removeprefix(f"{leg.name} ").replace(".", " ") for name in (element.of, element.name)]
+            paths = [f"legs.{leg.name}.{name}.compliance" for name in names]
+            factor = next((factors[path] for path in paths if path in factors), 1.0)
+            element = replace(element, stiffness=element.stiffness / factor)
+        chain.append(element)
+    return replace(leg, chain=tuple(chain))
 
 
 def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], ...]:
-    """Coordinates to command there, those at which actuators really stand, and the senses of their counts, by joint."""
-    known = {error.path: value for error, value in zip(model.errors, values, strict=True)}
-    commands, stands, senses = {}, {}, {}
+    """Return coordinates to command there, real coordinates, and the senses of the actuators, each by actuator."""
+    value_by_path = {error.path: value for error, value in zip(model.errors, values, strict=True)}
+    commands, real_coordinates, senses = {}, {}, {}
     for row, joints in zip(model.rows.legs, coordinates, strict=True):
-        for unit in (unit for unit in row.units if unit.drive):
-            drive, path = unit.drive, f"legs.{row.name}.{unit.name}"
-            if drive is not None:
-                stand = drive.home + drive.sense * float(joints[0, drive.coordinate])
-                name = f"{row.name} {unit.name}"
-                stands[name], senses[name] = stand, float(drive.sense)
-                commands[name] = (stand - known.get(f"{path}.zero", 0.0)) / (1.0 + known.get(f"{path}.gain", 0.0))
-    return commands, stands, senses
+        for unit in row.units:
+            if unit.drive is not None:
+                name, path = f"{row.name} {unit.name}", f"legs.{row.name}.{unit.name}"
+                zero, gain = (value_by_path.get(f"{path}.{error}", 0.0) for error in ("zero", "gain"))
+                real = unit.drive.home + unit.drive.sense * float(joints[0, unit.drive.coordinate])
+                real_coordinates[name], senses[name] = real, float(unit.drive.sense)
+                commands[name] = (real - zero) / (1.0 + gain)
+    return commands, real_coordinates, senses

@@ -40,7 +40,7 @@ ERROR_GROUPS = {
 }
 """Groups of errors by the names that a line may have."""
 CLEARANCE_WORD = "clearance"
-"""Part of the path of free motions of joints; paths with * are about these only where they name it."""
+"""Part of the path of free motions of joints; paths with * are about these only if they have this word."""
 TOLERANCE_EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "share": "20 um/m"}
 """A tolerance of each kind of number, for messages."""
 WRITE = (
@@ -48,11 +48,10 @@ WRITE = (
     '"0.02 mm" (of actuators) under [tolerances] into its file, or give --tolerance "joints=0.05 mm"'
 )
 MACHINES_AT_ONCE = 1 << 14
-"""Machines that are made at once: their numbers stay in the cache."""
+"""Machines that are made at once: with some ten variables each they fill the second level of the cache."""
 LEAST_NORMAL_PROBABILITY = 1e-16
-"""Probability below which no normal number is drawn: eight standard deviations."""
-
-
+"""Probability below which no normal number is drawn, that of eight standard deviations: a point of the cube may be 0 or
+1, of which the number would be infinite."""
 UNIFORM_VARIANCE = 1.0 / 3.0
 """Variance of a variable that is anywhere between -1 and 1."""
 
@@ -62,16 +61,16 @@ class TolerancedPart:
     """Numbers of a machine that may be off together: a single one, or the free motion of a joint in all directions.
 
     Attributes:
-        errors: their places in the error model.
+        errors: numbers of its errors in the error model.
         path: path of the number, as a line may name it.
-        words: for people.
+        words: its name for people.
         kind: "length", "angle" or "share".
-        group: of the errors.
-        leg: name of its leg; empty of what legs share.
-        line: what the line is about that holds for it.
-        limit: plus and minus, SI; of a clearance, how far the joint may move from its middle.
-        normal: whether it is normally distributed, the limit being three standard deviations; else evenly.
-        cost: of its line.
+        group: group of its errors.
+        leg: name of its leg; empty if legs share the number.
+        line: subject of the line of [tolerances] that holds for it.
+        limit: greatest deviation to both sides, SI; for a clearance, the way of the joint from its middle.
+        normal: whether it is normally distributed with a limit of three standard deviations; evenly otherwise.
+        cost: cost of its line.
     """
 
     errors: tuple[int, ...]
@@ -97,36 +96,36 @@ def toleranced_parts(
     """Give each error the tolerance of the last line that is about it; errors without a line are exact.
 
     Args:
-        machine: whose numbers are the nominal sizes of its fields.
-        errors: of the model.
-        tolerances: lines, in order.
+        machine: the machine, whose numbers are the nominal sizes of its fields.
+        errors: errors of the model.
+        tolerances: lines of [tolerances], in order.
 
     Raises:
         InputError: there is no line, a line is about nothing, or has no value for what it is about.
     """
     if not tolerances:
         raise InputError(f"{machine.name} has no tolerances, so that nothing can be off; {WRITE}.")
-    kept: dict[int, tuple[Tolerance, Deviation]] = {}
+    line_of_error: dict[int, tuple[Tolerance, Deviation]] = {}
     for line in tolerances.values():
-        places = [place for place, error in enumerate(errors) if is_about(line.about, error)]
-        if not places:
+        numbers = [number for number, error in enumerate(errors) if is_about(line.about, error)]
+        if not numbers:
             raise InputError(_about_nothing(machine, line, errors))
-        fitting = [(place, line.of(errors[place].kind)) for place in places]
-        known = {place: (line, deviation) for place, deviation in fitting if deviation is not None}
-        if not known:
-            kinds = list(dict.fromkeys(errors[place].kind for place in places))
+        deviations = [(number, line.of(errors[number].kind)) for number in numbers]
+        with_value = {number: (line, deviation) for number, deviation in deviations if deviation is not None}
+        if not with_value:
+            kinds = list(dict.fromkeys(errors[number].kind for number in numbers))
             raise InputError(
                 f'{machine.name}: tolerances.{line.about} is "{line.text}", but the numbers that it is about are '
-                f'{" and ".join(map(_plural, kinds))}; write for example "{TOLERANCE_EXAMPLES[kinds[0]]}". '
+                f'{" and ".join(f"{kind}s" for kind in kinds)}; write for example "{TOLERANCE_EXAMPLES[kinds[0]]}". '
                 "`kinetostat budget MACHINE --list` shows every number that can move the tool."
             )
-        kept = {**kept, **known}
+        line_of_error |= with_value
     sizes = values(machine)
-    return tuple(_part(machine, errors, group, kept, sizes) for group in _parts_of(errors, kept))
+    return tuple(_part(machine, errors, group, line_of_error, sizes) for group in _parts_of(errors, line_of_error))
 
 
 def is_about(about: str, error: MachineError) -> bool:
-    """Whether a line is about an error: its group, its path or the beginning of it, or a path with *."""
+    """Return whether a line is about an error: its group, its path or the beginning of it, or a path with *."""
     if about in ERROR_GROUPS:
         return error.group == ERROR_GROUPS[about]
     if error.group == "clearances" and CLEARANCE_WORD not in about:
@@ -135,7 +134,10 @@ def is_about(about: str, error: MachineError) -> bool:
 
 
 def _fits(pattern: str, path: str) -> bool:
-    """Whether a path has the parts of a pattern between its stars, in this order; in linear time, whatever they are."""
+    """Return whether a path has the parts of a pattern between its stars, in this order.
+
+    It takes linear time, whatever people write: a regular expression with many stars would not.
+    """
     first, *others = pattern.split("*")
     if not others:
         return path == pattern
@@ -150,29 +152,27 @@ def _fits(pattern: str, path: str) -> bool:
     return path.endswith(others[-1]) and len(path) - len(others[-1]) >= place
 
 
-def _parts_of(errors: Sequence[MachineError], known: Iterable[int]) -> Iterator[list[int]]:
-    """Places of errors with a tolerance; those of the clearance of a joint together."""
-    joints: dict[str, list[int]] = {}
-    for place in sorted(known):
-        error = errors[place]
-        joints.setdefault(_joint(error) if error.group == "clearances" else error.path, []).append(place)
-    yield from joints.values()
+def _parts_of(errors: Sequence[MachineError], numbers: Iterable[int]) -> Iterator[list[int]]:
+    """Give the numbers of errors with a tolerance, those of the clearance of a joint together."""
+    parts: dict[str, list[int]] = {}
+    for number in sorted(numbers):
+        parts.setdefault(_path_of_part(errors[number]), []).append(number)
+    yield from parts.values()
 
 
-def _joint(error: MachineError) -> str:
-    """The path of a clearance without its direction."""
-    return error.path.rpartition(".")[0]
+def _path_of_part(error: MachineError) -> str:
+    """Return the path of an error, of a clearance without its direction."""
+    return error.path.rpartition(".")[0] if error.group == "clearances" else error.path
 
 
 def _part(
     machine: Machine,
     errors: Sequence[MachineError],
-    places: Sequence[int],
-    known: Mapping[int, tuple[Tolerance, Deviation]],
+    numbers: Sequence[int],
+    line_of_error: Mapping[int, tuple[Tolerance, Deviation]],
     sizes: Mapping[str, object],
 ) -> TolerancedPart:
-    error, (line, deviation) = errors[places[0]], known[places[0]]
-    free = error.group == "clearances"
+    error, (line, deviation) = errors[numbers[0]], line_of_error[numbers[0]]
     nominal = sizes.get(error.path, 0.0)
     size = abs(float(nominal)) if error.kind == "length" and isinstance(nominal, int | float) else 0.0
     try:
@@ -180,9 +180,9 @@ def _part(
     except InputError as reason:
         raise InputError(f"{machine.name}: tolerances.{line.about}: {reason}") from None
     return TolerancedPart(
-        errors=tuple(places),
-        path=_joint(error) if free else error.path,
-        words=error.words.partition(" along ")[0] if free else error.words,
+        errors=tuple(numbers),
+        path=_path_of_part(error),
+        words=error.words.partition(" along ")[0] if error.group == "clearances" else error.words,
         kind=error.kind,
         group=error.group,
         leg=error.leg,
@@ -193,12 +193,8 @@ def _part(
     )
 
 
-def _plural(kind: str) -> str:
-    return f"{kind}s"
-
-
 def _about_nothing(machine: Machine, line: Tolerance, errors: Sequence[MachineError]) -> str:
-    """Say that a line is about nothing, and what there is."""
+    """Write the message that a line is about nothing, with what a line may be about."""
     present = [name for name, group in ERROR_GROUPS.items() if any(error.group == group for error in errors)]
     near = difflib.get_close_matches(line.about, [*present, *(error.path for error in errors)], 1)
     hint = f'did you mean "{near[0]}"?' if near else f"groups are {', '.join(present)}."
@@ -210,18 +206,19 @@ def _about_nothing(machine: Machine, line: Tolerance, errors: Sequence[MachineEr
 
 @dataclass(frozen=True)
 class RandomInputs:
-    """The variables of all parts, and what they do at n poses.
+    """The variables of all parts, and their effects at n poses.
 
     Attributes:
-        parts: what has a tolerance.
+        parts: the parts with a tolerance.
         owner: number of the part of each variable [q].
-        block: number of the block of each variable: coordinates of one point in a disc or ball [q].
-        variance: of each variable [q].
+        block: number of the block of each variable; variables of a block are coordinates of one point in a disc or
+            ball [q].
+        variance: variance of each variable [q].
         columns: twist of the tool when a variable is 1 [n x 6 x q].
         shift: twist of the tool when all variables are 0: joints that a load presses to one end [n x 6].
         errors: value of each error of the model when a variable is 1, at the first pose [errors x q].
         drawn: value of each error when all variables are 0, at the first pose [errors].
-        pressed: which parts are joints that a load presses at each pose [n x parts].
+        pressed: whether parts are joints that a load presses at each pose [n x parts].
     """
 
     parts: tuple[TolerancedPart, ...]
@@ -240,27 +237,26 @@ class RandomInputs:
         return len(self.owner)
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
-        """Values of the variables of so many machines, slab by slab [slab x q]: Sobol points.
+        """Give values of the variables of random machines, slab by slab [slab x q]: Sobol points.
 
         Args:
-            count: a power of 2.
-            seed: of the scrambling.
+            count: number of machines, a power of 2.
+            seed: seed of the scrambling.
         """
         points = qmc.Sobol(self.size, scramble=True, seed=seed)
         for start in range(0, count, MACHINES_AT_ONCE):
             yield self._values(points.random(min(MACHINES_AT_ONCE, count - start)))
 
     def _values(self, points: Array) -> Array:
-        """Values of the variables from points of the unit cube [m x q]."""
+        """Return values of the variables from points of the unit cube [m x q]."""
         # Variable by variable, whose values then lie beside each other.
         values = 2.0 * np.ascontiguousarray(points.T) - 1.0
-        bent = [part.normal and not part.free for part in self.parts]
-        for place in np.flatnonzero(np.array(bent)[self.owner]):
-            values[place] = (
-                ndtri(np.clip(points[:, place], LEAST_NORMAL_PROBABILITY, 1.0 - LEAST_NORMAL_PROBABILITY)) / SIGMAS
-            )
+        is_normal = np.array([part.normal and not part.free for part in self.parts])
+        for variable in np.flatnonzero(is_normal[self.owner]):
+            probabilities = np.clip(points[:, variable], LEAST_NORMAL_PROBABILITY, 1.0 - LEAST_NORMAL_PROBABILITY)
+            values[variable] = ndtri(probabilities) / SIGMAS
         for size in (2, 3):
-            of_size = [places for places in self.blocks if len(places) == size]
+            of_size = [variables for variables in self.blocks if len(variables) == size]
             if of_size:
                 values[np.array(of_size)] = _in_ball(values[np.array(of_size)])
         return values.T
@@ -272,12 +268,16 @@ class RandomInputs:
 
 
 def _in_ball(cube: Array) -> Array:
-    """Even points of the cube from -1 to 1 as even points of the disc or ball [blocks x 2 or 3 x m]."""
-    first, angle = 0.5 * (cube[:, 0] + 1.0), np.pi * cube[:, 1]
+    """Return even points of the cube from -1 to 1 as even points of the disc or ball [blocks x 2 or 3 x m].
+
+    The share of a disc within a radius grows with its square, that of a ball with its cube; heights of even points on
+    a sphere are even (Archimedes).
+    """
+    share_within, angle = 0.5 * (cube[:, 0] + 1.0), np.pi * cube[:, 1]
     if cube.shape[1] == 2:
-        radius = np.sqrt(first)
+        radius = np.sqrt(share_within)
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    radius, height = np.cbrt(first), cube[:, 2]
+    radius, height = np.cbrt(share_within), cube[:, 2]
     across = radius * np.sqrt(1.0 - height**2)
     return np.stack([across * np.cos(angle), across * np.sin(angle), radius * height], axis=1)
 
@@ -306,7 +306,7 @@ def random_inputs(
     length: float,
     others: bool = False,
 ) -> RandomInputs:
-    """State what the tolerances of a machine do at n poses.
+    """State the variables of the tolerances of a machine, and their effects at n poses.
 
     Args:
         parts: parts with a tolerance.
@@ -319,19 +319,19 @@ def random_inputs(
     count, _, size = rates.shape
     work = np.einsum("nie,ni->ne", rates, load)
     # The most work that any motion of a length can do: work far below it is no reaction.
-    most = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
-    reacting = np.abs(work) > NO_REACTION * most[:, None]
-    pressed = np.array([part.free & reacting[:, list(part.errors)].any(axis=1) for part in parts]).T
+    greatest_work = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
+    reacts = np.abs(work) > NO_REACTION * greatest_work[:, None]
+    pressed = np.array([part.free & reacts[:, list(part.errors)].any(axis=1) for part in parts]).T
     shift, drawn, blocks = np.zeros((count, 6)), np.zeros(size), list[_Block]()
     for number, part in enumerate(parts):
-        bears = pressed[:, number]
+        is_pressed = pressed[:, number]
         changes = others and part.free
-        if bears.any() or changes:
-            blocks.append(_pressed_block(number, part, rates, work, bears))
+        if is_pressed.any() or changes:
+            blocks.append(_pressed_block(number, part, rates, work, is_pressed))
             shift += blocks[-1].columns[:, :, 0]
             drawn += blocks[-1].errors[:, 0]
-        if not bears.all() or changes:
-            blocks.append(_unpressed_block(number, part, rates, bears))
+        if not is_pressed.all() or changes:
+            blocks.append(_unpressed_block(number, part, rates, is_pressed))
     sizes = [block.columns.shape[2] for block in blocks]
     return RandomInputs(
         parts=tuple(parts),
@@ -346,33 +346,35 @@ def random_inputs(
     )
 
 
-def _pressed_block(number: int, part: TolerancedPart, rates: Array, work: Array, bears: Mask) -> _Block:
-    """The variable of a joint that a load presses to one end of its clearance, which is itself what varies.
+def _pressed_block(number: int, part: TolerancedPart, rates: Array, work: Array, is_pressed: Mask) -> _Block:
+    """Return the variable of a joint that a load presses to one end of its clearance; the clearance itself varies.
 
     The joint stands at half of its usual clearance from its middle, and the variable is the other half.
 
     Args:
-        number, part: the joint.
-        rates, work: rates of all errors, and the work of the load on them [n x errors].
-        bears: the poses at which the load presses it [n].
+        number: number of the part.
+        part: the joint.
+        rates: rates of all errors [n x 6 x errors].
+        work: work of the load on all errors [n x errors].
+        is_pressed: whether the load presses the joint at the poses [n].
     """
-    places = list(part.errors)
-    sizes = np.maximum(np.linalg.norm(work[:, places], axis=1), LEAST_DIVISOR)
-    direction = work[:, places] / sizes[:, None] * bears[:, None]
-    half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], direction)
+    numbers = list(part.errors)
+    sizes = np.maximum(np.linalg.norm(work[:, numbers], axis=1), LEAST_DIVISOR)
+    direction = work[:, numbers] / sizes[:, None] * is_pressed[:, None]
+    half_twist = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, numbers], direction)
     errors = np.zeros((rates.shape[2], 1))
-    errors[places, 0] = 0.5 * part.limit * direction[0]
-    return _Block(number, UNIFORM_VARIANCE, half[:, :, None], errors)
+    errors[numbers, 0] = 0.5 * part.limit * direction[0]
+    return _Block(number, UNIFORM_VARIANCE, half_twist[:, :, None], errors)
 
 
-def _unpressed_block(number: int, part: TolerancedPart, rates: Array, bears: Mask) -> _Block:
-    """The variables of a part that may be anywhere within its limit; arguments as of `_pressed_block`."""
-    places = list(part.errors)
-    columns = part.limit * rates[:, :, places] * ~bears[:, None, None]
-    errors = part.limit * np.eye(rates.shape[2])[:, places] * (not bears[0])
-    # Of each coordinate of a point that is anywhere in a ball; of a single one, 1/3.
-    of_ball = 1.0 / (len(places) + 2.0)
-    variance = SIGMAS**-2 if part.normal and not part.free else of_ball
+def _unpressed_block(number: int, part: TolerancedPart, rates: Array, is_pressed: Mask) -> _Block:
+    """Return the variables of a part that may be anywhere within its limit; arguments as of `_pressed_block`."""
+    numbers = list(part.errors)
+    columns = part.limit * rates[:, :, numbers] * ~is_pressed[:, None, None]
+    errors = part.limit * np.eye(rates.shape[2])[:, numbers] * (not is_pressed[0])
+    # The variance of each coordinate of an even point in a ball of k dimensions is 1 / (k + 2).
+    in_ball = 1.0 / (len(numbers) + 2.0)
+    variance = SIGMAS**-2 if part.normal and not part.free else in_ball
     return _Block(number, variance, columns, errors)
 
 
@@ -388,7 +390,7 @@ def possible_errors(machine: Machine | MachineState) -> PossibleErrors:
     """List every number of a machine that may be off.
 
     Args:
-        machine: as drawn, with or without tolerances; or its state, as `state_of` returns it.
+        machine: the machine as drawn, with or without tolerances; or its state, as `state_of` returns it.
 
     Raises:
         InputError: it has no place at its pose.

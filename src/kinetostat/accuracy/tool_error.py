@@ -1,8 +1,8 @@
-"""The error of the tool by independent errors of the machine: what is measured of it, and how large it gets.
+"""The error of the tool by independent errors of the machine: its measures, and how large they get.
 
 Measures are components of the twist of the tool, lengths of some of them, a direction, and what no actuator corrects.
-Their sizes are computed to first order, for the worst case, as percentiles of drawn machines, and for some machines by
-exact solutions; what is left between these and the first order is curvature, and what errors do only together.
+Their sizes are computed to first order, for the worst case, as percentiles of random machines, and for some machines by
+exact solutions; these differ from the first order by curvature, and by what errors do only together.
 
 Source: theory (48), (50), (52) and (53).
 """
@@ -26,14 +26,17 @@ PARASITIC = "parasitic "
 """Prefix of the measures of what no actuator corrects."""
 USUAL_PERCENT = 95.0
 """Percent of all machines that the usual error covers."""
-STARTS, FEW_STARTS = 200, 24
-"""Directions from which the worst case of a length is searched: at a single pose, and at each of many."""
+STARTS = 200
+"""Random directions from which the worst case of a length is searched at a single pose: a search ends in a local
+maximum, and so many find the greatest of them."""
+FEW_STARTS = 24
+"""The same at each of many poses, where the time counts and neighbours show a maximum that was missed."""
 SAME_LENGTH = 1e-12
 """Relative growth of the worst case in a step below which it is round-off."""
 MOST_WORST_CASE_STEPS = 100
 """Steps of that search, which nearly always ends after ten."""
 SOLVED_AT_ONCE = 1024
-"""Machines that are solved together."""
+"""Machines that are solved together: their matrices stay in the cache, and calls of NumPy cost little of the time."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,9 @@ class Measures:
     """Numbers of a twist that people ask for.
 
     Attributes:
-        rows: of the linear ones by name, applied to a twist (rad, m) [6] or other ones at each pose [n x 6].
-        lengths: of some of these rows together, by name.
-        units: "rad" or "m" by name.
+        rows: rows of the linear measures by name, applied to a twist (rad, m) [6], or others at each pose [n x 6].
+        lengths: names of the rows of which a measure is the length, by its name.
+        units: "rad" or "m", by name.
     """
 
     rows: Mapping[str, Array]
@@ -56,18 +59,18 @@ class Measures:
         return (*self.rows, *self.lengths)
 
     def linear(self, twists: Array) -> Array:
-        """The linear measures of twists at n poses [n x 6 x q] -> [n x rows x q]."""
+        """Return the linear measures of twists at n poses [n x 6 x q] -> [n x rows x q]."""
         count = len(twists)
         matrix = np.stack([np.broadcast_to(row, (count, 6)) for row in self.rows.values()], axis=1)
         return np.asarray(matrix @ twists)
 
     def places(self, name: str) -> list[int]:
-        """The numbers of the rows that a measure is made of."""
-        known = list(self.rows)
-        return [known.index(row) for row in self.lengths.get(name, (name,))]
+        """Return the numbers of the rows that a measure is made of."""
+        names = list(self.rows)
+        return [names.index(row) for row in self.lengths.get(name, (name,))]
 
     def sizes(self, rows: Array) -> Array:
-        """All measures as sizes from values of the linear ones [... x rows] -> [... x measures]."""
+        """Return all measures as sizes from values of the linear ones [... x rows] -> [... x measures]."""
         lengths = [np.linalg.norm(rows[..., self.places(name)], axis=-1) for name in self.lengths]
         return np.concatenate([np.abs(rows), *(length[..., None] for length in lengths)], axis=-1)
 
@@ -75,24 +78,24 @@ class Measures:
 def measures_of(
     drives: Array, components: Sequence[str], along: Array | None, length: float
 ) -> tuple[Measures, int, tuple[str, ...]]:
-    """List what is measured of the twist of the tool.
+    """List the measures of the twist of the tool.
 
     Args:
         drives: twist of the tool per unit of each actuator, SI [n x 6 x actuators].
-        components: of the twist that the machine has.
+        components: components of the twist that the machine has.
         along: unit vector, base axes; None if no direction is asked for.
-        length: by which rotations count beside displacements, m.
+        length: length by which rotations count beside displacements, m.
 
     Returns:
-        The measures, how many freedoms the actuators move, and the components that none of them moves.
+        The measures, the number of freedoms that the actuators move, and the components that none of them moves.
     """
     rows: dict[str, Array] = {name: np.eye(6)[COMPONENTS.index(name)] for name in components}
     if along is not None:
         rows["along"] = np.concatenate([np.zeros(3), along])
-    left, freedoms, parasitic = _correction_rest(drives, components, length)
+    remainder, freedoms, parasitic = _correction_remainder(drives, components, length)
     lengths = _lengths(components, "")
     if freedoms < len(components):
-        rows |= {f"{PARASITIC}{name}": left[:, COMPONENTS.index(name)] for name in components}
+        rows |= {f"{PARASITIC}{name}": remainder[:, COMPONENTS.index(name)] for name in components}
         lengths |= _lengths(components, PARASITIC)
     units = {name: "rad" if _turns(name) else "m" for name in (*rows, *lengths)}
     return Measures(rows, lengths, units), freedoms, parasitic
@@ -103,7 +106,7 @@ def _turns(name: str) -> bool:
 
 
 def _lengths(components: Sequence[str], prefix: str) -> dict[str, tuple[str, ...]]:
-    """The angle and the distance, where they have more than one component."""
+    """Return the rows of the angle and of the distance, where they have more than one component."""
     parts = {
         "rotation": tuple(f"{prefix}{name}" for name in components if _turns(name)),
         "position": tuple(f"{prefix}{name}" for name in components if not _turns(name)),
@@ -111,22 +114,27 @@ def _lengths(components: Sequence[str], prefix: str) -> dict[str, tuple[str, ...
     return {f"{prefix}{name}": members for name, members in parts.items() if len(members) > 1}
 
 
-def _correction_rest(drives: Array, components: Sequence[str], length: float) -> tuple[Array, int, tuple[str, ...]]:
-    """The map from an error to what is left of it after small corrections of the actuators [n x 6 x 6], theory (53).
+def _correction_remainder(
+    drives: Array, components: Sequence[str], length: float
+) -> tuple[Array, int, tuple[str, ...]]:
+    """Return the map from an error to its remainder after small corrections of the actuators [n x 6 x 6], theory (53).
 
-    Corrections take as much away as they can, rotations times the length counting like displacements.
+    Corrections take as much away as they can, rotations times the length counting like displacements. Arguments and
+    the other results are those of `measures_of`.
     """
     scale = np.array([length] * 3 + [1.0] * 3)
-    moved = drives * scale[:, None]
-    basis, sizes, _ = np.linalg.svd(moved, full_matrices=False)
-    counted = sizes > NO_FREEDOM * sizes.max(axis=1, initial=LEAST_DIVISOR)[:, None]
-    basis = basis * counted[:, None]
-    left = np.eye(6) - basis @ np.swapaxes(basis, 1, 2)
-    # Without round-off, so that what is moved by no actuator is all left, and what is moved by them is not.
-    left = np.where(np.abs(left) < NO_FREEDOM, 0.0, left)
-    most = np.abs(moved).max(initial=0.0)
-    still = [name for name in components if (np.abs(moved[:, COMPONENTS.index(name)]) <= NO_FREEDOM * most).all()]
-    return left * scale / scale[:, None], int(counted.sum(axis=1).min()), tuple(still)
+    motions = drives * scale[:, None]
+    basis, sizes, _ = np.linalg.svd(motions, full_matrices=False)
+    is_freedom = sizes > NO_FREEDOM * sizes.max(axis=1, initial=LEAST_DIVISOR)[:, None]
+    basis = basis * is_freedom[:, None]
+    remainder = np.eye(6) - basis @ np.swapaxes(basis, 1, 2)
+    # Without round-off, so that nothing remains of what actuators correct, and all of what none of them moves.
+    remainder = np.where(np.abs(remainder) < NO_FREEDOM, 0.0, remainder)
+    greatest = np.abs(motions).max(initial=0.0)
+    parasitic = [
+        name for name in components if (np.abs(motions[:, COMPONENTS.index(name)]) <= NO_FREEDOM * greatest).all()
+    ]
+    return remainder * scale / scale[:, None], int(is_freedom.sum(axis=1).min()), tuple(parasitic)
 
 
 @dataclass(frozen=True)
@@ -136,10 +144,10 @@ class Spread:
     Attributes:
         mean: the error of the average machine, as a size [n x measures].
         rms: root of the mean square over all machines [n x measures].
-        rss: the root of the sum of squares of what each limit does by itself [n x measures].
+        rss: the root of the sum of squares of the errors by each limit alone [n x measures].
         worst: the largest error that the limits allow [n x measures].
-        usual: what 95 % of all machines keep within [n x measures].
-        everywhere: what 95 % of all machines keep within at all these poses [measures].
+        usual: the error within which 95 % of all machines keep [n x measures].
+        everywhere: the error within which 95 % of all machines keep at all these poses [measures].
     """
 
     mean: Array
@@ -151,64 +159,64 @@ class Spread:
 
 
 def first_order(inputs: RandomInputs, measures: Measures) -> tuple[Array, Array, Array, Array]:
-    """Mean, root of the mean square, root sum of squares and worst case of each measure [n x measures], theory (50).
+    """Return mean, root of the mean square, root sum of squares and worst case [n x measures], theory (50).
 
     Args:
-        inputs: variables and what they do.
-        measures: that are asked for.
+        inputs: the variables and their effects.
+        measures: the measures.
     """
     rows = measures.linear(inputs.columns)
     shift = measures.linear(inputs.shift[:, :, None])[:, :, 0]
-    squares, limits, mean = [], [], measures.sizes(shift)
+    variances, squares, worst, mean = [], [], [], measures.sizes(shift)
     for name in measures.names:
-        places = measures.places(name)
-        squares.append((rows[:, places] ** 2 @ inputs.variance).sum(axis=1))
-        limits.append((rows[:, places] ** 2).sum(axis=(1, 2)))
-    worst = [_worst(rows[:, measures.places(name)], shift[:, measures.places(name)], inputs) for name in measures.names]
-    rms = np.sqrt(mean**2 + np.stack(squares, axis=1))
-    return mean, rms, mean + np.sqrt(np.stack(limits, axis=1)), np.stack(worst, axis=1)
+        of_measure = rows[:, measures.places(name)]
+        variances.append((of_measure**2 @ inputs.variance).sum(axis=1))
+        squares.append((of_measure**2).sum(axis=(1, 2)))
+        worst.append(_worst(of_measure, shift[:, measures.places(name)], inputs))
+    rms = np.sqrt(mean**2 + np.stack(variances, axis=1))
+    return mean, rms, mean + np.sqrt(np.stack(squares, axis=1)), np.stack(worst, axis=1)
 
 
 def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
-    """The largest length that limits allow [n], theory (52): over all directions, the sum of all that reaches there.
+    """Return the largest length that limits allow [n], theory (52): the greatest sum along any direction.
 
     Args:
-        rows: what each variable does [n x k x q].
-        shift: what is there without them [n x k].
-        inputs: says which variables belong together.
+        rows: effect of each variable [n x k x q].
+        shift: the error when all variables are 0 [n x k].
+        inputs: the variables, some of which keep a limit together.
     """
-    alone = np.array([block[0] for block in inputs.blocks if len(block) == 1], dtype=int)
-    joined = [block for block in inputs.blocks if len(block) > 1]
+    single = np.array([block[0] for block in inputs.blocks if len(block) == 1], dtype=int)
+    joint = [block for block in inputs.blocks if len(block) > 1]
     count, size, _ = rows.shape
     if size == 1:
-        reach = np.abs(rows[:, 0, alone]).sum(axis=1) + np.abs(shift[:, 0])
-        return np.asarray(reach + sum(np.linalg.norm(rows[:, 0, block], axis=1) for block in joined))
+        reach = np.abs(rows[:, 0, single]).sum(axis=1) + np.abs(shift[:, 0])
+        return np.asarray(reach + sum(np.linalg.norm(rows[:, 0, block], axis=1) for block in joint))
     directions = np.random.default_rng(0).standard_normal((STARTS if count == 1 else FEW_STARTS, size))
     directions = np.broadcast_to(directions / np.linalg.norm(directions, axis=1)[:, None], (count, *directions.shape))
-    most = np.zeros(count)
+    worst = np.zeros(count)
     for _ in range(MOST_WORST_CASE_STEPS):
         # The machine that reaches farthest along a direction lies in a direction of its own, which is tried next:
         # its length never falls.
-        farthest = _farthest(directions, rows, shift, alone, joined)
+        farthest = _farthest(directions, rows, shift, single, joint)
         lengths = np.linalg.norm(farthest, axis=2)
         directions = farthest / np.maximum(lengths, LEAST_DIVISOR)[:, :, None]
         longest = lengths.max(axis=1)
-        if (longest <= most * (1.0 + SAME_LENGTH)).all():
+        if (longest <= worst * (1.0 + SAME_LENGTH)).all():
             break
-        most = np.maximum(most, longest)
-    return most
+        worst = np.maximum(worst, longest)
+    return worst
 
 
-def _farthest(directions: Array, rows: Array, shift: Array, alone: Integers, joined: Sequence[Integers]) -> Array:
-    """The error of the machine that reaches farthest along each direction [n x directions x k].
+def _farthest(directions: Array, rows: Array, shift: Array, single: Integers, joint: Sequence[Integers]) -> Array:
+    """Return the error of the machine that reaches farthest along each direction [n x directions x k].
 
     Args:
         directions: unit vectors [n x directions x k].
         rows, shift: see `_worst`.
-        alone, joined: numbers of the variables that keep a limit each, and of those that keep one together.
+        single, joint: numbers of the variables that keep a limit each, and of those that keep one together.
     """
-    result = np.sign(directions @ rows[:, :, alone]) @ np.swapaxes(rows[:, :, alone], 1, 2)
-    for block in joined:
+    result = np.sign(directions @ rows[:, :, single]) @ np.swapaxes(rows[:, :, single], 1, 2)
+    for block in joint:
         reach = directions @ rows[:, :, block]
         reach = reach / np.maximum(np.linalg.norm(reach, axis=2, keepdims=True), LEAST_DIVISOR)
         result = result + reach @ np.swapaxes(rows[:, :, block], 1, 2)
@@ -216,11 +224,11 @@ def _farthest(directions: Array, rows: Array, shift: Array, alone: Integers, joi
 
 
 def spread_of(inputs: RandomInputs, measures: Measures, machines: Iterable[Array]) -> tuple[Spread, Array]:
-    """The error of the tool to first order, with percentiles of drawn machines.
+    """Return the error of the tool to first order, with percentiles of random machines.
 
     Args:
-        inputs: variables and what they do at n poses.
-        measures: that are asked for.
+        inputs: the variables and their effects at n poses.
+        measures: the measures.
         machines: values of the variables, slab by slab [slab x q].
 
     Returns:
@@ -229,23 +237,34 @@ def spread_of(inputs: RandomInputs, measures: Measures, machines: Iterable[Array
     rows, shift = measures.linear(inputs.columns), measures.linear(inputs.shift[:, :, None])[:, :, 0]
     count, size, _ = rows.shape
     flat = rows.reshape(count * size, -1).T
-    drawn = np.concatenate([measures.sizes((slab @ flat).reshape(len(slab), count, size) + shift) for slab in machines])
+    sizes = np.concatenate([measures.sizes((slab @ flat).reshape(len(slab), count, size) + shift) for slab in machines])
     mean, rms, rss, worst = first_order(inputs, measures)
-    usual, largest = np.percentile(drawn, USUAL_PERCENT, axis=0), drawn.max(axis=1)
-    return Spread(mean, rms, rss, worst, usual, np.percentile(largest, USUAL_PERCENT, axis=0)), largest
+    largest = sizes.max(axis=1)
+    spread = Spread(
+        mean=mean,
+        rms=rms,
+        rss=rss,
+        worst=worst,
+        usual=np.percentile(sizes, USUAL_PERCENT, axis=0),
+        everywhere=np.percentile(largest, USUAL_PERCENT, axis=0),
+    )
+    return spread, largest
 
 
 def squares_of(inputs: RandomInputs, measures: Measures) -> Array:
-    """The variance that each part brings to each measure, summed over the poses [measures x parts], theory (50)."""
+    """Return the variance that each part brings to each measure, summed over the poses [measures x parts].
+
+    Source: theory (50).
+    """
     rows = measures.linear(inputs.columns)
-    each = np.einsum("nkq,q->kq", rows**2, inputs.variance)
-    parts = np.zeros((len(each), len(inputs.parts)))
-    np.add.at(parts.T, inputs.owner, each.T)
-    return np.stack([parts[measures.places(name)].sum(axis=0) for name in measures.names])
+    by_variable = np.einsum("nkq,q->kq", rows**2, inputs.variance)
+    by_part = np.zeros((len(by_variable), len(inputs.parts)))
+    np.add.at(by_part.T, inputs.owner, by_variable.T)
+    return np.stack([by_part[measures.places(name)].sum(axis=0) for name in measures.names])
 
 
 def shares(squares: Array) -> Array:
-    """Squares as shares that add up to 1 in each row; 0 where there is nothing to share."""
+    """Return squares as shares that add up to 1 in each row; 0 where there is nothing to share."""
     whole = squares.sum(axis=1, keepdims=True)
     return np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0)
 
@@ -255,10 +274,10 @@ class ExactSample(Immutable):
     """Machines whose equations were solved exactly, at the pose of the machine.
 
     Attributes:
-        machines: how many.
-        failed: how many of them cannot be assembled with their actuators there.
+        machines: number of machines.
+        failed: number of those that cannot be assembled with their actuators there.
         rms: root of the mean square of each measure [measures].
-        usual: what 95 % of them keep within [measures].
+        usual: the error within which 95 % of them keep [measures].
         difference: the largest difference of a measure from its first order [measures].
         unexplained: share of the variance that single contributions do not explain [measures]; 0 where nothing varies.
     """
@@ -275,11 +294,11 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
     """Solve machines exactly at the pose of the machine.
 
     Args:
-        machine: as drawn.
-        inputs: variables and what they do there.
-        measures: that are asked for.
-        count: of machines, a power of 2.
-        seed: of the machines.
+        machine: the machine as drawn.
+        inputs: the variables and their effects there.
+        measures: the measures.
+        count: number of machines, a power of 2.
+        seed: seed of the random machines.
 
     Raises:
         InputError: none of them can be assembled.
@@ -294,21 +313,21 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
     solved, linear = solved[closed], linear[closed]
     sizes = measures.sizes(solved)
     return ExactSample(
-        count,
-        int((~closed).sum()),
-        np.sqrt((sizes**2).mean(axis=0)),
-        np.percentile(sizes, USUAL_PERCENT, axis=0),
-        np.abs(sizes - measures.sizes(linear)).max(axis=0),
-        _unexplained_variance(solved, linear, measures),
+        machines=count,
+        failed=int((~closed).sum()),
+        rms=np.sqrt((sizes**2).mean(axis=0)),
+        usual=np.percentile(sizes, USUAL_PERCENT, axis=0),
+        difference=np.abs(sizes - measures.sizes(linear)).max(axis=0),
+        unexplained=_unexplained_variance(solved, linear, measures),
     )
 
 
 def _solved_and_linear(
     machine: Machine, inputs: RandomInputs, measures: Measures, count: int, seed: int
 ) -> tuple[Array, Array]:
-    """Linear measures of machines by exact solutions, and to first order [machines x rows each]; NaN without solution.
+    """Return linear measures of machines by exact solutions, and to first order [machines x rows each].
 
-    Args: as of `exact_sample`.
+    NaN without a solution. Arguments are those of `exact_sample`.
     """
     path = next(path for path in values(machine) if path.startswith(POSE))
     coordinate = float(values(machine)[path])
@@ -327,8 +346,8 @@ def _solved_and_linear(
 
 
 def _unexplained_variance(solved: Array, linear: Array, measures: Measures) -> Array:
-    """The variance of what the first order leaves, over the variance [machines x rows] -> [measures]."""
-    left, whole = (solved - linear).var(axis=0), solved.var(axis=0)
+    """Return the variance of what the first order leaves, over the variance [machines x rows] -> [measures]."""
+    of_rows = (solved - linear).var(axis=0), solved.var(axis=0)
     places = [measures.places(name) for name in measures.names]
-    parts, wholes = (np.array([each[rows].sum() for rows in places]) for each in (left, whole))
-    return np.divide(parts, wholes, out=np.zeros_like(parts), where=wholes > 0.0)
+    remainder, whole = (np.array([variance[rows].sum() for rows in places]) for variance in of_rows)
+    return np.divide(remainder, whole, out=np.zeros_like(remainder), where=whole > 0.0)
