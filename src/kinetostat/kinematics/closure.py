@@ -22,7 +22,7 @@ from kinetostat.kinematics.closing import (
 )
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems, coordinates_at, goal_of, problems_of
-from kinetostat.kinematics.posture import nearest_home
+from kinetostat.kinematics.nearest import nearest_home
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked_columns
