@@ -114,7 +114,7 @@ def stiffness_along(
     def along(block: Block, function: Callable[..., float | None]) -> float | None:
         try:
             return function(direction, block, stiffness, compliance, components)
-        except ValueError:  # The direction is zero, or not one of this block; below, none of either block is an error.
+        except ValueError:  # the direction is zero or not one of this block; below, one of neither block is refused
             return None
 
     force, force_held = along("translation", free_stiffness_along), along("translation", guided_stiffness_along)
@@ -133,9 +133,9 @@ def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
     Raises:
         InputError: it is not three finite numbers.
     """
-    given = [] if isinstance(direction, str) or not isinstance(direction, Iterable) else list(direction)
-    numbers = [float(c) for c in given if isinstance(c, Real) and not isinstance(c, bool)]
-    if len(given) != 3 or len(numbers) != 3 or not all(abs(c) <= LARGEST_COMPONENT for c in numbers):
+    entries = [] if isinstance(direction, str) or not isinstance(direction, Iterable) else list(direction)
+    numbers = [float(c) for c in entries if isinstance(c, Real) and not isinstance(c, bool)]
+    if len(entries) != 3 or len(numbers) != 3 or not all(abs(c) <= LARGEST_COMPONENT for c in numbers):
         raise InputError(
             f"The direction is {shorten(direction)}; give three finite numbers, e.g. (0, 0, 1), on the command line "
             "--along 0,0,1; its length does not matter."
@@ -177,16 +177,16 @@ def indices_of(
         elif compliance is not None:
             screws = compliance_eigenscrews(compliance)
     return Indices(
-        None if compliance is None else principal_compliances(compliance, components),
-        free_stiffnesses(stiffness, compliance, components),
-        guided_stiffnesses(stiffness, compliance, components),
-        stiffness_condition(stiffness, compliance, length, components),
-        {
+        principal_compliances=None if compliance is None else principal_compliances(compliance, components),
+        free=free_stiffnesses(stiffness, compliance, components),
+        guided=guided_stiffnesses(stiffness, compliance, components),
+        stiffness_condition=stiffness_condition(stiffness, compliance, length, components),
+        centres={
             "stiffness": centre_of_stiffness(stiffness, components),
             "compliance": centre_of_compliance(compliance, components),
             "elasticity": centre_of_elasticity(stiffness, compliance, components),
         },
-        tuple(screws),
+        eigenscrews=tuple(screws),
     )
 
 
@@ -300,13 +300,13 @@ def load_case(
     length = float(response.configuration.length)
     load = clean_screw(wrench.rotated(turn), length)
     size = float(wrench.rotational.norm() + wrench.translational.norm() * length)
-    loaded = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
+    loads_of_springs = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
-        tuple(COMPONENTS[i] for i in kept),
-        np.array(load.components(), dtype=float)[[*kept]],
-        np.array(_deflection(statics, load))[[*kept]],
-        tuple(_spring_load(spring, float(amount)) for spring, amount in loaded),
-        tuple(
+        components=tuple(COMPONENTS[i] for i in kept),
+        wrench=np.array(load.components(), dtype=float)[[*kept]],
+        deflection=np.array(_deflection(statics, load))[[*kept]],
+        springs=tuple(_spring_load(spring, float(amount)) for spring, amount in loads_of_springs),
+        reactions=tuple(
             Reaction(
                 reaction.leg,
                 reaction.joint,
@@ -330,17 +330,23 @@ def _spring_load(spring: Spring, load: float) -> SpringLoad:
     """The load and the deformation of a spring; a free one deforms without end under a load, and not at all without."""
     stiffness = float(spring.stiffness)
     deformation = load / stiffness if stiffness else math.copysign(math.inf, load) if load else 0.0
-    return SpringLoad(spring.name, spring.actuated, spring.joint.point is not None, load, deformation)
+    return SpringLoad(
+        name=spring.name,
+        actuated=spring.actuated,
+        turning=spring.joint.point is not None,
+        load=load,
+        deformation=deformation,
+    )
 
 
 def clean_screw(screw: AnyScrew, length: float, least: float = 0.0) -> AnyScrew:
     """Set components of a screw that are only round-off to zero.
 
     Args:
-        screw: of floats.
-        length: by which its last three components are multiplied to compare with the first three: m for a wrench,
-            1/m for a twist.
-        least: size of what it is a part of, measured as its first three components.
+        screw: a screw of floats.
+        length: factor of its last three components that makes them comparable with the first three: in m for a wrench,
+            in 1/m for a twist.
+        least: size of the sum that the screw is a part of, measured as its first three components.
     """
     sizes = [abs(c) * scale for c, scale in zip(screw.components(), [1.0] * 3 + [length] * 3, strict=True)]
     limit = ROUND_OFF_OF_ENTRY * max(least, *sizes)
@@ -349,7 +355,7 @@ def clean_screw(screw: AnyScrew, length: float, least: float = 0.0) -> AnyScrew:
 
 
 def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUND_OFF_OF_ENTRY) -> list[list[float]]:
-    """Set entries of K or C [n x n] to zero that are below a `share` of the mean (geometric) of their diagonal ones."""
+    """Set entries of K or C [n x n] to zero that are below a share of the geometric mean of both diagonal entries."""
     sizes = [abs(row[i]) for i, row in enumerate(rows)]
     return [
         [0.0 if abs(c) < share * math.sqrt(size * other) else c for c, other in zip(row, sizes, strict=True)]
@@ -380,12 +386,12 @@ def _clean_sum(shares: Sequence[tuple[AnyScrew, Scalar]], length: float) -> tupl
     is zero there whatever the other screws are.
     """
     cleaned = [clean_screw(screw, length).components() for screw, weight in shares if weight > 0.0]
-    reached = [any(components) for components in zip(*cleaned, strict=True)] or [False] * SIZE
+    is_reached = [any(components) for components in zip(*cleaned, strict=True)] or [False] * SIZE
     result = []
     for screw, weight in shares:
         if math.isinf(weight):
             result.append((clean_screw(screw, length), weight))
             continue
-        kept = [float(c) if there else 0.0 for c, there in zip(screw.components(), reached, strict=True)]
+        kept = [float(c) if reached else 0.0 for c, reached in zip(screw.components(), is_reached, strict=True)]
         result.append((type(screw)(Vector(*kept[:3]), Vector(*kept[3:])), weight))
     return tuple(result)

@@ -1,4 +1,4 @@
-"""Poses from actuator coordinates: which assembly modes a machine has near its pose, and what each of them is worth.
+"""Poses from actuator coordinates: the assembly modes that a machine has near its pose, and the status of each.
 
 The equations are solved in `kinematics.forward`; the command is `forward`.
 """
@@ -58,10 +58,10 @@ class Forward(ImmutableAnswer):
     """The poses of a machine whose actuators stand at given coordinates.
 
     Attributes:
-        machine: whose pose the search began at.
-        actuators: with the coordinates that they have.
-        poses: one for each assembly mode, the present one first, then by distance from the pose of the machine.
-        message: how many there are, or why there is none; one paragraph.
+        machine: the machine at the pose at which the search began.
+        actuators: its actuators with their coordinates.
+        poses: a pose for each assembly mode, the present one first, then by distance from the pose of the machine.
+        message: the number of poses, or the reason why there is none; one paragraph.
     """
 
     machine: Machine
@@ -90,11 +90,11 @@ def forward(
     the pose.
 
     Args:
-        machine: its pose is where the search begins.
+        machine: the machine at the pose at which the search begins.
         actuators: coordinates by name of the actuator, or of its leg: SI, or text with a unit. Those that are not given
             stay as they are at the pose.
-        starts: how many starts there are beside the pose itself; more of them find more modes.
-        spread: how far from the pose they lie at most, rad and in units of the machine's length.
+        starts: number of starts of the search beside the pose itself; more of them find more modes.
+        spread: their greatest distance from the pose, rad and in units of the machine's length.
 
     Raises:
         InputError: an unknown actuator, a value of another kind, a machine that its actuators do not determine, or an
@@ -102,7 +102,7 @@ def forward(
     """
     _check_search(starts, spread)
     system = system_of(machine)
-    driven = _given_actuators(system, actuators or {}, machine)
+    driven = _placed_actuators(system, actuators or {}, machine)
     if undriven(system):
         raise InputError(
             f"{machine.name}: the actuators do not determine the pose: the platform can move while they stand still. "
@@ -121,22 +121,22 @@ def _check_search(starts: int, spread: float) -> None:
         raise InputError(f"spread is {shorten(spread)}; give a number greater than 0 and at most pi.")
 
 
-def _given_actuators(system: System, given: Mapping[str, float | str], machine: Machine) -> tuple[Actuator, ...]:
+def _placed_actuators(system: System, coordinates: Mapping[str, float | str], machine: Machine) -> tuple[Actuator, ...]:
     """The actuators at the coordinates that are given, or where they stand."""
     if not system.actuators:
         raise InputError(f"{machine.name} has no actuator; forward kinematics needs one for each freedom.")
     names = _names(system)
-    at: dict[str, Actuator] = {}
-    for name, value in given.items():
+    commanded: dict[str, Actuator] = {}
+    for name, value in coordinates.items():
         actuator = names[choice(name, names, "the name of an actuator")]
-        if actuator.name in at:
+        if actuator.name in commanded:
             raise InputError(f'the actuator "{actuator.name}" is given twice; leave one of its coordinates out.')
         try:
             coordinate = Quantity(actuator.kind, actuator.meaning).number(value)
         except UnitError as error:
             raise InputError(f'actuator "{name}" is {shorten(value)}: {error}.') from None
-        at[actuator.name] = replace(actuator, coordinate=coordinate)
-    driven = tuple(at.get(actuator.name, actuator) for actuator in system.actuators)
+        commanded[actuator.name] = replace(actuator, coordinate=coordinate)
+    driven = tuple(commanded.get(actuator.name, actuator) for actuator in system.actuators)
     unplaced = [actuator.name for actuator in driven if not math.isfinite(float(actuator.coordinate))]
     if unplaced:
         raise InputError(
@@ -181,8 +181,8 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
             f"No pose near that of {machine.name} has these actuator coordinates; give others, begin nearer, or search "
             f"further away (spread).{more}"
         )
-    there = "there is" if len(modes) == 1 else "there are"
-    first = f"Near the pose {there} {_count_of_modes(len(modes))} with these actuator coordinates."
+    verb = "is" if len(modes) == 1 else "are"
+    first = f"Near the pose there {verb} {_count_of_modes(len(modes))} with these actuator coordinates."
     if not any(mode.present for mode in modes):
         return (
             f"{first} Moved evenly, the actuators do not lead to any of them: the present mode ends on the way, at a "

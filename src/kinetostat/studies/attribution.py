@@ -27,11 +27,11 @@ class Contribution(ImmutableAnswer):
     """The contribution of one spring to the diagonal entries of C and K.
 
     Attributes:
-        spring: its name.
+        spring: name of the spring.
         part: the joint or link that it stands for.
-        stiffness: N/m or N·m/rad; infinity if rigid.
+        stiffness: its stiffness, N/m or N·m/rad; infinity if rigid.
         compliance_share: its share of each diagonal entry of C, 0 to 1, or NaN where the entry is zero or infinite [n].
-        stiffness_share: the same for K.
+        stiffness_share: its share of each diagonal entry of K, likewise [n].
     """
 
     spring: str
@@ -55,19 +55,20 @@ def contributions(
     parts = zip(springs, compliance_shares(statics), stiffness_shares(statics), strict=True)
     return tuple(
         Contribution(
-            spring.name,
-            spring.part or spring.name,
-            spring.stiffness,
-            _ratios(of_compliance, compliance, kept),
-            _ratios(of_stiffness, stiffness, kept),
+            spring=spring.name,
+            part=spring.part or spring.name,
+            stiffness=spring.stiffness,
+            compliance_share=_ratios(of_compliance, compliance, kept),
+            stiffness_share=_ratios(of_stiffness, stiffness, kept),
         )
         for spring, of_compliance, of_stiffness in parts
     )
 
 
 def _ratios(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> Array:
+    """Shares of a part in the diagonal of the whole, in those components that the machine has [n]."""
     pairs = [(part.entry(i, i), whole.entry(i, i)) for i in kept]
-    return np.array([float(p / w) if 0.0 < w < math.inf else math.nan for p, w in pairs])
+    return np.array([float(share / entry) if 0.0 < entry < math.inf else math.nan for share, entry in pairs])
 
 
 def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]]:
@@ -78,14 +79,14 @@ def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]
     return parts
 
 
-EQUAL_SHARES = 9
-"""Decimals in which shares are compared, so that equal parts keep their order."""
+DECIMALS_OF_SHARES = 9
+"""Decimals in which shares are compared: equal parts differ by round-off alone, and keep their order."""
 MOST_NAMED = 3
-"""Parts that are named as those that contribute most."""
-NAMED = 0.05
-"""Share from which a part is named."""
-MOST_OF_IT = 0.6
-"""Share that the named parts must have together; otherwise kinds of parts are named."""
+"""Parts that are named as those that contribute most: a sentence with more is no longer read."""
+LEAST_NAMED_SHARE = 0.05
+"""Share from which a part is named: to stiffen a lesser one gains next to nothing."""
+LEAST_SHARE_TOGETHER = 0.6
+"""Share that the named parts must have together, well more than half; otherwise kinds of parts are named."""
 
 Key = TypeVar("Key")
 
@@ -108,7 +109,7 @@ class Softest(ImmutableAnswer):
     """The direction in which a force, or a moment, meets the least stiffness, and what makes it soft.
 
     Attributes:
-        stiffness: N/m or N·m/rad, with all other motions free; 0 where nothing resists a motion in this direction.
+        stiffness: the least stiffness, N/m or N·m/rad, with all other motions free; 0 where nothing resists.
         directions: unit vectors that span all directions with this stiffness, axes of K and C [1 to 3 x 3].
         shares: each part and its share of the compliance there, the greatest share first; empty where stiffness is 0.
         kinds: the same for all parts of one kind together, such as "actuator ×6".
@@ -138,19 +139,19 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     if math.isinf(least):
         return None
     pairs = zip(block.stiffnesses, block.directions, strict=True)
-    alike = np.array([way for k, way in pairs if math.isclose(k, least, rel_tol=EQUAL_STIFFNESSES)])
+    directions = np.array([unit for k, unit in pairs if math.isclose(k, least, rel_tol=EQUAL_STIFFNESSES)])
     if least == 0.0:
-        return Softest(least, alike, ())
+        return Softest(least, directions, ())
     rows = ROTATIONS if name == "rotation" else TRANSLATIONS
     amounts: dict[str, float] = {}
     for spring, share in zip(springs, compliance_shares(statics), strict=True):
         entries = [(float(share.entry(i, j)), i % 3, j % 3) for i in rows for j in rows]
         if not all(math.isfinite(entry) for entry, _, _ in entries):
-            return Softest(0.0, alike, ())  # a free spring lets it go: what round-off has left is no stiffness
-        amount = sum(entry * way[i] * way[j] for way in alike for entry, i, j in entries)
+            return Softest(0.0, directions, ())  # a free spring lets it go: what round-off has left is no stiffness
+        amount = sum(entry * unit[i] * unit[j] for unit in directions for entry, i, j in entries)
         # The compliance in each of these directions is 1 / least, so this is the spring's share of their sum.
-        amounts[spring.name] = amount * least / len(alike)
-    return Softest(least, alike, *parts_and_kinds(springs, amounts))
+        amounts[spring.name] = amount * least / len(directions)
+    return Softest(least, directions, *parts_and_kinds(springs, amounts))
 
 
 def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> tuple[Shares, Shares]:
@@ -176,7 +177,7 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
 
 def ranking_of(shares: Mapping[Key, float]) -> tuple[tuple[Key, float], ...]:
     """Sort shares, the greatest first; those that are equal but for round-off keep their order."""
-    return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))
+    return tuple(sorted(shares.items(), key=lambda item: -round(item[1], DECIMALS_OF_SHARES)))
 
 
 def strongest_first(effects: Sequence[Effect]) -> list[Effect]:
@@ -194,6 +195,6 @@ def largest_contributors(parts: Shares, kinds: Shares) -> str:
     Returns:
         Nothing where no share is large enough to be named.
     """
-    shares = parts if sum(share for _, share in parts[:MOST_NAMED]) >= MOST_OF_IT else kinds
-    named = [(name, 100.0 * share) for name, share in shares[:MOST_NAMED] if share >= NAMED]
+    shares = parts if sum(share for _, share in parts[:MOST_NAMED]) >= LEAST_SHARE_TOGETHER else kinds
+    named = [(name, 100.0 * share) for name, share in shares[:MOST_NAMED] if share >= LEAST_NAMED_SHARE]
     return ", ".join(f"{name} {percent:.0f}\N{NO-BREAK SPACE}%" for name, percent in named)

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_DESIGNS = 12
+"""Designs that are compared: each is a column of a table."""
 OVERRIDE_SEPARATOR = ";"
-"""Between overrides of one design."""
-
+"""Sign between overrides of one design."""
 _OVERRIDDEN = re.compile(r"(.+?):(\s*[A-Za-z_][\w.-]*\s*=.*)", re.DOTALL)
 
 
@@ -44,9 +44,9 @@ class Design:
     """A machine under the name by which it was given.
 
     Attributes:
-        label: as written.
-        machine: with its pose.
-        analysis: of it.
+        label: the name, as written.
+        machine: the machine with its pose.
+        analysis: its analysis.
     """
 
     label: str
@@ -64,9 +64,9 @@ class Difference:
     """A field of which not all designs that have it say the same.
 
     Attributes:
-        path: of the field.
-        parameters: of each design; the kind need not be the same. None where it has no such field.
-        values: SI, entry by entry; empty where it has no such field.
+        path: path of the field.
+        parameters: the field in each design, not always of the same kind; None where a design has no such field.
+        values: its values in each design, SI, entry by entry; empty where a design has no such field.
     """
 
     path: str
@@ -79,8 +79,8 @@ class SoftDirection:
     """The softest rotation or translation of a design, and what makes it soft.
 
     Attributes:
-        direction: the component.
-        shares: of the elements in its compliance, the greatest first.
+        direction: name of the component.
+        shares: names of elements and their shares in its compliance, the greatest first.
     """
 
     direction: str
@@ -92,14 +92,15 @@ class Comparison(ImmutableAnswer):
     """Designs side by side.
 
     Attributes:
-        designs: in order; the first is what the others are compared with.
-        differences: fields that two designs have at least and that differ.
+        designs: the designs in order; the others are compared with the first.
+        differences: fields that differ, of those that two designs have at least.
         rows: numbers at the pose of each design.
         softest: the softest rotation and translation of each design; fewer where it has none.
-        verdicts: on the requirements of all files, each judged for every design; None where it lacks the quantity.
-        ranges: of the grid, as written.
+        verdicts: verdicts on the requirements of all files, each judged for every design; None where a design lacks the
+            quantity.
+        ranges: ranges of the grid, as written.
         where: these poses in words, "over x=-1 cm:1 cm:5"; empty without any.
-        poses: of each design, how many poses of the grid have an answer, and how many there are.
+        poses: for each design, the number of poses of the grid with an answer, and that of all.
         over: numbers over those poses.
     """
 
@@ -184,25 +185,23 @@ def compare(
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
     for design in given:
         _refuse_absent(design, ranges)
-    analyses, names = [design.analysis for design in given], several(quantities)
-    looked = bool(ranges) or poses is not None
-    over, counts = rows_over(analyses, ranges, poses, names, progress) if looked else ((), ())
-    where = f"over {', '.join(ranges)}" if ranges else "at the poses of " + _poses_name(poses) if looked else ""
+    analyses, names, where = [design.analysis for design in given], several(quantities), ""
+    if ranges:
+        where = f"over {', '.join(ranges)}"
+    elif poses is not None:
+        where = f"at the poses of {poses if isinstance(poses, str | Path) else 'the list'}"
+    over, counts = rows_over(analyses, ranges, poses, names, progress) if where else ((), ())
     return Comparison(
-        tuple(given),
-        _differences(given),
-        rows_at_poses(analyses, names),
-        tuple(_softest(design) for design in given),
-        _verdicts(given),
-        tuple(ranges),
-        where,
-        counts,
-        over,
+        designs=tuple(given),
+        differences=_differences(given),
+        rows=rows_at_poses(analyses, names),
+        softest=tuple(_softest(design) for design in given),
+        verdicts=_verdicts(given),
+        ranges=tuple(ranges),
+        where=where,
+        poses=counts,
+        over=over,
     )
-
-
-def _poses_name(poses: Any) -> str:
-    return str(poses) if isinstance(poses, str | Path) else "the list"
 
 
 def _verdicts(designs: Sequence[Design]) -> tuple[tuple[Verdict | None, ...], ...]:

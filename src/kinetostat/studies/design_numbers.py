@@ -30,7 +30,8 @@ from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_qu
 from kinetostat.tolerances import EQUAL_DESIGNS
 
 PERCENTILE = 95.0
-"""Share of the poses, in percent, that are at least as good as the value that is shown."""
+"""Share of the poses, in percent, that are at least as good as the value that is shown: a few bad corners of a
+workspace, which the worst value shows, do not count."""
 BUILT_ERROR = "built_error"
 """A number beside the quantities: the error that 95 % of the machines within the tolerances of a file do not exceed."""
 DISPLACEMENT = "displacement"

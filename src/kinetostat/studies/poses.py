@@ -38,7 +38,7 @@ class GivenColumn:
     Attributes:
         name: name of the field, as written.
         entries: numbers, or texts with a unit.
-        unit: unit of numbers; SI where it is empty.
+        unit: unit of the numbers; SI where it is empty.
     """
 
     name: str
@@ -53,7 +53,7 @@ class PoseColumns:
     Attributes:
         fields: the given fields, in order.
         values: values of each of the fields [poses].
-        labels: further columns that belong to the poses, as a time; by name.
+        labels: further columns that belong to the poses, such as a time, by name.
         unit_doubt: a sentence where numbers of a file that have no unit seem to be mm or deg, which answers give where
             the poses have none; empty if nothing is doubtful.
     """
@@ -85,10 +85,10 @@ def read_columns(
     """Read columns: find their fields, convert and check every value.
 
     Args:
-        machine: whose fields they are.
-        columns: all of one length, or of length one. Orientations may be columns of a quaternion, a rotation matrix or
-            a tilt, as `quaternion.w`; they become roll, pitch and yaw.
-        where: says in messages where a value stands.
+        machine: the machine whose fields they are.
+        columns: the columns, all of one length, or of length one. Orientations may be columns of a quaternion, a
+            rotation matrix or a tilt, as `quaternion.w`; they become roll, pitch and yaw.
+        where: a function that says in messages where a value stands.
         labels: further columns of the poses.
 
     Raises:
@@ -99,9 +99,9 @@ def read_columns(
         raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
     columns = _with_angles(machine, columns, where)
     fields = [_field(machine, column.name) for column in columns]
-    given = [leaf for field in fields for leaf in field.leaves]
-    for leaf in given:
-        if given.count(leaf) > 1:
+    leaves = [leaf for field in fields for leaf in field.leaves]
+    for leaf in leaves:
+        if leaves.count(leaf) > 1:
             raise InputError(f"{leaf} is given by two columns of the poses; remove one of them.")
     pairs = list(zip(columns, fields, strict=True))
     values = [column_values(column, field.quantity, where) for column, field in pairs]
@@ -210,11 +210,12 @@ def _check(value: float, quantity: Quantity, place: str) -> None:
 
 
 MOST_DIMENSIONS = 6
-"""Axes of one grid."""
+"""Axes of one grid: a pose has six coordinates."""
 POSE_FORMS = (
     "give a DataFrame or a dictionary with a column for each field that changes, an array with a column for each "
     "coordinate of the pose, an xarray Dataset, or the path of a CSV file"
 )
+"""The end of messages about poses in no form that is read."""
 
 
 def given_poses(machine: Machine, poses: Any) -> PoseColumns:
@@ -227,7 +228,7 @@ def given_poses(machine: Machine, poses: Any) -> PoseColumns:
         return read_poses(machine, Path(poses))
     labels: dict[str, Any] = {}
     if hasattr(poses, "data_vars"):
-        columns, labels = _of_dataset(poses)
+        columns, labels = _columns_of_dataset(poses)
     elif isinstance(poses, Mapping):
         named = numbers_for(quantities(machine.family.tables["pose"]), poses, angles_of)
         columns = [GivenColumn(name, entries) for name, entries in named.items()]
@@ -235,21 +236,21 @@ def given_poses(machine: Machine, poses: Any) -> PoseColumns:
         columns = [GivenColumn(name, poses[name]) for name in poses.columns]
         labels = {"pose": np.asarray(poses.index)} if hasattr(poses, "index") else {}
     else:
-        columns = _of_array(machine, poses)
+        columns = _columns_of_array(machine, poses)
     return read_columns(machine, columns, lambda name, i: f"poses[{name!r}][{i}]", labels)
 
 
-def _of_dataset(dataset: Any) -> tuple[list[GivenColumn], dict[str, Any]]:
+def _columns_of_dataset(dataset: Any) -> tuple[list[GivenColumn], dict[str, Any]]:
     """Return the variables of a dataset, or its coordinates if it has none, over all its dimensions together."""
     names = list(dataset.data_vars) or list(dataset.coords)
-    flat = [np.ravel(array) for array in np.broadcast_arrays(*_like(dataset, names))]
+    flat = [np.ravel(array) for array in np.broadcast_arrays(*_spread_variables(dataset, names))]
     others = [name for name in dataset.coords if name not in names and dataset[name].dims == tuple(dataset.dims)]
     labels = {str(name): dataset[name].values for name in others}
     fields = [str(dataset[name].attrs.get("field", name)) for name in names]
     return [GivenColumn(field, values) for field, values in zip(fields, flat, strict=True)], labels
 
 
-def _like(dataset: Any, names: Sequence[Any]) -> list[Any]:
+def _spread_variables(dataset: Any, names: Sequence[Any]) -> list[Any]:
     """Return variables with a length of one along dimensions that they do not have."""
     return [
         np.expand_dims(
@@ -259,7 +260,7 @@ def _like(dataset: Any, names: Sequence[Any]) -> list[Any]:
     ]
 
 
-def _of_array(machine: Machine, poses: Any) -> list[GivenColumn]:
+def _columns_of_array(machine: Machine, poses: Any) -> list[GivenColumn]:
     coordinates = [p.shown for p in parameters(machine.family) if p.path.startswith(POSE)]
     try:
         array = np.asarray(poses, dtype=float)
@@ -275,10 +276,11 @@ def _of_array(machine: Machine, poses: Any) -> list[GivenColumn]:
 
 
 LARGEST_POSE_FILE = 1 << 30
-"""Bytes of a file of poses."""
+"""Bytes of a file of poses, 1 GiB: the text is kept in memory, in several copies."""
 MOST_POSE_COLUMNS = 1000
+"""Columns of a file of poses, several times the fields of a machine."""
 SEPARATORS = (";", "\t", ",")
-"""Looked for in this order: where a semicolon separates, a comma is the decimal sign."""
+"""Signs between columns, in the order in which they are looked for: beside a semicolon, a comma is the decimal sign."""
 ANSWERS = {"pose", "status", *QUANTITIES}
 """Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
@@ -294,7 +296,7 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
     are comments. Columns of answers that `kinetostat path` wrote are left out.
 
     Args:
-        machine: whose fields they are.
+        machine: the machine whose fields the columns are.
         path: path of the file.
 
     Raises:
@@ -374,7 +376,6 @@ def columns_of(
 
 
 def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
-    """The cells of a line."""
     try:
         return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     except csv.Error as error:

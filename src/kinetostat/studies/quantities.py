@@ -27,7 +27,9 @@ from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
 TENSIONS = GROUPS["tension"]
+"""Quantities that are tensions, cable by cable."""
 ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
+"""Quantities that are loads of actuators, which the table of limits names."""
 LOADING_KINDS = ("force", "acceleration", "density", "linear density", "temperature difference", "thermal expansion")
 """Kinds of parameters that may bring in a load which an answer to first order leaves out."""
 
@@ -249,7 +251,7 @@ def refuse_unknown_mass(machine: Machine, what: str, configuration: Configuratio
 
     Args:
         machine: the machine as its file has it.
-        what: the name of what needs them, as people wrote it.
+        what: the quantity or command that needs them, as people wrote it.
         configuration: the machine placed at its pose.
 
     Raises:

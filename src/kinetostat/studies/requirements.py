@@ -39,12 +39,11 @@ else:
     motors = LateModule("kinetostat.studies.motors")
 
 MOST_POSES = 5_000_000
-
-
+"""Poses at which a requirement is judged: their quantities fit in memory, half a gigabyte for a dozen."""
 SMALL_MOTIONS = ("displacement_", "reversal_error_")
 """Beginnings of the names of quantities that are small motions, which have units of their own."""
 MANIFOLD = 2.0
-"""Margin from which a multiple of the bound is shown instead of a percentage."""
+"""Margin from which a multiple of the bound is shown instead of a percentage: "3 times" reads better than "200 %"."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,9 +30,11 @@ from kinetostat.studies.storage import write_dataset
 from kinetostat.tolerances import EQUAL_ROUTES
 
 DIAGONALS = (*GROUPS["stiffness"], *GROUPS["compliance"])
+"""Quantities that are compared: the diagonals of K and C."""
 COMPARED_POSES = 500
+"""Poses at which routes are compared: several slabs of machine code, and a hundredth of a second of NumPy."""
 TIMED_POSES = 200_000
-"""Enough to keep some cores busy for a tenth of a second."""
+"""Poses whose time is taken: enough to keep some cores busy for a tenth of a second."""
 
 
 def checks() -> Iterator[InstallationCheck]:

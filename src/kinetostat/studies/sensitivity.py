@@ -62,14 +62,15 @@ FAR_AWAY = (
     "derivatives here. Look at the loaded state (analyze --loaded), and reduce the loads."
 )
 MOST_NAMED = 12
-"""Greatest number of parameters without influence that are named."""
+"""Greatest number of parameters without influence that are named: two lines of a terminal."""
 
 UNIT_OF_PERCENTS = "percent per percent, for an angle per 0.01 rad"
 """Unit of the percentages. A percent of an angle has no meaning, because the zero of an angle is a convention."""
 
-RIGID = "because rigid (a relative change is undefined)"
-FREE = "because free (C is infinite, or does not depend on it)"
-OPENS = "because the legs would no longer close if one of them changed alone"
+BECAUSE_RIGID = "because rigid (a relative change is undefined)"
+BECAUSE_FREE = "because free (C is infinite, or does not depend on it)"
+BECAUSE_OPEN = "because the legs would no longer close if one of them changed alone"
+"""Reasons why there is no derivative by a parameter."""
 
 
 def greatest_of(percents: Array) -> float:
@@ -85,8 +86,8 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
 
     Args:
         slope: derivative of the index by the parameter, SI.
-        size: what one percent of a change of the parameter is of, SI; see `measure_of`.
-        index: SI.
+        size: the amount of which one percent is a percent of change of the parameter, SI; see `measure_of`.
+        index: the index, SI.
     """
     with np.errstate(all="ignore"):
         ratio = np.multiply(size, slope) / index
@@ -95,14 +96,14 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
 
 
 def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
-    """Return what one percent of a change of a parameter is of, SI, and the name of that measure.
+    """Return the amount of which one percent is a percent of change of a parameter, SI, and the name of that measure.
 
     It is the parameter itself, except for a length of zero, where it is the characteristic length of the machine, and
     for an angle, where it is 1 rad.
 
     Args:
-        kind: of the parameter, a key of `units.KINDS`; the entries of a direction are measured by its length instead.
-        value: of the parameter, SI.
+        kind: kind of the parameter, a key of `units.KINDS`; entries of a direction are measured by its length instead.
+        value: value of the parameter, SI.
         length: characteristic length, m.
     """
     if kind == "length" and abs(value) <= ZERO_LENGTH * length:
@@ -115,13 +116,13 @@ class Influence(ImmutableAnswer):
     """The effect of one parameter on the indices.
 
     Attributes:
-        path: of the parameter.
-        kind: a key of `units.KINDS`.
-        value: SI.
-        percent_of: what one percent of a change is of, SI: the value itself, or a `measure`.
+        path: path of the parameter.
+        kind: kind of the parameter, a key of `units.KINDS`.
+        value: its value, SI.
+        percent_of: the amount of which one percent is a percent of change, SI: the value itself, or a `measure`.
         measure: "itself", "length" where a length is zero (the machine's characteristic length), "radian" of an angle
             (whose percent is 0.01 rad), or "axis" (the direction's length).
-        derivatives: of each index by it, SI; NaN where the index is infinite [indices].
+        derivatives: derivative of each index by it, SI; NaN where the index is infinite [indices].
         percents: percent by which each index changes per percent of a change; NaN where the index is infinite, or 0 up
             to round-off.
     """
@@ -153,14 +154,14 @@ class Sensitivity(ImmutableAnswer):
 
     Attributes:
         machine: the machine.
-        status: of the pose; all that follows is empty unless it is OK.
+        status: status of the pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         quantities: names of the indices.
         indices: their values, SI; infinite where rigid or free, 0 where they are only round-off.
-        characteristic_length: of the machine, m.
-        parameters: those that have an influence, the greatest first.
+        characteristic_length: characteristic length of the machine, m.
+        parameters: parameters that have an influence, the greatest first.
         without_influence: paths of those that have none.
-        without_derivative: paths of those without a derivative, and why.
+        without_derivative: paths of those without a derivative, each with the reason.
         loads_left_out: a sentence on the loads of the file that do not count; empty where all do.
     """
 
@@ -194,7 +195,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     Derivatives are exact. In a machine written leg by leg, the joints follow each change so that the legs stay closed.
 
     Args:
-        machine: with its pose, or its state, as `state_of` returns it.
+        machine: the machine at its pose, or its state, as `state_of` returns it.
         quantities: names of quantities or groups.
 
     Raises:
@@ -284,10 +285,10 @@ def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[st
     """Why there is no derivative by a parameter; empty if there is one."""
     value = here[parameter.path]
     if math.isinf(value):
-        return RIGID
+        return BECAUSE_RIGID
     if parameter.quantity.stiff and value == 0.0:
-        return FREE
-    return OPENS if all(math.isnan(slope) for slope in slopes[parameter.path]) else ""
+        return BECAUSE_FREE
+    return BECAUSE_OPEN if all(math.isnan(slope) for slope in slopes[parameter.path]) else ""
 
 
 def _influence(
@@ -299,8 +300,15 @@ def _influence(
         size, measure = math.hypot(*(here[f"{field}.{i}"] for i in range(3))), "axis"
     else:
         size, measure = measure_of(kind, here[path], length)
-    percents = relative_sensitivity(np.array(slopes), size, indices)
-    return Influence(path, kind, here[path], size, measure, np.array(slopes, dtype=float), percents)
+    return Influence(
+        path=path,
+        kind=kind,
+        value=here[path],
+        percent_of=size,
+        measure=measure,
+        derivatives=np.array(slopes, dtype=float),
+        percents=relative_sensitivity(np.array(slopes), size, indices),
+    )
 
 
 def notes(answer: Sensitivity) -> Iterator[str]:

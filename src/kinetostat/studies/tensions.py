@@ -41,7 +41,8 @@ else:  # only a grid needs them, and labelled datasets take longer to import tha
     datasets = LateModule("kinetostat.studies.datasets")
 
 SAG_MATTERS = 0.95
-"""Share of the stiffness of a straight cable below which a cable's sag is said to matter."""
+"""Share of the stiffness of a straight cable below which a cable's sag is said to matter: Young's modulus of a rope is
+hardly known better than to a twentieth."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,11 @@ class CableState:
     """A cable at the pose.
 
     Attributes:
-        name: of its leg.
-        tension: at the platform, N; None where no tensions hold the load.
-        base_tension: where it leaves the base, N; the same of a straight cable.
+        name: name of its leg.
+        tension: tension at the platform, N; None where no tensions hold the load.
+        base_tension: tension where it leaves the base, N; the same of a straight cable.
         reserve: distance of the tension from the nearer of its bounds, N.
-        length: unstretched, from where it leaves the base to the platform, with what lies on its pulley, m.
+        length: unstretched length from where it leaves the base to the platform, with what lies on its pulley, m.
         sag: greatest distance from the line of its ends, m.
         stiffness_share: share of a straight cable's stiffness along the line of its ends.
     """
@@ -72,15 +73,15 @@ class Tensions(ImmutableAnswer):
     """Tensions of the cables of a machine.
 
     Attributes:
-        machine: at its pose, with its loads.
+        machine: the machine at its pose, with its loads.
         status: OK, or NO_REST where no tensions within the bounds hold the load.
         message: the answer in a sentence.
-        cables: every cable.
+        cables: all cables.
         bounds: least and greatest tension that are allowed, N; the greatest one may be infinite.
         capacity: how far the load with its box, or every required wrench, is inside the set of wrenches that the
             cables can hold, N, moments over the length of the machine; negative where they cannot hold them.
         wrench_closure: positive where cables without an upper bound hold any wrench.
-        required: how many wrenches the capacity is about.
+        required: number of wrenches that the capacity is about.
     """
 
     machine: Machine
@@ -113,7 +114,7 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
     """Choose the tensions of a machine whose legs are cables, within the bounds of its [load] and as [cables] says.
 
     Args:
-        machine: with its pose and loads, or its state.
+        machine: the machine at its pose with its loads, or its state.
         wrenches: loads that must be held at this pose, for the capacity: a DataFrame, a dictionary or a CSV file with
             columns such as "load.force.2" or "tool.payload" as `evaluate` takes them; the cables can then hold all
             mixtures of them as well.
@@ -121,33 +122,33 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
     Raises:
         InputError: a leg is not a cable, nothing says what weighs, or `wrenches` cannot be read or move the pose.
     """
-    given = state_of(machine).machine
-    signs = cable_signs(given)
+    machine = state_of(machine).machine
+    signs = cable_signs(machine)
     if not signs:
-        raise InputError(f'{given.name} has legs that are not cables; write every leg with type = "cable".')
+        raise InputError(f'{machine.name} has legs that are not cables; write every leg with type = "cable".')
     with np.errstate(all="ignore"):
-        cables = cables_of(given, signs, 1)
-        required = None if wrenches is None else _required_loads(given, wrenches)
+        cables = cables_of(machine, signs, 1)
+        required = None if wrenches is None else _required_loads(machine, wrenches)
         capacity = float(cables.capacity(required)[0])
-        closed = float(wrench_closure(cables.wrenches)[0])
+        closure = float(wrench_closure(cables.wrenches)[0])
     exist = bool(cables.tensions[1][0])
-    states = _states(given, cables)
-    show = given.display.show
+    states = _cable_states(machine, cables)
+    show = machine.display.show
     if exist:
         sizes = [cable.tension for cable in states if cable.tension is not None]
         ends = f"{show(min(sizes), 'N')} to {show(max(sizes), 'N')}"
         message = f"Tensions from {ends} hold the load."
     else:
-        message = why_no_tensions(given)
+        message = why_no_tensions(machine)
     return Tensions(
-        given,
-        Status.OK if exist else Status.NO_REST,
-        message,
-        states,
-        (float(cables.least[0]), float(cables.most[0])),
-        capacity,
-        closed,
-        1 if required is None else len(required),
+        machine=machine,
+        status=Status.OK if exist else Status.NO_REST,
+        message=message,
+        cables=states,
+        bounds=(float(cables.least[0]), float(cables.most[0])),
+        capacity=capacity,
+        wrench_closure=closure,
+        required=1 if required is None else len(required),
     )
 
 
@@ -161,29 +162,29 @@ def _required_loads(machine: Machine, wrenches: Any) -> Array:
     return cables_of(placed, cable_signs(machine), columns.count).load
 
 
-def _states(machine: Machine, cables: Cables) -> tuple[CableState, ...]:
-    chosen, shape = cables.tensions[0][0], cables.shape
+def _cable_states(machine: Machine, cables: Cables) -> tuple[CableState, ...]:
+    tensions_or_nan, shape = cables.tensions[0][0], cables.shape
     straight = np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))[0]
-    slack = np.where(np.isnan(chosen), 0.0, chosen) / cables.stiffness[0]
-    lengths = (straight - slack if shape is None else shape.length[0]) + cables.wound[0]
-    ends = chosen if shape is None else shape.base_tension[0]
-    sags, shares = (
-        (np.zeros(len(chosen)), np.ones(len(chosen))) if shape is None else (shape.sag[0], shape.stiffness_share[0])
-    )
+    if shape is None:
+        stretch = np.where(np.isnan(tensions_or_nan), 0.0, tensions_or_nan) / cables.stiffness[0]
+        lengths, base_tensions = straight - stretch, tensions_or_nan
+        sags, shares = np.zeros(len(straight)), np.ones(len(straight))
+    else:
+        lengths, base_tensions = shape.length[0], shape.base_tension[0]
+        sags, shares = shape.sag[0], shape.stiffness_share[0]
+    least, most = float(cables.least[0]), float(cables.most[0])
     states = []
     for number, steps in enumerate(machine.chains().legs):
-        name = next(spring.of for step in steps for spring in step.element.springs).rpartition(" ")[0]
-        tension = None if math.isnan(chosen[number]) else float(chosen[number])
-        least, most = float(cables.least[0]), float(cables.most[0])
+        tension = None if math.isnan(tensions_or_nan[number]) else float(tensions_or_nan[number])
         states.append(
             CableState(
-                name,
-                tension,
-                None if tension is None else float(ends[number]),
-                None if tension is None else min(tension - least, most - tension),
-                float(lengths[number]),
-                float(sags[number]),
-                float(shares[number]),
+                name=next(spring.of for step in steps for spring in step.element.springs).rpartition(" ")[0],
+                tension=tension,
+                base_tension=None if tension is None else float(base_tensions[number]),
+                reserve=None if tension is None else min(tension - least, most - tension),
+                length=float(lengths[number] + cables.wound[0][number]),
+                sag=float(sags[number]),
+                stiffness_share=float(shares[number]),
             )
         )
     return tuple(states)
