@@ -327,9 +327,10 @@ def failures(dataset: xr.Dataset) -> dict[Status, int]:
 MOST_RANGES_OF_MAPS = 2
 """Greatest number of ranges of the maps of a report: a map has two axes."""
 PROBE_STEPS = 48
-"""Number of poses to each side that are tried along a coordinate."""
+"""Number of poses to each side that are tried along a coordinate: its range is then known to two percent."""
 LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}
-"""Largest distance from the pose, by kind of coordinate: in units of the characteristic length, and in rad."""
+"""Largest distance from the pose, by kind of coordinate: in units of the characteristic length, and in rad: over as
+much, machines of this size commonly work."""
 LARGEST_REACH_IN_LIMITS = {"length": 1.0, "angle": math.radians(90.0)}
 """The same for a machine whose file has limits, which then end its ranges."""
 LEAST_MARGIN_SHARE = 0.1

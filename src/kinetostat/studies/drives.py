@@ -33,12 +33,14 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.dynamics import rigid_form_of, senses_of_drives
+from kinetostat.studies.dynamics import places_of_drives, rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
 
+MOST_NAMED = 3
+"""Drives that a sentence names."""
 PASSABLE = (*REGULAR, Status.UNDECIDED)
 """Statuses of poses at which drives have forces: limits of the file are compared with, but stop no motion."""
 
@@ -53,7 +55,7 @@ class DriveLoad:
         turns: rotation of its rotor, rad per m or rad of its coordinate; 1 where the file gives neither lead nor ratio:
             its motor is then the drive itself.
         rotary: whether its motor turns.
-        coordinate: least and greatest.
+        coordinate: least and greatest coordinate.
         speed, acceleration, force: greatest sizes at the drive.
         rms_force: root of the mean square of the force over time.
         parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
@@ -196,8 +198,8 @@ def drives(
             the platform may be columns, such as force.x [N]. None for a speed and an acceleration of the platform
             point at the pose of the machine, in the worst directions; without these, for the motion of the file's
             requirements.
-        points: about how many points of the motion are looked at.
-        speed, acceleration: without a motion: of the platform point, m/s and m/s² or texts with a unit.
+        points: number of points of the motion that are looked at, about.
+        speed, acceleration: those of the platform point, without a motion: m/s and m/s², or texts with a unit.
 
     Raises:
         InputError: the file is not a motion, or the drives do not hold the machine.
@@ -301,17 +303,14 @@ def _has_forces(state: MachineState, form: RigidForm) -> bool:
 def _coordinates(state: MachineState, motion: Motion) -> Array:
     """Coordinates of the drives along a motion [drives x n]."""
     machine, count = state.machine, motion.path.size
-    driven = driven_springs(state.configuration)
-    every = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
-    chosen = [number for number, spring in enumerate(every) if any(spring is other for other in driven)]
     with np.errstate(all="ignore"):
         states = states_at(machine, motion.path.columns, count)
         if states.joints is None:
             actuators = actuators_of(states.configuration)
         else:
             actuators = [a.at(states.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
-        rows = stacked_columns([actuators[number].coordinate for number in chosen], count).T
-    slides = np.array([spring.joint.point is None for spring in driven])
+        rows = stacked_columns([actuators[place].coordinate for place in places_of_drives(state)], count).T
+    slides = np.array([spring.joint.point is None for spring in driven_springs(state.configuration)])
     return np.where(slides[:, None], rows, np.unwrap(rows, axis=1))
 
 
@@ -340,7 +339,7 @@ class _Motors:
 def _motors_of(state: MachineState) -> _Motors:
     springs = driven_springs(state.configuration)
     numbers = [numbers_of_drive(state.machine, "drives", spring) for spring in springs]
-    turns = np.array([float(rotor_turns(spring, given)) for spring, given in zip(springs, numbers, strict=True)])
+    turns = np.array([float(rotor_turns(spring, table)) for spring, table in zip(springs, numbers, strict=True)])
     slides = np.array([spring.joint.point is None for spring in springs])
     return _Motors(tuple(springs), tuple(numbers), np.where(turns > 0.0, turns, 1.0), ~slides | (turns > 0.0))
 
@@ -361,8 +360,17 @@ def _curves(state: MachineState, motors: _Motors, motion: Motion, forces: PathFo
     power = torque * speed * turns
     steps = 0.5 * (power[:, 1:] + power[:, :-1]) * np.diff(motion.times)
     energy = np.concatenate([np.zeros((len(power), 1)), np.cumsum(steps, axis=1)], axis=1)
-    place = _coordinates(state, motion)
-    return DriveCurves(place, speed, acceleration, force, parts, speed * turns, torque, power, energy)
+    return DriveCurves(
+        coordinate=_coordinates(state, motion),
+        speed=speed,
+        acceleration=acceleration,
+        force=force,
+        parts=parts,
+        motor_speed=speed * turns,
+        motor_torque=torque,
+        power=power,
+        net_energy=energy,
+    )
 
 
 def root_mean_square(times: Array, rows: Array) -> Array:
@@ -410,7 +418,7 @@ def _wrong_signs(state: MachineState, curves: DriveCurves) -> str:
     wrong = [name_of(spring) for spring, row in rows if spring.acts and (row * signs[spring.acts]).max() > 0.0]
     if not wrong:
         return ""
-    shown = ", ".join(wrong[:3]) + (", ..." if len(wrong) > 3 else "")
+    shown = ", ".join(wrong[:MOST_NAMED]) + (", ..." if len(wrong) > MOST_NAMED else "")
     return f" {shown} cannot do what would be asked of them: they carry loads of one sign only."
 
 
@@ -425,13 +433,14 @@ def _limits_passed(motion: Motion, codes: Codes) -> str:
 
 def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> str:
     show = machine.display.show
-    worst = max(summaries, key=lambda drive: drive.motor_torque)
-    fast = max(summaries, key=lambda drive: drive.motor_speed)
-    speed = f"{fast.motor_speed * 30.0 / np.pi:.4g} 1/min" if fast.rotary else show(fast.motor_speed, "m") + "/s"
-    hot = max(summaries, key=lambda drive: drive.rms_torque)
-    mean = "" if motion.timeless else f"{show(hot.rms_torque, hot.motor_unit)} RMS at most ({hot.name}), "
+    strongest = max(summaries, key=lambda drive: drive.motor_torque)
+    fastest = max(summaries, key=lambda drive: drive.motor_speed)
+    rate = f"{fastest.motor_speed * 30.0 / np.pi:.4g} 1/min"
+    speed = rate if fastest.rotary else show(fastest.motor_speed, "m") + "/s"
+    hottest = max(summaries, key=lambda drive: drive.rms_torque)
+    mean = "" if motion.timeless else f"{show(hottest.rms_torque, hottest.motor_unit)} RMS at most ({hottest.name}), "
     return (
         f"{'In' if motion.timeless else 'Along'} {motion.kind}, the motors give up to "
-        f"{show(worst.motor_torque, worst.motor_unit)} ({worst.name}), {mean}at up to {speed}, and up to "
+        f"{show(strongest.motor_torque, strongest.motor_unit)} ({strongest.name}), {mean}at up to {speed}, and up to "
         f"{max(drive.power[0] for drive in summaries):.4g} W each."
     )

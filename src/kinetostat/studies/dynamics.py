@@ -37,8 +37,8 @@ class Dynamics(ImmutableAnswer):
     M, C and g, but in `forces`.
 
     Attributes:
-        state: the machine at its pose.
-        form: what decides its equations.
+        state: the state of the machine at its pose.
+        form: the form of its equations: all that does not depend on the pose.
         coordinates: names of the coordinates of the pose.
         drives: names of the drives.
     """
@@ -58,12 +58,12 @@ class Dynamics(ImmutableAnswer):
         )
 
     @cached_property
-    def _machine_here(self) -> MachineAtPose:
+    def _at_pose(self) -> MachineAtPose:
         return self.form.at(self.state)
 
     @cached_property
     def _at_rest(self) -> Operators:
-        return operators(self._machine_here, dict.fromkeys(self.coordinates, 0.0))
+        return operators(self._at_pose, dict.fromkeys(self.coordinates, 0.0))
 
     @cached_property
     def senses(self) -> Array:
@@ -90,9 +90,9 @@ class Dynamics(ImmutableAnswer):
         """C over the pose at some rates of its coordinates [coordinates x coordinates]; dM/dt - 2 C is skew-symmetric.
 
         Args:
-            rates: of the coordinates in their order, m/s and rad/s.
+            rates: rates of the coordinates in their order, m/s and rad/s.
         """
-        return np.array(operators(self._machine_here, self._by_name(rates)).coriolis, dtype=float)
+        return np.array(operators(self._at_pose, self._by_name(rates)).coriolis, dtype=float)
 
     @property
     def mass_at_drives(self) -> Array:
@@ -113,7 +113,7 @@ class Dynamics(ImmutableAnswer):
         """C over the drives at some speeds of theirs [drives x drives]; errors as of `mass_at_drives`.
 
         Args:
-            speeds: of the drives in their order, m/s and rad/s.
+            speeds: speeds of the drives in their order, m/s and rad/s.
         """
         self._check_square()
         return self._over_drives(np.linalg.solve(self.jacobian, np.asarray(speeds, dtype=float)).tolist())[1]
@@ -126,26 +126,26 @@ class Dynamics(ImmutableAnswer):
         friction, and bends flexure hinges; their sum is what a drive does.
 
         Args:
-            rates: of the coordinates in their order, m/s and rad/s.
-            accelerations: of the same, m/s² and rad/s².
+            rates: rates of the coordinates in their order, m/s and rad/s.
+            accelerations: their accelerations, m/s² and rad/s².
         """
-        here = self._machine_here
-        _, demand_by_part = forces_along(here, PoseRates(self._by_name(rates), self._by_name(accelerations)))
-        length = float(here.rigid.length)
-        units = self.senses * [1.0 if drive.slides else length for drive in here.rigid.drives]
+        at_pose = self._at_pose
+        _, demand_by_part = forces_along(at_pose, PoseRates(self._by_name(rates), self._by_name(accelerations)))
+        length = float(at_pose.rigid.length)
+        units = self.senses * [1.0 if drive.slides else length for drive in at_pose.rigid.drives]
         return {
-            part: np.array(drive_forces(here.rigid, here.statics, demand_by_part[part]), dtype=float) * units
+            part: np.array(drive_forces(at_pose.rigid, at_pose.statics, demand_by_part[part]), dtype=float) * units
             for part in PARTS
         }
 
     def _by_name(self, numbers: Sequence[float]) -> dict[str, float]:
-        given = [float(number) for number in numbers]
-        if len(given) != len(self.coordinates):
+        row = [float(number) for number in numbers]
+        if len(row) != len(self.coordinates):
             raise InputError(
-                f"There are {len(given)} numbers; give one for each coordinate of the pose: "
+                f"There are {len(row)} numbers; give one for each coordinate of the pose: "
                 f"{', '.join(self.coordinates)}."
             )
-        return dict(zip(self.coordinates, given, strict=True))
+        return dict(zip(self.coordinates, row, strict=True))
 
     def _check_square(self) -> None:
         if len(self.drives) != len(self.coordinates):
@@ -156,21 +156,26 @@ class Dynamics(ImmutableAnswer):
 
     def _over_drives(self, rates: Sequence[float]) -> tuple[Array, Array, Array]:
         self._check_square()
-        whole: tuple[list[Row], list[Row], Row] = operators(self._machine_here, self._by_name(rates)).at_drives()
+        whole: tuple[list[Row], list[Row], Row] = operators(self._at_pose, self._by_name(rates)).at_drives()
         mass, coriolis, gravity = (np.array(part, dtype=float) for part in whole)
-        both = np.outer(self.senses, self.senses)
-        return mass * both, coriolis * both, gravity * self.senses
+        signs = np.outer(self.senses, self.senses)
+        return mass * signs, coriolis * signs, gravity * self.senses
+
+
+def places_of_drives(state: MachineState) -> list[int]:
+    """Places of the drives among all actuators of a machine, of which some may be free and drive nothing."""
+    actuators = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
+    driven = driven_springs(state.configuration)
+    return [place for place, spring in enumerate(actuators) if any(spring is drive for drive in driven)]
 
 
 def senses_of_drives(state: MachineState) -> Array:
     """1 where the coordinate of a drive grows as its joint moves forward, else -1 [drives], at a single pose."""
-    every = [spring for leg in state.configuration.legs for spring in leg.springs if spring.actuated]
     if state.machine.family.chains is None:
         senses = np.array(senses_of(state.configuration), dtype=float)
     else:
         senses = np.array([a.sign for a in joint_actuators(state.machine.chains(), leg_names(state.machine))])
-    driven = driven_springs(state.configuration)
-    return np.asarray(senses[[any(spring is other for other in driven) for spring in every]])
+    return np.asarray(senses[places_of_drives(state)])
 
 
 @checked
@@ -178,7 +183,7 @@ def dynamics(machine: Machine | MachineState) -> Dynamics:
     """Take the equations of motion of a machine of rigid parts at its pose.
 
     Args:
-        machine: with its masses: those of platform, payload, links and rotors.
+        machine: the machine with its masses: those of platform, payload, links and rotors.
 
     Raises:
         InputError: the machine has no place at its pose, or its drives do not hold all of its motions.

@@ -44,8 +44,10 @@ from kinetostat.studies.tensions import tensions
 from kinetostat.studies.under_load import under_load
 from kinetostat.studies.vibration import modes
 
-MAP_POINTS, GUIDELINE_POINTS = 41, 7
-"""Points along each coordinate of the maps, and of the poses at which guidelines are tried."""
+MAP_POINTS = 41
+"""Points along each coordinate of the maps: contours between them are smooth on a page."""
+GUIDELINE_POINTS = 7
+"""Points along each coordinate at which guidelines are tried: some fifty poses, in half a second."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 """Parts that take time and may be left out; an independent engine computes validation (`views.report.writing`)."""
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."

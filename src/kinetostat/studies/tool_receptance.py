@@ -7,6 +7,7 @@ The first line names the columns: "frequency [Hz]", and for each entry a real an
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,11 +19,13 @@ from kinetostat.studies.poses import GivenColumn, column_values, columns_of
 from kinetostat.vibration.receptance import FreeTool
 
 _HEAD = re.compile(r"(tip|flange)\.(r?[xyz])\s*/\s*(tip|flange)\.(r?[xyz])\s+(real|imaginary)")
+"""The head of a column: what moves, what is pushed, and the part of the number."""
 FREQUENCY = "frequency"
+"""Name of the column of frequencies."""
 KINDS = {(False, False): "linear compliance", (True, True): "torsional compliance"}
 """Kind of an entry by whether a rotation is moved and a moment pushes; all others are rad/N, the same as m/(N·m)."""
 
-Key = tuple[str, int, str, int]
+Key: TypeAlias = tuple[str, int, str, int]
 """Place and component that move, then place and component of the force."""
 
 
@@ -32,7 +35,7 @@ def read_tool(path: str | Path) -> FreeTool:
     Entries are symmetric, so that one of each pair is enough; those between components that no column names are zero.
 
     Args:
-        path: of a CSV file with rising frequencies.
+        path: path of a CSV file with rising frequencies.
 
     Raises:
         InputError: the file cannot be read, a column or a frequency is wrong, a part or the flange is missing, or the
@@ -51,7 +54,7 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
     frequencies: Array | None = None
     for column in columns:
         if column.name == FREQUENCY:
-            frequencies = column_values(column, Quantity("frequency", ""), lambda name, i: f"line {numbers[i]}, {name}")
+            frequencies = _values(column, Quantity("frequency", ""), numbers)
             continue
         match = _HEAD.fullmatch(column.name)
         if match is None:
@@ -59,8 +62,9 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
                 f"{shorten(column.name)} is not a column of a receptance; write frequency [Hz], or such as "
                 f"tip.x/flange.ry real: tip or flange, and one of {', '.join(COMPONENTS)}, on both sides."
             )
-        moved, pushed = (COMPONENTS.index(match[2]), COMPONENTS.index(match[4]))
-        parts[(match[1], moved, match[3], pushed), match[5]] = _values(column, moved, pushed, numbers)
+        moved, pushed = COMPONENTS.index(match[2]), COMPONENTS.index(match[4])
+        kind = KINDS.get((moved < 3, pushed < 3), "coupling compliance")
+        parts[(match[1], moved, match[3], pushed), match[5]] = _values(column, Quantity(kind, ""), numbers)
     if frequencies is None or len(frequencies) < 2:
         raise InputError("it needs a column frequency [Hz] with at least two lines.")
     falling = np.flatnonzero(np.diff(frequencies) <= 0.0)
@@ -70,8 +74,8 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
     return _free_tool(frequencies, _entries(parts))
 
 
-def _values(column: GivenColumn, moved: int, pushed: int, numbers: list[int]) -> Array:
-    quantity = Quantity(KINDS.get((moved < 3, pushed < 3), "coupling compliance"), "")
+def _values(column: GivenColumn, quantity: Quantity, numbers: list[int]) -> Array:
+    """The values of a column, SI; messages name the line of a value by the numbers of the lines."""
     return column_values(column, quantity, lambda name, i: f"line {numbers[i]}, {name}")
 
 
@@ -80,12 +84,12 @@ def _entries(parts: Mapping[tuple[Key, str], Array]) -> dict[Key, Complex]:
     entries: dict[Key, Complex] = {}
     for key in dict.fromkeys(key for key, _ in parts):
         text = f"{key[0]}.{COMPONENTS[key[1]]}/{key[2]}.{COMPONENTS[key[3]]}"
-        both = [parts.get((key, part)) for part in ("real", "imaginary")]
-        if both[0] is None or both[1] is None:
-            missing = "real" if both[0] is None else "imaginary"
+        real, imaginary = (parts.get((key, part)) for part in ("real", "imaginary"))
+        if real is None or imaginary is None:
+            missing = "real" if real is None else "imaginary"
             raise InputError(f"{text} has no column {missing}; add it, with zeros where it is nothing.")
-        entries[key] = both[0] + 1.0j * both[1]
-        if key[:2] == key[2:] and np.median(both[1]) > 0.0:
+        entries[key] = real + 1.0j * imaginary
+        if key[:2] == key[2:] and np.median(imaginary) > 0.0:
             raise InputError(
                 f"the imaginary parts of {text} are positive, as of a tool that gains energy; receptances are of "
                 "motions exp(+i omega t): change the sign of all imaginary parts."
@@ -112,5 +116,5 @@ def _free_tool(frequencies: Array, entries: Mapping[Key, Complex]) -> FreeTool:
         rows = [[entries.get((moved, i, pushed, k), zeros) for k in places[pushed]] for i in places[moved]]
         return np.moveaxis(np.array(rows), 2, 0)
 
-    tip, flange = tuple(places["tip"]), tuple(places["flange"])
-    return FreeTool(frequencies, tip, flange, matrix("tip", "tip"), matrix("tip", "flange"), matrix("flange", "flange"))
+    at_tip, across, at_flange = (matrix(*ends) for ends in (("tip", "tip"), ("tip", "flange"), ("flange", "flange")))
+    return FreeTool(frequencies, tuple(places["tip"]), tuple(places["flange"]), at_tip, across, at_flange)

@@ -37,9 +37,10 @@ from kinetostat.studies.attribution import Softest, softest
 from kinetostat.tolerances import LEAST_DIVISOR, ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
+"""The last sentence about a machine that does not stand."""
 CURVE_SHARES = tuple(i / 12 for i in range(16))
-"""Shares of the loads at which a curve is drawn: up to 125 %."""
-MOVING = 0.5
+"""Shares of the loads at which a curve is drawn: up to 125 %, so that it shows what a little more load would do."""
+LEAST_NAMED_MOTION = 0.5
 """Share of the largest motion above which a leg is named among those that move."""
 
 
@@ -162,9 +163,7 @@ class LoadedState(AnswerInState):
             known, statics = springs(free.configuration), clean_statics(free.statics)
         blocks = free_stiffnesses(self.tangent, self.compliance, self.machine.family.components) or {}
         weakest = {name: softest(block, name, known, statics) for name, block in blocks.items()}
-        return {
-            name: _with_shares_of_springs(direction) for name, direction in weakest.items() if direction is not None
-        }
+        return {name: _with_shares_of_springs(way) for name, way in weakest.items() if way is not None}
 
     def __repr__(self) -> str:
         return f"<{self.machine.name!r} under load: {self.rest.word}>"
@@ -239,9 +238,9 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), last)
         states, rest_state = _spring_states(solution.balance), solution.balance.state
-        known, last = (1.0, rest_state) if solution.settled[0] else (math.nan, last)
-        displacements.append(known * _in_si(mechanism, rest_state.platform.amounts()[0], parts))
-        loads.append([known * spring.load for spring in states])
+        one_or_nan, last = (1.0, rest_state) if solution.settled[0] else (math.nan, last)
+        displacements.append(one_or_nan * _in_si(mechanism, rest_state.platform.amounts()[0], parts))
+        loads.append([one_or_nan * spring.load for spring in states])
     return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in states), np.array(loads))
 
 
@@ -305,16 +304,22 @@ def _spring_states(equations: Balance) -> list[SpringState]:
     mechanism, coordinates = equations.mechanism, equations.state.coordinates
     length, force = float(mechanism.length[0]), float(mechanism.force[0])
     states = []
-    for leg, terms, moved in zip(mechanism.legs, equations.legs, coordinates, strict=True):
+    for leg, terms, amounts in zip(mechanism.legs, equations.legs, coordinates, strict=True):
         for i, spring in enumerate(leg.springs):
             if spring is None:
                 continue
-            turning = spring.joint.point is not None
-            load = float(terms.loads[0, i]) * force * (length if turning else 1.0)
-            amount = float(moved[0, i]) * (1.0 if turning else length)
-            amount = 0.0 if abs(moved[0, i]) < UNMOVED_TOOL else amount
-            slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
-            states.append(SpringState(spring.name, leg.name, turning, bool(spring.actuated), load, amount, slack))
+            turning, amount = spring.joint.point is not None, float(amounts[0, i])
+            states.append(
+                SpringState(
+                    name=spring.name,
+                    leg=leg.name,
+                    turning=turning,
+                    actuated=bool(spring.actuated),
+                    load=float(terms.loads[0, i]) * force * (length if turning else 1.0),
+                    deformation=0.0 if abs(amount) < UNMOVED_TOOL else amount * (1.0 if turning else length),
+                    slack=bool(leg.sign[i]) and terms.carrying[0, i] == 0.0,
+                )
+            )
     return states
 
 
@@ -325,14 +330,13 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array
         return None
     start = balance(mechanism, free_state(mechanism))
     step = solve(start, -start.left[:, :, None], loaded=False)[0, :, 0]
-    size = mechanism.ways.shape[1]
-    return _in_si(mechanism, mechanism.ways @ step[:size], parts)
+    return _in_si(mechanism, mechanism.ways @ step[: mechanism.ways.shape[1]], parts)
 
 
 def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> Array:
     """Components of a displacement in rad and m; round-off is set to zero."""
-    moved = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
-    cleaned = clean_screw(Twist(Vector(*moved[:3]), Vector(*moved[3:])), 1.0).components()
+    numbers = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
+    cleaned = clean_screw(Twist(Vector(*numbers[:3]), Vector(*numbers[3:])), 1.0).components()
     return np.array(cleaned)[parts] * mechanism.twist_units[0, parts]
 
 
@@ -434,9 +438,9 @@ def how_it_gives_way(limit: LoadLimit | None) -> str:
 
 
 def moving_legs(equations: Balance, stability: Stability) -> list[str]:
-    """The legs that move more than `MOVING` times as much as the one that moves most when a state gives way."""
+    """The legs that move most when a state gives way, and those that move at least half as much."""
     legs = zip(equations.mechanism.legs, stability.legs, strict=True)
-    return [leg.name for leg, size in legs if size > MOVING * max(stability.legs)]
+    return [leg.name for leg, size in legs if size > LEAST_NAMED_MOTION * max(stability.legs)]
 
 
 def _slack_legs(equations: Balance) -> tuple[str, ...]:
