@@ -59,8 +59,8 @@ def _without_repetitions(points: Array) -> Array:
     _, first = np.unique(np.round(points / scale), axis=0, return_index=True)
     kept = points[np.sort(first)]
     # Rounding may part two points that are one: what is left is compared directly.
-    apart = np.abs(kept[:, None] - kept[None]).max(axis=2) > 2.0 * scale
-    return np.asarray(kept[[bool(apart[i, :i].all()) for i in range(len(kept))]])
+    differs = np.abs(kept[:, None] - kept[None]).max(axis=2) > 2.0 * scale
+    return np.asarray(kept[[bool(differs[i, :i].all()) for i in range(len(kept))]])
 
 
 def outline(normals: Array, bounds: Array, reach: float) -> Array:
@@ -90,7 +90,7 @@ UNBOUNDED_FORCE = 1e300
 FARTHEST_FACE = 1e200
 """Distance beyond which a face exists only because of `UNBOUNDED_FORCE`."""
 MOST_NUMBERS = 120_000
-"""Greatest number of entries of an array in a slab, so that it stays in the second level of the cache."""
+"""Greatest number of entries of an array in a slab: 1 MB, so that it stays in the second level of the cache."""
 
 
 @dataclass(frozen=True)
@@ -178,17 +178,20 @@ def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: A
     result = np.empty(count)
     half = np.zeros((count, size)) if box is None else box
     for part in _slabs(count, size, forces):
-        across = faces(wrenches[part].transpose(1, 2, 0))
-        above, below = across.ends(least[part].T, most[part].T)
-        along = np.stack(
-            [sum(a * b for a, b in zip(across.normals, w.T, strict=True)) for w in required[part].transpose(1, 0, 2)]
-        )
-        of_box = sum(a * b for a, b in zip(np.abs(across.normals), half[part].T, strict=True))
-        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - of_box
-        known = ~np.isnan(across.normals[0])
+        faces_of_part = faces(wrenches[part].transpose(1, 2, 0))
+        normals = faces_of_part.normals
+        above, below = faces_of_part.ends(least[part].T, most[part].T)
+        along = np.stack([_dot(normals, wrench.T) for wrench in required[part].transpose(1, 0, 2)])
+        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - _dot(np.abs(normals), half[part].T)
+        known = ~np.isnan(normals[0])
         distance = np.where(known, inside, np.inf).min(axis=0)
         result[part] = np.where(known.any(axis=0), np.where(distance > FARTHEST_FACE, np.inf, distance), np.nan)
     return result
+
+
+def _dot(normals: Array, wrenches: Array) -> Array:
+    """Products of normals [d x faces x n] with wrenches [d x n], added up over d in order [faces x n]."""
+    return np.asarray(sum(normal * wrench for normal, wrench in zip(normals, wrenches, strict=True)))
 
 
 def wrench_closure(wrenches: Array) -> Array:

@@ -44,7 +44,7 @@ else:
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Beginning of the names of entries, by the name of the matrix."""
 MACHINES_KEPT = 8
-"""Number of machines, by identity, whose facts that do not depend on the poses are kept."""
+"""Machines, by identity, whose facts that do not depend on the poses are kept: as many as a program mostly compares."""
 
 
 @dataclass(frozen=True)
@@ -145,19 +145,22 @@ class Buffers:
         """
         direct, self._function, self._count = function.direct, function, count
         program = direct.program if direct and isinstance(direct.program, Program) else None
+        # A program fills all lanes of a vector register: memory has room for one register at least.
         room = max(count, program.lanes) if program else count
-        whole, every = np.repeat(np.asarray(start, dtype=float)[:, None], room, axis=1), np.empty((function.rows, room))
+        inputs = np.repeat(np.asarray(start, dtype=float)[:, None], room, axis=1)
+        results = np.empty((function.rows, room))
         self._codes = bytearray(room)
         codes = np.frombuffer(self._codes, dtype=np.int8)
-        self.inputs, self.results, self.status = whole[:, :count], every[:, :count], codes[:count]
+        self.inputs, self.results, self.status = inputs[:, :count], results[:, :count], codes[:count]
         rows = dict(zip(function.paths, places, strict=True))
         self._columns = {path: self.inputs[row] for path, row in rows.items()}
         self._angles: list[Array] = []
         self._run = None
         if direct and program:
-            turning = sorted({rows[path] for path in direct.form.turning})
-            self._angles = [whole[first:end].reshape(-1) for first, end in _in_a_row(turning)]
-            self._run = program.call_on(direct.fixed, [whole[rows[path]] for path in direct.form.varying], every, codes)
+            rows_of_angles = sorted({rows[path] for path in direct.form.turning})
+            self._angles = [inputs[first:end].reshape(-1) for first, end in _runs(rows_of_angles)]
+            varying = [inputs[rows[path]] for path in direct.form.varying]
+            self._run = program.call_on(direct.fixed, varying, results, codes)
 
     def __call__(self) -> Array:
         """Evaluate the function at `inputs`; gives `results`, the same array at every call."""
@@ -165,7 +168,8 @@ class Buffers:
             self._evaluate()
             return self.results
         for row in self._angles:
-            if not row.dot(row) <= LARGEST_ANGLE**2:  # some may be beyond what traced cosines take
+            # No angle exceeds the root of the sum of squares; beyond it, one may be too large for traced cosines.
+            if not row.dot(row) <= LARGEST_ANGLE**2:
                 self._evaluate()
                 return self.results
         self._run()
@@ -178,13 +182,14 @@ class Buffers:
         self._function.fill(self._columns, self.results, self.status)
 
 
-def _in_a_row(numbers: Sequence[int]) -> list[tuple[int, int]]:
+def _runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     """Begin and end of each run of consecutive numbers."""
-    first = [k for k in numbers if k - 1 not in numbers]
-    return list(zip(first, [k + 1 for k in numbers if k + 1 not in numbers], strict=True))
+    beginnings = [k for k in numbers if k - 1 not in numbers]
+    return list(zip(beginnings, [k + 1 for k in numbers if k + 1 not in numbers], strict=True))
 
 
 NOT_CONVERGED = int(Status.NOT_CONVERGED)
+"""Code of a point at which a program has found no joints, and another way may."""
 
 
 @checked
@@ -233,7 +238,8 @@ class CompiledFunction:
         self, machine: Machine, inputs: Sequence[str], quantities: str | Sequence[str], judged: bool = True
     ) -> None:
         """Compile. Arguments and errors are those of `compile`."""
-        self._given = machine, tuple(inputs), quantities if isinstance(quantities, str) else tuple(quantities), judged
+        requested = quantities if isinstance(quantities, str) else tuple(quantities)
+        self._arguments = machine, tuple(inputs), requested, judged
         self.judged = judged
         self._fields = _without_repetition([find(machine.family, name) for name in inputs])
         self.machine, self.inputs = machine, tuple(field.path for field in self._fields)
@@ -246,25 +252,25 @@ class CompiledFunction:
         self._function: Function = function_of(machine, tuple(self._leaves), self.distinct, judged=judged)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return CompiledFunction, self._given
+        return CompiledFunction, self._arguments
 
     def __repr__(self) -> str:
         return f"<{', '.join(self.quantities)} of {self.machine.name!r} by {', '.join(self.inputs)}>"
 
-    def __call__(self, *given: Scalar) -> Array:
+    def __call__(self, *arrays: Scalar) -> Array:
         """Evaluate the quantities.
 
         Args:
-            given: a number or an array for each input, SI, of shapes that broadcast.
+            arrays: a number or an array for each input, SI, of shapes that broadcast.
 
         Returns:
             [shape of the quantities x shape of the inputs].
         """
-        points, shape = self._points(given)
+        points, shape = self._points(arrays)
         results, _ = self._function.at(points)
         return self._arrange(results[self._rows], shape)
 
-    def status(self, *given: Scalar) -> Codes:
+    def status(self, *arrays: Scalar) -> Codes:
         """Return the codes of `Status` where the function has been given the same arrays; 0 where there are values.
 
         Raises:
@@ -272,14 +278,14 @@ class CompiledFunction:
         """
         if not self.judged:
             raise InputError("judged is False, so that this function knows no status; compile it with judged=True.")
-        points, shape = self._points(given)
+        points, shape = self._points(arrays)
         return self._function.at(points)[1].reshape(shape)[()]
 
-    def jacobian(self, *given: Scalar) -> Array:
+    def jacobian(self, *arrays: Scalar) -> Array:
         """Return the derivatives of the quantities by each input, exact to round-off; the first call compiles them.
 
         Args:
-            given: as for a call of the function.
+            arrays: as for a call of the function.
 
         Returns:
             [shape of the quantities x inputs x shape of the inputs]; of a single quantity this is its gradient.
@@ -287,24 +293,24 @@ class CompiledFunction:
         Raises:
             InputError: a quantity has no derivatives that are known.
         """
-        return self.value_and_jacobian(*given)[1]
+        return self.value_and_jacobian(*arrays)[1]
 
-    def value_and_jacobian(self, *given: Scalar) -> tuple[Array, Array]:
+    def value_and_jacobian(self, *arrays: Scalar) -> tuple[Array, Array]:
         """Return what a call returns and what `jacobian` returns, for little more than one of them.
 
         Args:
-            given: as for a call of the function.
+            arrays: as for a call of the function.
 
         Raises:
             InputError: a quantity has no derivatives that are known.
         """
-        points, shape = self._points(given)
-        sloped = self._slopes(points)
-        slopes = np.zeros((len(self.distinct), len(self._fields), points.size))
+        points, shape = self._points(arrays)
+        answer = self._gradients(points)
+        rates = np.zeros((len(self.distinct), len(self._fields), points.size))
         for k, row in enumerate(self._leaves.values()):
-            slopes[:, row] += sloped.gradients[:, k]
-        jacobian = self._arrange(slopes[self._rows], (len(self._fields), *shape))
-        return self._arrange(sloped.values[self._rows], shape), jacobian
+            rates[:, row] += answer.gradients[:, k]
+        jacobian = self._arrange(rates[self._rows], (len(self._fields), *shape))
+        return self._arrange(answer.values[self._rows], shape), jacobian
 
     def buffers(self, count: int = 1) -> Buffers:
         """Prepare arrays for so many poses; see `Buffers`. It begins at the numbers of the machine.
@@ -320,25 +326,25 @@ class CompiledFunction:
         return Buffers(self._function, list(self._leaves.values()), start, count)
 
     @cached_property
-    def _slopes(self) -> "Callable[[PointTable], derivatives.Gradients]":
+    def _gradients(self) -> "Callable[[PointTable], derivatives.Gradients]":
         """The function with its derivatives by each leaf; refused where they are not known."""
         names, leaves = list(self.distinct), tuple(self._leaves)
         refuse_without_derivatives(self.machine, names, leaves)
         return lambda points: derivatives.evaluate_gradient(self.machine, points, names, leaves, repeated=True)
 
-    def _points(self, given: Sequence[Scalar]) -> tuple[PointTable, tuple[int, ...]]:
+    def _points(self, arrays: Sequence[Scalar]) -> tuple[PointTable, tuple[int, ...]]:
         """The points of some inputs in a row, and their shape."""
-        if len(given) != len(self._fields):
+        if len(arrays) != len(self._fields):
             raise InputError(
-                f"the function has been given {len(given)} arrays; give {len(self._fields)}, one for each of "
+                f"the function has been given {len(arrays)} arrays; give {len(self._fields)}, one for each of "
                 f"{', '.join(self.inputs)}."
             )
         try:
-            arrays = np.broadcast_arrays(*(np.asarray(array, dtype=float) for array in given))
+            columns = np.broadcast_arrays(*(np.asarray(array, dtype=float) for array in arrays))
         except (TypeError, ValueError) as error:
             raise InputError(f"the inputs of the function are not arrays of numbers that fit: {error}.") from None
-        rows = [array.reshape(-1) for array in arrays]
-        return PointTable({leaf: rows[row] for leaf, row in self._leaves.items()}), arrays[0].shape
+        rows = [column.reshape(-1) for column in columns]
+        return PointTable({leaf: rows[row] for leaf, row in self._leaves.items()}), columns[0].shape
 
     def _arrange(self, rows: Array, shape: tuple[int, ...]) -> Array:
         """Results [rows x ...] as they are returned."""
@@ -349,20 +355,20 @@ def _without_repetition(fields: list[Parameter]) -> list[Parameter]:
     """The fields, none of which another contains."""
     if not fields:
         raise InputError("inputs names no field; name those that vary, e.g. x.")
-    taken = [leaf for field in fields for leaf in field.leaves]
-    for leaf in taken:
-        if taken.count(leaf) > 1:
+    leaves = [leaf for field in fields for leaf in field.leaves]
+    for leaf in leaves:
+        if leaves.count(leaf) > 1:
             raise InputError(f"{leaf} is an input twice; name it once.")
     return fields
 
 
-def _named_quantities(machine: Machine, given: str | Sequence[str]) -> tuple[tuple[str, ...], tuple[int, ...]]:
+def _named_quantities(machine: Machine, requested: str | Sequence[str]) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """The names of what is asked for, and the shape of the axes that count them."""
     parts = machine.family.component_names
-    if isinstance(given, str) and given in MATRICES:
-        return tuple(entry_name(given, row, column) for row in parts for column in parts), (len(parts), len(parts))
-    names = [given] if isinstance(given, str) else several(given)
+    if isinstance(requested, str) and requested in MATRICES:
+        return tuple(entry_name(requested, row, column) for row in parts for column in parts), (len(parts), len(parts))
+    names = [requested] if isinstance(requested, str) else several(requested)
     if any(name in MATRICES for name in names):
         raise InputError('quantities has a matrix among others; compile it alone, e.g. quantities="K".')
     resolved = tuple(resolve_quantities(names, parts, cable_count(machine)))
-    return resolved, () if isinstance(given, str) and len(resolved) == 1 else (len(resolved),)
+    return resolved, () if isinstance(requested, str) and len(resolved) == 1 else (len(resolved),)

@@ -35,9 +35,10 @@ class StepsCheck:
 
     Attributes:
         parts: "chunks" of a grid, or "steps" of a search.
-        intact: how many of them are as they were written.
-        damaged: how many are not, or have been lost; the same command, or `optimize FOLDER`, computes them again.
-        missing: how many are still to be computed, since the study was stopped.
+        intact: number of those that are as they were written.
+        damaged: number of those that are not, or have been lost; the same command, or `optimize FOLDER`, computes them
+            again.
+        missing: number of those that are still to be computed, since the study was stopped.
         frame: whether names, attributes and coordinates of a grid's file are as they were written.
         checked: whether there are checksums; without them only missing data is seen.
         removed: whether a grid's file is no longer there.
@@ -77,7 +78,7 @@ class FolderCheck:
 
     Attributes:
         steps: steps of the folder's long study; None if it has none.
-        files: how many are listed; None if there is no list.
+        files: number of files that are listed; None if there is no list.
         changed: names of listed files that are missing or not as they were written, the list itself among them.
     """
 

@@ -166,13 +166,13 @@ class MotorFit:
     Attributes:
         name: name of the motor.
         motor: its numbers.
-        loads: what the motion asks of drives with its rotor.
+        loads: the demands of the motion on drives with its rotor.
         drive: name of the drive that uses the greatest share of a limit.
         peak: share of the peak limit that is used, at the worst point of the worst drive; infinite if too fast.
         continuous: share of the continuous limit that is used.
         speed: share of the greatest speed that is used.
         inertia_ratio: greatest inertia of the load over that of the motor; None where it is not known.
-        source: where the numbers of the motor are printed.
+        source: place where the numbers of the motor are printed.
     """
 
     name: str
@@ -241,7 +241,7 @@ def motors(
         motion: a motion, or the path of its CSV file; that of the requirements of the machine's file if None.
         catalogue: path of the file; that of kinetostat if None.
         gear, screw: names of a gear for rotary drives, or a screw for linear ones, of the catalogue; none if empty.
-        points: number of points of the motion at which it is looked at, about.
+        points: number of points of the motion that are looked at, about.
 
     Raises:
         InputError: no motion, a mistake in a file, an unknown gear or screw, or motors of which nothing says how far
@@ -276,8 +276,7 @@ def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: 
     Raises:
         InputError: there is no gear or screw of that name.
     """
-    settings: dict[str, float] = {}
-    inertia = 0.0
+    settings, inertia = dict[str, float](), 0.0
     if gear:
         chosen_gear = catalogue.gears[choice(gear, catalogue.gears, "the gear of the catalogue")]
         settings |= {"drives.ratio": chosen_gear.ratio, "drives.efficiency": chosen_gear.efficiency}
@@ -317,7 +316,7 @@ def fit_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
     Args:
         catalogue: the catalogue.
         name: name of the motor.
-        loads: what the motion asks of drives with this motor's rotors.
+        loads: the demands of the motion on drives with this motor's rotors.
     """
     motor = catalogue.motors[name]
     if loads.curves is None or loads.motion is None:
