@@ -36,67 +36,64 @@ SPRINGS = ("stiffness.", "legs.")
 DOUBLED = 2.0
 """Factor on a stiffness of the file by which its springs are recognised; exact in binary."""
 DIGITS = 12
-"""Digits of a fitted value: more than any measurement has, and few enough for every unit."""
+"""Digits of a fitted value: more than any measurement has, and few enough to hide the round-off of changing units."""
 
 
 def fitted_file_values(answer: Identification) -> dict[str, float] | None:
     """Return the values of the machine's file that a fit changes, by path, SI.
 
     Returns:
-        The values as identified; None where errors were found that no value of the file says.
+        The values as identified; None where errors were found that no value of the file can hold.
     """
+    machine = answer.machine
     errors = dict(zip(answer.observed.model.errors, answer.errors.tolist(), strict=True))
     if any(size and error.group in ("geometry", "clearances") for error, size in errors.items()):
         return None
-    drawn = values(answer.machine)
+    drawn = values(machine)
     shared = {e.path: float(drawn[e.path]) + size for e, size in errors.items() if size and e.group == "shared"}
     factors = np.array([1.0 + size for error, size in errors.items() if error.group == "compliances"])
-    stiffnesses = {} if (factors == 1.0).all() else _fitted_stiffnesses(answer.machine, factors)
-    return None if stiffnesses is None else _readable(answer.machine, shared | stiffnesses)
-
-
-def _readable(machine: Machine, numbers: dict[str, float]) -> dict[str, float]:
-    """Round numbers in the units of the machine's file, so that they can be written in these."""
+    stiffnesses = {} if (factors == 1.0).all() else _fitted_stiffnesses(machine, factors)
+    if stiffnesses is None:
+        return None
+    fitted = shared | stiffnesses
+    # Rounded in the units in which the file has them, so that it can be written with few digits.
     kinds = {leaf: field.quantity.kind for field in parameters(machine.family) for leaf in field.leaves}
-    written = written_at(machine, numbers)
-    return {path: rounded_value(value, kinds[path], written[path], DIGITS) for path, value in numbers.items()}
+    written = written_at(machine, fitted)
+    return {path: rounded_value(value, kinds[path], written[path], DIGITS) for path, value in fitted.items()}
 
 
 def identified_machine(answer: Identification) -> Machine | None:
-    """Return the machine with the values of its file as identified; None where these do not say all that was found."""
-    return _machine_of(answer, fitted_file_values(answer))
-
-
-def _machine_of(answer: Identification, fitted: dict[str, float] | None) -> Machine | None:
+    """Return the machine with the values of its file as identified; None where these cannot hold all that was found."""
+    fitted = fitted_file_values(answer)
     return None if fitted is None else answer.machine.with_values(fitted)
 
 
 def _fitted_stiffnesses(machine: Machine, factors: Array) -> dict[str, float] | None:
     """Find the stiffnesses of the file by which the compliances of springs are multiplied by factors.
 
-    A stiffness of the file stands for those springs that become stiffer as it does. The machine with the stiffnesses
-    that were found is compared with the wanted one, so that a spring of two stiffnesses, or of none, is noticed.
+    A stiffness of the file belongs to those springs whose compliance halves as it is doubled. The machine with the
+    stiffnesses that were found is compared with the wanted one, so that a spring of two stiffnesses, or of none, is
+    noticed.
 
     Args:
-        machine: as drawn.
-        factors: factor on the compliance of each spring that deflects.
+        machine: the machine as drawn.
+        factors: factor on the compliance of each spring that deflects [springs].
 
     Returns:
         The stiffnesses by path, SI; None where there are none with which all springs are as wanted.
     """
     drawn, fitted = _compliances(machine), {}
-    for path, given in values(machine).items():
-        stiffness = float(given)
+    for path, value in values(machine).items():
+        stiffness = float(value)
         if not path.startswith(SPRINGS) or not 0.0 < stiffness < math.inf:
             continue
-        doubled = _compliances(machine.with_values({path: DOUBLED * stiffness}))
-        of_springs = set(factors[DOUBLED * doubled == drawn].tolist()) if doubled.shape == drawn.shape else set()
-        if len(of_springs) == 1 and of_springs != {1.0}:
-            fitted[path] = stiffness / of_springs.pop()
-    reached = _compliances(machine.with_values(fitted))
-    wanted = drawn * factors
-    same = reached.shape == wanted.shape and np.allclose(reached, wanted, rtol=FITTED_COMPLIANCE, atol=0.0)
-    return fitted if same else None
+        stiffer = _compliances(machine.with_values({path: DOUBLED * stiffness}))
+        its_factors = set(factors[DOUBLED * stiffer == drawn].tolist()) if stiffer.shape == drawn.shape else set()
+        if len(its_factors) == 1 and its_factors != {1.0}:
+            fitted[path] = stiffness / its_factors.pop()
+    reached, wanted = _compliances(machine.with_values(fitted)), drawn * factors
+    as_wanted = reached.shape == wanted.shape and np.allclose(reached, wanted, rtol=FITTED_COMPLIANCE, atol=0.0)
+    return fitted if as_wanted else None
 
 
 def _compliances(machine: Machine) -> Array:
@@ -108,45 +105,38 @@ def _compliances(machine: Machine) -> Array:
 def with_home(answer: Identification, record: dict[str, Any]) -> dict[str, Any]:
     """Add to the record of a fit where actuators stand at the home pose of the machine as built.
 
+    A machine whose file can hold all that was found stands where the fitted file says, and counts as the drawn one
+    does; any other stands where the drawn one goes with its errors.
+
     Args:
         answer: the fit.
-        record: plain data. It gets the values of the machine's file as identified under "numbers", if these say all;
-            where the machine cannot be placed as built, the reason under "machine_file".
+        record: its plain data, which are extended by commands, coordinates and senses of actuators under "home", and
+            the values of the fitted file, if it can hold all, under "numbers"; where the machine cannot be placed,
+            by the reason under "machine_file".
     """
     fitted = fitted_file_values(answer)
-    machine = _machine_of(answer, fitted)
+    home: dict[str, Any] = {}
     try:
-        home = _home_as_built(answer)
+        built = as_built(answer.machine, answer.errors)
+        home = {"commands": built.commands, "actuators": built.coordinates, "senses": built.senses}
     except InputError as error:
-        if machine is None:
+        if fitted is None:
             return {**record, "machine_file": str(error)}
-        home = {}
-    if machine is None:
+    if fitted is None:
         return {**record, "home": home}
-    return {**record, "home": home | _home_of_file(machine), "numbers": fitted}
+    coordinates = home_coordinates(answer.machine.with_values(fitted))
+    of_file = {"actuators": coordinates, "senses": dict.fromkeys(coordinates, 1.0)}
+    return {**record, "home": home | of_file, "numbers": fitted}
 
 
-def _home_as_built(answer: Identification) -> dict[str, Any]:
-    """Commands and places of actuators at the home pose of the machine with its errors, and how these count.
-
-    Raises:
-        InputError: the machine cannot be placed with its errors.
-    """
-    built = as_built(answer.machine, answer.errors)
-    return {"commands": built.commands, "actuators": built.coordinates, "senses": built.senses}
-
-
-def _home_of_file(machine: Machine) -> dict[str, Any]:
-    """Places of actuators at the home pose of a machine by its fitted file, which counts as the drawn one does."""
-    coordinates = home_coordinates(machine)
-    return {"actuators": coordinates, "senses": dict.fromkeys(coordinates, 1.0)}
-
-
-FAMILY, TOWERS = "delta-linear", "ABC"
+PRINTER_FAMILY, TOWERS = "delta-linear", "ABC"
 NOMINAL_ANGLES = (210.0, 330.0, 90.0)
 """Angles of the towers A, B, C of an ideal printer, from the x axis, degrees."""
-STEP = 1e-6
-"""Step of central differences of firmware numbers, in plausible sizes of the unknowns."""
+FIRMWARE_STEP = 1e-6
+"""Step of central differences of firmware numbers, in plausible sizes of the unknowns: a nanometre or a nanoradian,
+which leaves seven digits of the rates."""
+INTERVALS = ("radius", "rods", "angles", "raised", "scale")
+"""Firmware numbers that have intervals."""
 SAME_SCALE = 1e-9
 """Difference of a scale from 1 up to which it is round-off."""
 
@@ -158,12 +148,12 @@ class FirmwareNumbers:
     Attributes:
         radius: delta radius, from the middle of the platform's rods to those of the carriages.
         rods: length of the rods of towers A, B, C.
-        angles: angles by which the towers are beyond their nominal 210, 330 and 90 degrees.
-        raised: by how much `position_endstop` of each tower must be raised: its carriage stands so much higher.
-        scale: factor on the way of all carriages: rotation_distance, or 1 over steps per mm.
+        angles: angle of each tower less its nominal 210, 330 or 90 degrees.
+        raised: height by which `position_endstop` of each tower must be raised.
+        scale: factor on the travel of all carriages: on rotation_distance, or 1 over that on steps per mm.
         halves: half of the interval of each number, by its name: "radius", "rods", "angles", "raised", "scale".
         heights: height by which the carriage of each tower stands higher at its endstop than the controller assumes.
-        nozzle_rises: height by which the nozzle is higher below the same carriages, because radius or rods are others.
+        nozzle_rises: height by which the nozzle is higher below the same carriages, by the new radius and rods.
     """
 
     radius: float
@@ -190,70 +180,51 @@ class FirmwareNumbers:
 
 def firmware_numbers(answer: Identification) -> FirmwareNumbers | None:
     """The numbers of a controller that a fit gives; None of a machine that is not a linear delta."""
-    if answer.machine.family.name != FAMILY:
+    if answer.machine.family.name != PRINTER_FAMILY:
         return None
-    fit = answer.fit
-    values = _numbers(answer, fit.values)
-    sizes = STEP * answer.sizes
-    rates = np.stack(
-        [
-            (_numbers(answer, fit.values + step) - _numbers(answer, fit.values - step)) / (2.0 * size)
-            for step, size in zip(np.diag(sizes), sizes, strict=True)
-        ],
-        axis=1,
-    )
-    halves = np.sqrt(np.einsum("ij,jk,ik->i", rates, fit.interval, rates))
-    names = ("radius", "rods", "angles", "raised", "scale")
-    ends = np.split(np.arange(11), [1, 4, 7, 10])
-    parts = {name: tuple(values[rows].tolist()) for name, rows in zip(names, ends, strict=True)}
-    wide = {name: tuple(halves[rows].tolist()) for name, rows in zip(names, ends, strict=True)}
-    return FirmwareNumbers(
-        parts["radius"][0],
-        parts["rods"],
-        parts["angles"],
-        parts["raised"],
-        parts["scale"][0],
-        wide,
-        tuple(values[11:14].tolist()),
-        tuple(values[14:17].tolist()),
-    )
+    fit, steps = answer.fit, FIRMWARE_STEP * answer.sizes
+    numbers = _numbers(answer, fit.values)
+    ends = [
+        (_numbers(answer, fit.values + step), _numbers(answer, fit.values - step), 2.0 * step.sum())
+        for step in np.diag(steps)
+    ]
+    halves = {}
+    for name in INTERVALS:
+        rates = np.stack([(ahead[name] - behind[name]) / width for ahead, behind, width in ends], axis=1)
+        halves[name] = tuple(np.sqrt(np.einsum("ij,jk,ik->i", rates, fit.interval, rates)).tolist())
+    lists = {name: tuple(entries.tolist()) for name, entries in numbers.items()}
+    return FirmwareNumbers(**{**lists, "radius": lists["radius"][0], "scale": lists["scale"][0]}, halves=halves)
 
 
-def _numbers(answer: Identification, values: Array) -> Array:
-    """Radius, rods, angles, raised endstops, scale, heights of the carriages, and of the nozzle under them [17]."""
-    errors = answer.observed.errors(values)
-    found_errors = {error.path: size for error, size in zip(answer.observed.model.errors, errors, strict=True)}
+def _numbers(answer: Identification, values: Array) -> dict[str, Array]:
+    """The fields of `FirmwareNumbers` but its intervals, by name, at values of the unknowns [1 or 3 each]."""
+    errors = list(zip(answer.observed.model.errors, answer.observed.errors(values), strict=True))
+    by_path = {error.path: size for error, size in errors}
     geometry = answer.machine.tables["geometry"]
 
-    def by_tower(field: str) -> Array:
-        return np.array([found_errors.get(f"geometry.{field}.{number}", 0.0) for number in range(3)])
+    def of_towers(field: str) -> Array:
+        return np.array([by_path.get(f"geometry.{field}.{number}", 0.0) for number in range(len(TOWERS))])
 
-    radius = np.mean(geometry.tower_radius) - geometry.platform_radius
-    changed = radius + by_tower("tower_radius").mean() - found_errors.get("geometry.platform_radius", 0.0)
-    rods = np.array(geometry.rod_length)
-    longer = rods + by_tower("rod_length")
-    nominal = np.radians(NOMINAL_ANGLES)
-    angles = np.array(geometry.tower_angles) + by_tower("tower_angles") - nominal
-    zeros, gains = (
-        np.array(
-            [
-                sum(
-                    size
-                    for error, size in zip(answer.observed.model.errors, errors, strict=True)
-                    if error.group == group and error.leg == f"tower {tower}"
-                )
-                for tower in TOWERS
-            ]
-        )
-        for group in ("zeros", "gains")
-    )
-    height = found_errors.get("geometry.platform_height", 0.0)
-    nozzle_rises = np.sqrt(rods**2 - radius**2) - np.sqrt(longer**2 - changed**2) - height
-    turned = np.degrees(np.arctan2(np.sin(angles), np.cos(angles)))
-    lengths = 1e3 * np.array([changed, *longer])
-    return np.array(
-        [*lengths, *turned, *(1e3 * (zeros + nozzle_rises)), 1.0 + gains.mean(), *(1e3 * zeros), *(1e3 * nozzle_rises)]
-    )
+    def of_actuators(group: str) -> Array:
+        legs = [f"tower {tower}" for tower in TOWERS]
+        return np.array([sum(s for e, s in errors if e.group == group and e.leg == leg) for leg in legs])
+
+    drawn_radius, drawn_rods = np.mean(geometry.tower_radius) - geometry.platform_radius, np.array(geometry.rod_length)
+    radius = drawn_radius + of_towers("tower_radius").mean() - by_path.get("geometry.platform_radius", 0.0)
+    rods = drawn_rods + of_towers("rod_length")
+    angles = np.array(geometry.tower_angles) + of_towers("tower_angles") - np.radians(NOMINAL_ANGLES)
+    heights = of_actuators("zeros")
+    rods_lift = np.sqrt(drawn_rods**2 - drawn_radius**2) - np.sqrt(rods**2 - radius**2)
+    nozzle_rises = rods_lift - by_path.get("geometry.platform_height", 0.0)
+    return {
+        "radius": 1e3 * np.array([radius]),
+        "rods": 1e3 * rods,
+        "angles": np.degrees(np.arctan2(np.sin(angles), np.cos(angles))),
+        "raised": 1e3 * (heights + nozzle_rises),
+        "scale": np.array([1.0 + of_actuators("gains").mean()]),
+        "heights": 1e3 * heights,
+        "nozzle_rises": 1e3 * nozzle_rises,
+    }
 
 
 def klipper_text(numbers: FirmwareNumbers) -> str:

@@ -1,8 +1,8 @@
 """Measured poses, distances and deflections of a machine from a CSV file: every value is checked, nothing is fitted.
 
 The file has a line of names and then a line for each pose. Columns named after coordinates of the pose or after
-actuators have the commanded values; `measured.x` and so on have measured positions and angles, `deflection.x` measured
-deflections under a wrench, and `sigma.x` the standard deviations of all of these.
+actuators have commanded values; columns such as `measured.x` have measured positions and angles, `deflection.x`
+measured deflections under a wrench, and `sigma.x` or `sigma.deflection.x` standard deviations.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +21,7 @@ from kinetostat.studies.poses import GivenColumn, Where, columns_of, read_column
 from kinetostat.units import UnitError
 
 POSITION, ROTATION, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
+"""Names of coordinates: of positions, of rotation vectors, and of orientations by roll, pitch and yaw."""
 MEASURED = {
     **dict.fromkeys((*POSITION, "distance"), "length"),
     **dict.fromkeys((*ROTATION, *EULER), "angle"),
@@ -30,6 +31,7 @@ roll, pitch and yaw, and its distance from a fixed point."""
 DEFLECTED = {**dict.fromkeys(POSITION, "length"), **dict.fromkeys(ROTATION, "angle")}
 """Quantities that can be measured of a deflection, with their kinds."""
 WRENCH_COLUMNS = {f"moment.{name}": "moment" for name in POSITION} | {f"force.{name}": "force" for name in POSITION}
+"""Columns of the wrench on the tool, in the order of its components, with their kinds."""
 COLUMN_GROUPS: dict[str, Mapping[str, str]] = {
     "measured": MEASURED,
     "deflection": DEFLECTED,
@@ -40,9 +42,10 @@ COLUMN_GROUPS: dict[str, Mapping[str, str]] = {
 HALF_TURN = np.pi * (1.0 + 1e-9)
 """Largest angle that an orientation has, with some room for round-off, rad."""
 MOST_MEASURED_POSES = 10_000
-"""Greatest number of poses in a file."""
+"""Greatest number of poses in a file: far more than anybody measures, and their rates fit in memory."""
 FARTHEST_POSITION = 0.5
-"""Share of the machine's length by which a measured position may differ from the commanded one in a known frame."""
+"""Share of the machine's length by which most measured positions may differ from the commanded ones in a known frame.
+No machine is so wrong, but millimetres taken for metres, or another frame, are farther away."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Sigmas:
     Attributes:
         length: that of lengths, m.
         angle: that of angles, rad.
-        known: whether they were given; if not, only their ratio counts.
+        known: whether somebody has stated them; if not, only their ratio counts.
     """
 
     length: float
@@ -123,12 +126,15 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
         groups = _by_group(columns)
         pose = _commanded_pose(machine, groups.pop("", []), groups.pop("actuator", []), where)
         numbers = {
-            group: {_name_in_group(column): _numbers(column, COLUMN_GROUPS[group], where) for column in entries}
+            group: {
+                (name := _name_in_group(column)): _numbers(column, COLUMN_GROUPS[group][name], where)
+                for column in entries
+            }
             for group, entries in groups.items()
             if group in COLUMN_GROUPS
         }
         loads = groups.get("wrench", [])
-        wrench = {column.name: _numbers(column, WRENCH_COLUMNS, where, column.name) for column in loads}
+        wrench = {column.name: _numbers(column, WRENCH_COLUMNS[column.name], where) for column in loads}
         return _measurements(str(path), lines, pose, numbers, wrench, sigmas)
     except InputError as error:
         text = str(error)
@@ -144,10 +150,10 @@ def _commanded_pose(
         machine: the machine that was measured.
         commanded: columns of coordinates of the pose.
         driven: columns of coordinates of actuators, which give the pose by forward kinematics.
-        where: says where an entry stands.
+        where: returns the line and column of an entry, for messages.
 
     Raises:
-        InputError: both or none are given, or a column is about something else.
+        InputError: both or none are commanded, or a column is not about the pose.
     """
     pose = dict(read_columns(machine, commanded, where).leaves) if commanded else {}
     others = [leaf for leaf in pose if not leaf.startswith(POSE)]
@@ -188,12 +194,12 @@ def _pose_names(machine: Machine) -> list[str]:
     return list(quantities(machine.family.tables["pose"]))
 
 
-def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Where, name: str = "") -> Array:
-    """The values of a column, SI, NaN where a cell is empty; `kinds` has their kinds by name.
+def _numbers(column: GivenColumn, kind: str, where: Where) -> Array:
+    """The values of a column, which are of one kind, SI; NaN where a cell is empty [n].
 
     An angle of a platform is at most half a turn; an actuator may turn farther.
     """
-    kind, result = kinds[name or _name_in_group(column)], np.full(len(column.entries), np.nan)
+    result = np.full(len(column.entries), np.nan)
     of_platform = kind == "angle" and not column.name.startswith(("sigma", "actuator."))
     bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
     for row, entry in enumerate(column.entries):
@@ -222,7 +228,7 @@ def _measurements(
     sigmas: Sigmas,
 ) -> Measurements:
     """The measurements by the numbers of each group of columns, checked against each other."""
-    count = len(lines)
+    count, stated_sigmas = len(lines), numbers.get("sigma", {})
     values = dict(numbers.get("measured", {}))
     values |= {f"deflection.{name}": entries for name, entries in numbers.get("deflection", {}).items()}
     if not values:
@@ -237,14 +243,14 @@ def _measurements(
     origins = np.stack([numbers.get("from", {}).get(name, np.full(count, np.nan)) for name in POSITION], axis=1)
     wrenches = np.stack([np.nan_to_num(wrench.get(name, np.zeros(count))) for name in WRENCH_COLUMNS], axis=1)
     result = Measurements(
-        path,
-        tuple(lines),
-        pose,
-        values,
-        _sigma(values, numbers.get("sigma", {}), sigmas),
-        wrenches,
-        origins,
-        sigmas.known or _have_sigmas(values, numbers.get("sigma", {})),
+        path=path,
+        lines=tuple(lines),
+        pose=pose,
+        values=values,
+        sigma=_sigma(values, stated_sigmas, sigmas),
+        wrenches=wrenches,
+        origins=origins,
+        known=sigmas.known or _have_sigmas(values, stated_sigmas),
     )
     _check_origins_and_loads(result)
     return result
@@ -262,24 +268,26 @@ def _check_origins_and_loads(data: Measurements) -> None:
             raise data.refusal(row, "a deflection is measured without a load; add columns such as force.z [N].")
 
 
-def _have_sigmas(values: Mapping[str, Array], given: Mapping[str, Array]) -> bool:
-    """Whether the file gives a standard deviation for every measured value."""
-    return all(name in given and np.isfinite(given[name][np.isfinite(v)]).all() for name, v in values.items())
+def _have_sigmas(values: Mapping[str, Array], stated: Mapping[str, Array]) -> bool:
+    """Whether the file states a standard deviation for every measured value."""
+    return all(
+        name in stated and np.isfinite(stated[name][np.isfinite(entries)]).all() for name, entries in values.items()
+    )
 
 
-def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigmas) -> dict[str, Array]:
+def _sigma(values: Mapping[str, Array], stated: Mapping[str, Array], sigmas: Sigmas) -> dict[str, Array]:
     """Standard deviations of all measured values, from the file or from the defaults."""
     result = {}
     for name, entries in values.items():
         kind = COLUMN_GROUPS["sigma"][name]
         usual = np.full(len(entries), sigmas.length if kind == "length" else sigmas.angle)
-        stated = given.get(name, usual)
-        result[name] = np.where(np.isnan(stated), usual, stated)
+        of_file = stated.get(name, usual)
+        result[name] = np.where(np.isnan(of_file), usual, of_file)
     return result
 
 
 def _from_actuators(machine: Machine, columns: Sequence[GivenColumn], where: Where) -> dict[str, Array]:
-    """The poses of the drawn machine at given coordinates of its actuators."""
+    """The poses of the drawn machine where its actuators are commanded, by leaf path, SI [n]."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
     names = {key: n for n, a in enumerate(system.actuators) for key in (a.name, a.leg)}
@@ -288,8 +296,8 @@ def _from_actuators(machine: Machine, columns: Sequence[GivenColumn], where: Whe
         if name not in names:
             known = ", ".join(f"actuator.{actuator.leg}" for actuator in system.actuators)
             raise InputError(f"there is no column {column.name}; choose from {known}.")
-        kind = system.actuators[names[name]].kind
-        goals[:, names[name]] = _numbers(column, {name: kind}, where)
+        number = names[name]
+        goals[:, number] = _numbers(column, system.actuators[number].kind, where)
     poses, placed = poses_at(system, goals)
     if not placed.all():
         row = int(np.argmin(placed))

@@ -1,4 +1,4 @@
-"""The record of a fit, as `kinetostat identify -o FOLDER` leaves it, read again: for reports and comparisons.
+"""The record of a fit, which `kinetostat identify -o FOLDER` has written, read again for reports and other questions.
 
 Nothing is fitted here, and nothing of the file is trusted before its form has been checked.
 """
@@ -17,15 +17,24 @@ from kinetostat.spec.errors import InputError
 
 RECORD = "fit.json"
 FIT_PICTURES = ("residuals", "correlations", "poses")
+"""Names of the pictures beside a record, without their suffix."""
 PNG = b"\x89PNG\r\n\x1a\n"
+"""The bytes with which a PNG file begins."""
 LARGEST_RECORD = 1 << 28
-"""Bytes of a record or a picture."""
+"""Bytes that are read of a record or a picture: a covariance of a thousand unknowns takes a tenth of them."""
 FIT_ADVICE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
 
 
 @dataclass(frozen=True)
 class FittedNumber:
-    """An unknown of a fit: its path and group, what it is, and its value with half of the 95 % interval, SI."""
+    """An unknown of a fit.
+
+    Attributes:
+        path, group: its path and the group of errors to which it belongs.
+        words: its meaning.
+        unit: its SI unit.
+        value, half: its value and half of the 95 % interval, infinite where nothing sees it, SI.
+    """
 
     path: str
     group: str
@@ -47,7 +56,7 @@ class FitRecord:
         unknowns: the numbers that were fitted.
         covariance: covariance of the unknowns, SI [unknowns x unknowns].
         rank: number of combinations of unknowns that the measurements see.
-        scatter: standard deviation of the residuals over that expected.
+        scatter: standard deviation of the residuals over the expected one.
         known: whether the standard deviations of the measurements were known.
         residuals: root mean squares of lengths (m) and angles (rad): as drawn, as identified, and of poses left out.
         outliers: of each outlier the line of the file, its name, and its residual in standard deviations.
@@ -86,7 +95,8 @@ class FitRecord:
         Args:
             actuators: names of the actuators, "leg 1 actuator".
             coordinates: coordinates that they shall have in the machine as built, m or rad [poses x actuators].
-            home: their coordinates at its home pose by its own count, which begins elsewhere for cranks and slides.
+            home: their coordinates at the home pose of that machine; cranks and slides are counted from elsewhere
+                there than in the drawn one.
 
         Raises:
             InputError: the fit is about an actuator that is not among them.
@@ -94,10 +104,10 @@ class FitRecord:
         from_home = np.asarray(coordinates, dtype=float) - [home[name] for name in actuators]
         counts = from_home * [self.senses.get(name, 1.0) for name in actuators]
         counts += [self.home.get(name, home[name]) for name in actuators]
-        for what in ("zero", "gain"):
+        for wanted in ("zero", "gain"):  # zeros are added last, so they are taken off first
             for unknown in self.unknowns:
                 path, _, kind = unknown.path.removeprefix("legs.").rpartition(".")
-                if kind != what or unknown.group not in ("zeros", "gains"):
+                if kind != wanted or unknown.group not in ("zeros", "gains"):
                     continue
                 name = path.replace(".", " ")
                 if name not in actuators:
@@ -106,18 +116,18 @@ class FitRecord:
                         "machine.toml that the same fit has written."
                     )
                 column = counts[:, list(actuators).index(name)]
-                column[:] = column - unknown.value if what == "zero" else column / (1.0 + unknown.value)
+                column[:] = column - unknown.value if kind == "zero" else column / (1.0 + unknown.value)
         return counts
 
     def check(self, machine: Machine, drawn: bool = True) -> None:
         """Refuse a machine that was not fitted.
 
         Args:
-            machine: to compare with.
-            drawn: whether it must be the drawn machine, not the one that the fit has written.
+            machine: the machine that a user names beside the record.
+            drawn: whether it must be the drawn machine; otherwise the one that the fit has written will do as well.
 
         Raises:
-            InputError: it has another name or is of another family.
+            InputError: the machine has another name or is of another family.
         """
         if self.machine != machine.name:
             raise InputError(f'"{self.path}" is the fit of {self.machine}, not of {machine.name}; give that machine.')
@@ -140,21 +150,21 @@ def read_fit(path: str | Path) -> FitRecord:
     """Read the record of a fit and the pictures beside it.
 
     Args:
-        path: of the record, or of the folder in which it lies.
+        path: path of the record, or of the folder in which it lies.
 
     Raises:
         InputError: it cannot be read, or is not the record of a fit.
     """
-    place = Path(path)
+    file = Path(path)
     try:
-        place = place / RECORD if place.is_dir() else place
-        record = json.loads(_bytes(place))
-        pictures = {name: place.with_name(f"{name}.png") for name in FIT_PICTURES}
-        return record_of(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
+        file = file / RECORD if file.is_dir() else file
+        record = json.loads(_bytes(file))
+        pictures = {name: file.with_name(f"{name}.png") for name in FIT_PICTURES}
+        return record_of(str(file), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
     except OSError as error:
-        raise InputError(f'"{place}" cannot be read: {error.strerror}; {FIT_ADVICE}') from None
+        raise InputError(f'"{file}" cannot be read: {error.strerror}; {FIT_ADVICE}') from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
-        raise InputError(f'"{place}" is not the record of a fit; {FIT_ADVICE}') from None
+        raise InputError(f'"{file}" is not the record of a fit; {FIT_ADVICE}') from None
 
 
 def _bytes(path: Path) -> bytes:
@@ -166,20 +176,24 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
     """Read the record of a fit from plain data.
 
     Args:
-        path: where it is from.
+        path: path of the record, for messages.
         record: plain data of an identification.
         pictures: contents of files by name; those that are no PNG are left out.
 
     Raises:
-        ValueError, KeyError, TypeError, AttributeError: it is not such a record.
+        ValueError, KeyError, TypeError, AttributeError: the data are not such a record.
     """
     unknowns = tuple(
         FittedNumber(
-            str(u["path"]), str(u["group"]), str(u.get("words", "")), str(u.get("unit", "1")), float(u["value"]),
-            float("inf") if u.get("half_interval_95") is None else float(u["half_interval_95"]),
+            path=str(u["path"]),
+            group=str(u["group"]),
+            words=str(u.get("words", "")),
+            unit=str(u.get("unit", "1")),
+            value=float(u["value"]),
+            half=float("inf") if u.get("half_interval_95") is None else float(u["half_interval_95"]),
         )
         for u in record["unknowns"]
-    )  # fmt: skip
+    )
     covariance = np.array(record["covariance"], dtype=float)
     if not unknowns or covariance.shape != (len(unknowns), len(unknowns)) or not np.isfinite(covariance).all():
         raise ValueError("no covariance of the unknowns")

@@ -1,13 +1,13 @@
 """Combinations of unknowns that no measured pose sees, in plain words, and how far they move the tool.
 
-Common motions of all base joints, of all platform joints, of the measuring frame and of the target are looked for
-first, because they are what cannot be told apart as a rule. What remains is named by its largest parts.
+Common motions of all base joints, of all platform joints, of the measuring frame and of the target are tried first,
+because as a rule they are what cannot be told apart. What remains is named by its largest parts. A combination is a
+column of amounts, each in the plausible size of its unknown.
 
 Source: theory (66).
 """
 
-from collections.abc import Iterator
-from itertools import product
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -21,40 +21,42 @@ from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET
 from kinetostat.tolerances import SEEN_BY_LEG
 
 SEEN_SHARE = 0.02
-"""Share of a combination that may be seen although it counts as unseen: it is named at the drawn machine, and the fit
-is some thousandths away from there."""
-MOST_NAMED_PARTS = 5
-"""Parts of a combination that are named."""
-SAME_EFFECT = 1e-5
-"""Share of the effect of a motion that errors of the leg may leave out and yet stand for it."""
-NO_ERROR = MachineError("", "", "", "", "")
-ROUND_OFF_OF_MOTION = 1e-7
-"""Share of a motion of the tool below which what is left of it is round-off."""
+"""Share of a common motion that may be seen although it counts as unseen. Its amounts are those of the drawn machine;
+the fit is some thousandths away from there."""
 NEW_SHARE = 0.1
 """Share of a combination that named ones must leave of it, so that it has a name of its own."""
-SAME_SHARE = 1e-6
-"""Relative difference below which two unknowns take part in combinations alike."""
+MOST_NAMED_PARTS = 5
+"""Greatest number of parts of a combination that its sentence names."""
 LEAST_NAMED_PART = 0.05
 """Share of the largest part of a combination below which a part is not named."""
-COMMON_MOTIONS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
-"""Words for the motions of a body, in the order of the components of twists."""
+SAME_EFFECT = 1e-5
+"""Share of the effect of a motion that errors of the leg may leave out and yet stand for it: effects are differences
+with steps that leave out a millionth."""
+NO_ERROR = MachineError("", "", "", "", "")
+"""Stands for the error of a motion that is none of the machine's: `effects` reads only where motions are inserted."""
+SAME_SHARE = 1e-6
+"""Relative difference below which two unknowns take part in combinations alike."""
 HIDDEN_BY_OTHERS = 1e-6
-"""Relative singular value below which other motions hide each other already, and are not taken to hide one more."""
+"""Relative singular value below which motions already hide each other; they are then not used to hide one more."""
 SAME_AS_FRAMES = 1e-10
 """Relative singular value below which motions of the base and of the target do the same to the tool."""
+ROUND_OFF_OF_MOTION = 1e-7
+"""Share of a motion of the tool below which what is left of it is round-off."""
 NO_PART = 1e-9
 """Share of the largest part of a combination below which a part is round-off."""
+COMMON_MOTIONS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
+"""Words for the motions of a body, in the order of the components of twists."""
 
 
 @dataclass(frozen=True)
 class Unseen:
-    """A combination of unknowns that changes nothing that was measured.
+    """A combination of unknowns that changes nothing that was measured, so large that its largest part is plausible.
 
     Attributes:
-        words: for people, a sentence.
-        parts: of the combination by path, SI, so that its largest one is a plausible size.
-        tool: how far it moves the tool at most over the poses, in the base frame, m.
-        inside: how far at most if the base and the target may be placed elsewhere: what another frame does not undo, m.
+        words: a sentence for people.
+        parts: its amount of each unknown by path, SI.
+        tool: greatest distance over the poses by which it moves the tool in the base frame, m.
+        inside: the same distance where base and target may be placed elsewhere: what another frame does not undo, m.
     """
 
     words: str
@@ -68,26 +70,28 @@ def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
 
     Args:
         observed: the measurements beside the model.
-        fit: to them.
+        fit: the fit to them.
         sizes: plausible size of each unknown, SI [unknowns].
     """
-    basis, result = fit.unseen_combinations, []
+    basis = fit.unseen_combinations
     if not basis.shape[1]:
         return []
     twists = observed.twists(observed.model.rates(values=observed.errors(fit.values)))
     named: list[Array] = []
-    for words, candidate in _common(observed, sizes, basis):
-        inside = basis @ (basis.T @ candidate)
-        if np.linalg.norm(candidate - inside) < SEEN_SHARE * np.linalg.norm(candidate) and _new(inside, named):
-            named.append(inside)
-            result.append(_combination(words, candidate, observed, twists, sizes))
+    result: list[Unseen] = []
+    for words, candidate in _common_combinations(observed, sizes, basis):
+        unseen = basis @ (basis.T @ candidate)
+        if np.linalg.norm(candidate - unseen) < SEEN_SHARE * np.linalg.norm(candidate) and _is_new(unseen, named):
+            named.append(unseen)
+            result.append(_described(words, candidate, observed, twists, sizes))
     unnamed = basis - _projection(basis, named)
-    directions, strength, _ = np.linalg.svd(unnamed, full_matrices=False)  # strengths are near 1, or near 0 if named
-    others = sparse(directions[:, strength > 0.5]).T
-    return result + [_combination(_sentence(each, observed), each, observed, twists, sizes) for each in others]
+    # Strengths are near 1, or near 0 where a direction is a mix of named ones.
+    directions, strengths, _ = np.linalg.svd(unnamed, full_matrices=False)
+    others = sparse(directions[:, strengths > 0.5]).T
+    return result + [_described(_sentence(other, observed), other, observed, twists, sizes) for other in others]
 
 
-def _new(combination: Array, named: list[Array]) -> bool:
+def _is_new(combination: Array, named: list[Array]) -> bool:
     """Whether a combination is more than a mix of those that have names."""
     unnamed = combination - _projection(combination[:, None], named)[:, 0]
     return bool(np.linalg.norm(unnamed) > NEW_SHARE * np.linalg.norm(combination))
@@ -102,9 +106,13 @@ def _projection(combinations: Array, named: list[Array]) -> Array:
 
 
 def sparse(combinations: Array) -> Array:
-    """The same span with each column 1 where all others are 0: at the unknowns that take most part in it.
+    """Combinations with the same span, each of which is 1 at one unknown where all others are 0 [unknowns x k].
 
-    Unknowns that do so alike, as those of equal legs, are taken in their order, so that round-off decides nothing.
+    These are the unknowns that take most part in the span. Of several that do so alike, such as those of equal legs,
+    the first is taken, so that round-off decides nothing.
+
+    Args:
+        combinations: combinations as columns [unknowns x k].
     """
     remaining, pivots = combinations.copy(), []
     for _ in range(combinations.shape[1]):
@@ -115,91 +123,104 @@ def sparse(combinations: Array) -> Array:
     return np.asarray(combinations @ np.linalg.inv(combinations[pivots]))
 
 
-def _common(observed: Observation, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
-    """Common motions that may hide each other, with what they are in unknowns, in plausible sizes."""
-    base, platform = (_common_motions(observed, sizes, at_end) for at_end in (False, True))
+def _common_combinations(observed: Observation, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
+    """Common motions, alone and with what may hide them, each with a sentence that holds if it is not seen.
+
+    Args:
+        observed: the measurements beside the model.
+        sizes: plausible size of each unknown, SI [unknowns].
+        basis: the combinations that are not seen, as columns [unknowns x k].
+    """
+    base, platform = _common_motions(observed, sizes, False), _common_motions(observed, sizes, True)
     frame, target = _place_motions(observed, sizes, FRAME_UNKNOWNS), _place_motions(observed, sizes, TARGET_UNKNOWNS)
-    for number, (what, preposition, axis) in enumerate(COMMON_MOTIONS):
-        on_base = f"a common {what} of all base joints {preposition} {axis}"
-        on_platform = f"a common {what} of all platform joints {preposition} {axis}"
-        for group, name, places, other in (
-            (base, on_base, frame, "the measuring frame"),
-            (platform, on_platform, target, "the target on the platform"),
+    for number, (motion, preposition, axis) in enumerate(COMMON_MOTIONS):
+        of_base = f"A common {motion} of all base joints {preposition} {axis}"
+        of_platform = f"A common {motion} of all platform joints {preposition} {axis}"
+        for motions, name, places, place in (
+            (base, of_base, frame, "the measuring frame"),
+            (platform, of_platform, target, "the target on the platform"),
         ):
-            if number in group:
-                yield f"{_first(name)} changes nothing that was measured.", group[number]
-                words = f"{_first(name)} cannot be told from another place of {other}."
-                yield words, _with_best(group[number], places, basis)
+            if number in motions:
+                yield f"{name} changes nothing that was measured.", motions[number]
+                words = f"{name} cannot be told from another place of {place}."
+                yield words, _hidden_by(motions[number], [*places.values()], basis)
         if number in base and platform:
-            every = [*platform.values(), *frame.values(), *target.values()]
-            words = f"{_first(on_base)} cannot be told from one of all platform joints."
-            yield words, _with_best(base[number], dict(enumerate(every)), basis)
+            others = [*platform.values(), *frame.values(), *target.values()]
+            yield f"{of_base} cannot be told from one of all platform joints.", _hidden_by(base[number], others, basis)
         if number in frame:
-            words = (
-                f"A {what} of the measuring frame {preposition} {axis} cannot be told from another place of the target."
-            )
-            yield words, _with_best(frame[number], target, basis)
+            of_frame = f"A {motion} of the measuring frame {preposition} {axis}"
+            words = f"{of_frame} cannot be told from another place of the target."
+            yield words, _hidden_by(frame[number], [*target.values()], basis)
 
 
-def _first(text: str) -> str:
-    return text[0].upper() + text[1:]
-
-
-def _with_best(candidate: Array, others: dict[int, Array], basis: Array) -> Array:
-    """A combination with those amounts of others that hide it best."""
+def _hidden_by(combination: Array, others: Sequence[Array], basis: Array) -> Array:
+    """A combination less those amounts of others that leave the least of it to be seen [unknowns]."""
     if not others:
-        return candidate
-    block = np.stack(list(others.values()), axis=1)
-    seen = block - basis @ (basis.T @ block)
-    share, *_ = np.linalg.lstsq(seen, candidate - basis @ (basis.T @ candidate), rcond=HIDDEN_BY_OTHERS)
-    return np.asarray(candidate - block @ share)
+        return combination
+    columns = np.stack(others, axis=1)
+    seen, seen_columns = (each - basis @ (basis.T @ each) for each in (combination, columns))
+    amounts, *_ = np.linalg.lstsq(seen_columns, seen, rcond=HIDDEN_BY_OTHERS)
+    return np.asarray(combination - columns @ amounts)
 
 
 def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[int, Array]:
-    """The unknowns that move all legs together on the base, or on the platform, by the number of the motion."""
+    """Combinations that move all base joints together, by the number of the motion; at the end, all platform joints.
+
+    Base joints turn about the origin of the base, platform joints about the tool point. A motion is left out if the
+    unknowns of some leg cannot make it.
+    """
     result = {}
+    centre = observed.model.rows.point if at_end else np.zeros(3)
     for number, unit in enumerate(np.eye(6)):
-        centre = observed.model.rows.point if at_end else np.zeros(3)
         twist = unit + np.concatenate([np.zeros(3), np.cross(centre, unit[:3])])
         legs = range(len(observed.model.rows.legs))
-        amounts = [_unknowns_of_leg(observed, leg, -twist if at_end else twist, at_end) for leg in legs]
-        together = sum((each for each in amounts if each is not None), np.zeros(len(sizes)))
-        if together.any() and not any(each is None for each in amounts):
-            result[number] = together / sizes
+        by_leg = [_values_of_leg(observed, leg, -twist if at_end else twist, at_end) for leg in legs]
+        values = sum((of_leg for of_leg in by_leg if of_leg is not None), np.zeros(len(sizes)))
+        if values.any() and not any(of_leg is None for of_leg in by_leg):
+            result[number] = values / sizes
     return result
 
 
-def _unknowns_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
-    """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
+def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
+    """Values of the unknowns that do what a motion of the beginning or the end of a leg does, SI [unknowns].
+
+    They are found by the effects on the platform with actuators held, at random coordinates of the leg.
+
+    Args:
+        observed: the measurements beside the model.
+        leg: number of the leg.
+        twist: twist of the motion, base frame [6].
+        at_end: whether the end of the leg moves, at the platform.
+
+    Returns:
+        The values, zero if the leg does not notice the motion; None if its unknowns cannot make it.
+    """
     rows, sources = observed.model.rows, observed.model.sources
-    row, result = rows.legs[leg], np.zeros(len(observed.error_numbers))
-    places = random_coordinates(row, rows.length)
+    row, values = rows.legs[leg], np.zeros(len(observed.error_numbers))
+    coordinates = random_coordinates(row, rows.length)
     motion = (NO_ERROR, (Insertion(leg, len(row.twists) if at_end else 0, twist),))
-    goal = effects(row, rows, [motion], places)[:, 0]
+    goal = effects(row, rows, [motion], coordinates)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
-        return result
-    machine = [(n, place) for n, place in enumerate(observed.error_numbers) if 0 <= place < len(sources)]
-    mine = [(n, sources[place]) for n, place in machine if {i.leg for i in sources[place][1]} == {leg}]
-    if not mine:
+        return values
+    numbers = [n for n, error in enumerate(observed.error_numbers) if 0 <= error < len(sources)]
+    of_leg = {n: sources[observed.error_numbers[n]] for n in numbers}
+    of_leg = {n: source for n, source in of_leg.items() if {insertion.leg for insertion in source[1]} == {leg}}
+    if not of_leg:
         return None
-    columns = effects(row, rows, [source for _, source in mine], places)
+    columns = effects(row, rows, [*of_leg.values()], coordinates)
     scale = np.linalg.norm(columns, axis=0)
-    share, *_ = np.linalg.lstsq(columns / scale, goal, rcond=SEEN_BY_LEG)
-    if np.linalg.norm(columns / scale @ share - goal) > SAME_EFFECT * np.linalg.norm(goal):
+    amounts, *_ = np.linalg.lstsq(columns / scale, goal, rcond=SEEN_BY_LEG)
+    if np.linalg.norm(columns / scale @ amounts - goal) > SAME_EFFECT * np.linalg.norm(goal):
         return None
-    result[[n for n, _ in mine]] = share / scale
-    return result
+    values[[*of_leg]] = amounts / scale
+    return values
 
 
 def _place_motions(observed: Observation, sizes: Array, paths: tuple[str, ...]) -> dict[int, Array]:
-    """The unknowns of the measuring frame or the target, by the number of the motion."""
-    known = [unknown.path for unknown in observed.unknowns]
-    result = {}
-    for number, path in enumerate(paths):
-        if path in known:
-            result[number] = np.zeros(len(sizes))
-            result[number][known.index(path)] = 1.0 / sizes[known.index(path)]
-    return result
+    """Combinations that move the measuring frame or the target alone, by the number of the motion."""
+    units = np.diag(1.0 / sizes)
+    columns = {unknown.path: units[n] for n, unknown in enumerate(observed.unknowns)}
+    return {number: columns[path] for number, path in enumerate(paths) if path in columns}
 
 
 def _sentence(combination: Array, observed: Observation) -> str:
@@ -207,34 +228,41 @@ def _sentence(combination: Array, observed: Observation) -> str:
     shares = combination / np.abs(combination).max()
     order = [int(i) for i in np.argsort(-np.abs(combination)) if abs(shares[i]) > LEAST_NAMED_PART]
     parts = [f"{shares[i]:+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
-    more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
     if len(order) == 1:
         return f"The {observed.unknowns[order[0]].words} changes nothing that was measured."
+    more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
     return f"Only other combinations than this one are seen: {', '.join(parts)}{more}."
 
 
-def _combination(words: str, combination: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
-    """Describe a combination, scaled so that its largest part is a plausible size."""
+def _described(words: str, combination: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
+    """Describe a combination, scaled so that its largest part is a plausible size.
+
+    Args:
+        words: its sentence.
+        combination: its amounts in plausible sizes [unknowns].
+        observed: the measurements beside the model.
+        twists: twists of the tool per unit of each unknown, base axes [n x 6 x unknowns].
+        sizes: plausible size of each unknown, SI [unknowns].
+    """
     values = combination / np.abs(combination).max() * sizes
     least = NO_PART * np.abs(values).max()
     parts = {u.path: float(v) for u, v in zip(observed.unknowns, values, strict=True) if abs(v) > least}
     motions = twists @ values
-    remaining = motions - _undone_by_frames(motions, observed)
+    remaining = motions - _made_by_frames(motions, observed)
     tool, inside = (float(np.linalg.norm(each[:, 3:], axis=1).max()) for each in (motions, remaining))
     return Unseen(words, parts, tool, inside if inside > ROUND_OFF_OF_MOTION * tool else 0.0)
 
 
-def _undone_by_frames(moved: Array, observed: Observation) -> Array:
-    """The part of motions of the tool that motions of the base and of the target can make [n x 6]."""
-    count, tool = len(moved), observed.model.drawn.tool
-    columns = []
-    for turning, moving in product((0.0, 1.0), np.eye(3)):
-        axis = np.broadcast_to(moving, (count, 3))
-        still = np.zeros((count, 3))
-        columns.append(np.concatenate([axis, cross(axis, tool)] if turning else [still, axis], axis=1).ravel())
-        arm = np.einsum("nij,j->ni", observed.model.drawn.axes, moving)
-        columns.append(np.concatenate([arm, still] if turning else [still, arm], axis=1).ravel())
-    unit = np.tile([observed.model.length] * 3 + [1.0] * 3, count)
-    matrix = np.stack(columns, axis=1) * unit[:, None]
-    share = np.linalg.lstsq(matrix, moved.ravel() * unit, rcond=SAME_AS_FRAMES)[0]
-    return np.asarray((matrix @ share / unit).reshape(count, 6))
+def _made_by_frames(motions: Array, observed: Observation) -> Array:
+    """The part of small motions of the tool that motions of the base and of the target can make [n x 6]."""
+    count, tool = len(motions), observed.model.drawn.tool
+    no_motion = np.zeros((count, 3))
+    axes = [(np.broadcast_to(axis, (count, 3)), observed.model.drawn.axes @ axis) for axis in np.eye(3)]
+    shifts = [parts for of_base, of_target in axes for parts in ([no_motion, of_base], [no_motion, of_target])]
+    turns = [
+        parts for of_base, of_target in axes for parts in ([of_base, cross(of_base, tool)], [of_target, no_motion])
+    ]
+    units = np.tile([observed.model.length] * 3 + [1.0] * 3, count)
+    matrix = np.stack([np.concatenate(parts, axis=1).ravel() for parts in shifts + turns], axis=1) * units[:, None]
+    amounts = np.linalg.lstsq(matrix, motions.ravel() * units, rcond=SAME_AS_FRAMES)[0]
+    return np.asarray((matrix @ amounts / units).reshape(count, 6))
