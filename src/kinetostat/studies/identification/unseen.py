@@ -30,8 +30,8 @@ MOST_NAMED_PARTS = 5
 LEAST_NAMED_PART = 0.05
 """Share of the largest part of a combination below which a part is not named."""
 SAME_EFFECT = 1e-5
-"""Share of the effect of a motion that errors of the leg may leave out and yet stand for it: effects are differences
-with steps that leave out a millionth."""
+"""Share of the effect of a motion that errors of a leg may leave out and yet stand for it: where they can make the
+motion, round-off leaves out 1e-13."""
 NO_ERROR = MachineError("", "", "", "", "")
 """Stands for the error of a motion that is none of the machine's: `effects` reads only where motions are inserted."""
 SAME_SHARE = 1e-6
@@ -83,12 +83,14 @@ def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
         unseen = basis @ (basis.T @ candidate)
         if np.linalg.norm(candidate - unseen) < SEEN_SHARE * np.linalg.norm(candidate) and _is_new(unseen, named):
             named.append(unseen)
-            result.append(_described(words, candidate, observed, twists, sizes))
+            result.append(_unseen_combination(words, candidate, observed, twists, sizes))
     unnamed = basis - _projection(basis, named)
     # Strengths are near 1, or near 0 where a direction is a mix of named ones.
     directions, strengths, _ = np.linalg.svd(unnamed, full_matrices=False)
     others = sparse(directions[:, strengths > 0.5]).T
-    return result + [_described(_sentence(other, observed), other, observed, twists, sizes) for other in others]
+    return result + [
+        _unseen_combination(_sentence(other, observed), other, observed, twists, sizes) for other in others
+    ]
 
 
 def _is_new(combination: Array, named: list[Array]) -> bool:
@@ -234,7 +236,7 @@ def _sentence(combination: Array, observed: Observation) -> str:
     return f"Only other combinations than this one are seen: {', '.join(parts)}{more}."
 
 
-def _described(words: str, combination: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
+def _unseen_combination(words: str, combination: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
     """Describe a combination, scaled so that its largest part is a plausible size.
 
     Args:
