@@ -22,6 +22,9 @@ PACKAGE = __name__.partition(".")[0]
 ENTRY_POINTS = "kinetostat.families"
 """The group in which an installed package names its families, so that the command line knows them as well."""
 
+HOMES = {"orthoglide": "delta", "tricept": "passive_leg"}
+"""Modules of families that are not named after them, by the beginning of their names, so that no other is imported."""
+
 _REGISTERED: dict[str, Family] = {}
 
 
@@ -33,10 +36,11 @@ def families() -> dict[str, Family]:
 def family_named(name: str) -> Family | None:
     """Return the family of a name, or None if there is none; of this package, only its own module is imported.
 
-    A module's name begins the names of its families. If no module's does, all are looked through, and then those that
-    installed packages register.
+    A module's name begins the names of its families, with few exceptions (`HOMES`). If no module's does, all are looked
+    through, and then those that installed packages register.
     """
-    for module in sorted(_modules(), key=lambda module: not name.startswith(module.replace("_", "-"))):
+    home = next((home for beginning, home in HOMES.items() if name.startswith(beginning)), name.replace("-", "_"))
+    for module in sorted(_modules(), key=lambda module: not home.startswith(module)):
         if name in _families_in(module):
             return _families_in(module)[name]
     if name not in _REGISTERED:
