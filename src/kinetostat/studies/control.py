@@ -29,7 +29,7 @@ from kinetostat.tolerances import UNFELT
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import Equations
 from kinetostat.vibration.receptance import state_space as equations_of
-from kinetostat.vibration.servo import ClosedLoops, slowest_decay
+from kinetostat.vibration.servo import ClosedLoops, least_damped_pole
 
 CURVE_RANGE = (0.001, 5.0)
 """Range of the curves in units of the lowest and of the sixth natural frequency with motors that stand still: from
@@ -151,7 +151,7 @@ def _with_loops(vibration: Vibration, closed: ClosedLoops) -> Servo:
         for row, limit in zip(sizes.T, round_off, strict=True)
     ]
     answer = replace(
-        answer, least=np.array(least), least_damped=slowest_decay(answer.poles, (0.0, float(frequencies[-1])))
+        answer, least=np.array(least), least_damped=least_damped_pole(answer.poles, (0.0, float(frequencies[-1])))
     )
     return replace(answer, message=_message(answer))
 

@@ -24,8 +24,9 @@ from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, NO_MOMENTUM, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 
-WELL = 0.1
-"""Share of the largest component of the tool's motion from which modes move the tool well along a component."""
+CLEAR_SHARE = 0.1
+"""Share of the largest component of the tool's motion from which modes clearly move the tool along a component: far
+above round-off, so that this does not choose the component."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,9 @@ class Drive:
     """Deflection of the spring of an actuator in each mode.
 
     Attributes:
-        name: of the actuator.
+        name: name of the actuator.
         turning: whether it turns, otherwise it slides.
-        motion: in each mode, of the scale of `Modes.tool` [m].
+        motion: deflection in each mode, of the scale of `Modes.tool` [m].
     """
 
     name: str
@@ -48,11 +49,11 @@ class Modes:
     """The natural vibrations at one pose, from the lowest frequency; motions without mass come last.
 
     Attributes:
-        squares: 1 / omega² of each, s² [m]; 0 where nothing has mass.
+        squares: 1 / omega² of each mode, s² [m]; 0 where nothing has mass.
         shapes: rates of the twist of the platform along its ways, and of all coordinates of the legs, scaled to
             a strain energy of one half [coordinates x m].
         tool: twist of the tool point in each, base axes, of the same scale: rad and m per root of a joule [6 x m].
-        drives: actuators that deflect.
+        drives: the actuators that deflect.
     """
 
     squares: Array
@@ -72,27 +73,28 @@ class Modes:
 
 
 def mass_matrix(equations: Balance) -> Array:
-    """The masses over the ways of the platform and all coordinates of the legs [n x coordinates x coordinates], s²."""
+    """Return M over the ways of the platform and all coordinates of the legs [n x coordinates x coordinates], s²."""
     mechanism, starts = equations.mechanism, starts_of(equations)
     ways, length = mechanism.ways, mechanism.length
     size = ways.shape[1]
     result = np.zeros((len(length), starts[-1], starts[-1]))
     result[:, :size, :size] = ways.T @ platform_inertia(mechanism.platform, equations.state.platform, length) @ ways
-    given = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
+    amounts = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
     for number, (leg, (first, last)) in enumerate(zip(mechanism.legs, pairwise(starts), strict=True)):
-        moving = slice(first, last)
+        of_leg = result[:, first:last, first:last]
         if leg.masses.carried:
-            placed = leg.chain.place(equations.state.coordinates[number], given)
+            placed = leg.chain.place(equations.state.coordinates[number], amounts)
             for _, matrix in energies(leg.masses, leg_rates(leg, placed), length):
-                result[:, moving, moving] += matrix
-        result[:, moving, moving] += _diagonal(leg.rotors * length[:, None])
+                of_leg += matrix
+        of_leg += _diagonal(leg.rotors * length[:, None])
     return result
 
 
 def stiffness_matrix(equations: Balance) -> tuple[Array, Array]:
-    """The stiffness over the same coordinates [n x coordinates x coordinates], and the conditions of closed legs.
+    """Return K over the same coordinates [n x coordinates x coordinates], and the conditions of closed legs.
 
-    States of rest are solved for with a spring along each idle motion, which nothing deflects; masses would.
+    States of rest are solved for with a spring along each idle motion, which nothing deflects there; in vibrations
+    masses would deflect it, so that it is taken away.
     """
     elastic, geometric, conditions = tangent_matrices(equations)
     stiff = elastic + geometric
@@ -102,7 +104,7 @@ def stiffness_matrix(equations: Balance) -> tuple[Array, Array]:
 
 
 def damping_matrix(equations: Balance) -> Array:
-    """Viscous friction of joints and rotors over the same coordinates [n x coordinates x coordinates], s."""
+    """Return viscous friction of joints and rotors over the same coordinates [n x coordinates x coordinates], s."""
     mechanism, starts = equations.mechanism, starts_of(equations)
     result = np.zeros((len(mechanism.length), starts[-1], starts[-1]))
     for leg, (first, last) in zip(mechanism.legs, pairwise(starts), strict=True):
@@ -115,13 +117,13 @@ def _diagonal(entries: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Solved:
+class ModesOfPoses:
     """Modes of poses that have as many motions.
 
     Attributes:
-        rows: of the poses [k].
+        rows: numbers of the poses [k].
         squares: as in `Modes` [k x m].
-        shapes: [k x coordinates x m].
+        shapes: as in `Modes` [k x coordinates x m].
     """
 
     rows: Integers
@@ -129,111 +131,115 @@ class Solved:
     shapes: Array
 
 
-def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
+def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPoses]:
     """Solve for the modes of n states; those at which springs and loads do not hold the machine are left out.
 
     Args:
-        equations: of the states.
+        equations: equations of the states.
         shaped: whether shapes are wanted; without them they are empty, and frequencies take half of the time.
     """
     stiff, conditions = stiffness_matrix(equations)
     mass = mass_matrix(equations)
-    left_out, starts = motions_left_out(equations, mass), starts_of(equations)
+    idle_conditions, starts = motions_left_out(equations, mass), starts_of(equations)
     sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    for rows, basis in _allowed_motions(conditions, left_out, starts, np.flatnonzero(sound)):
-        within_stiff, within_mass = (_within(part, rows, basis, starts) for part in (stiff, mass))
-        holds, factors = _factors(within_stiff)
+    for rows, basis in _allowed_motions(conditions, idle_conditions, starts, np.flatnonzero(sound)):
+        stiff_within, mass_within, unit_within = (
+            _over_motions(matrix, rows, basis, starts)
+            for matrix in (stiff, mass, np.broadcast_to(np.eye(starts[-1]), mass.shape))
+        )
+        holds, factors = _inverse_factors(stiff_within)
         if not holds.any():
             continue
-        ringing = factors @ within_mass[holds] @ np.swapaxes(factors, 1, 2)
+        transposed = np.swapaxes(factors, 1, 2)
+        scaled_mass = factors @ mass_within[holds] @ transposed
         if shaped:
-            squares, turned = np.linalg.eigh(ringing)
-            combined = np.swapaxes(factors, 1, 2) @ turned[:, :, ::-1]
-            shapes = _spread(combined, [part[holds] for part in basis])
+            squares, axes = np.linalg.eigh(scaled_mass)
+            shapes = _over_coordinates(transposed @ axes[:, :, ::-1], [part[holds] for part in basis])
         else:
-            squares, shapes = np.linalg.eigvalsh(ringing), np.zeros((int(holds.sum()), starts[-1], 0))
-        sizes = _within(np.broadcast_to(np.eye(starts[-1]), mass.shape), rows, basis, starts)[holds]
-        largest = np.trace(factors @ sizes @ np.swapaxes(factors, 1, 2), axis1=1, axis2=2)
-        round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * largest
+            squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), starts[-1], 0))
         squares = squares[:, ::-1]
+        motion_sizes = np.trace(factors @ unit_within[holds] @ transposed, axis1=1, axis2=2)
+        round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * motion_sizes
         squares = np.where(squares > np.maximum(UNRESISTED * squares[:, :1], round_off[:, None]), squares, 0.0)
-        yield Solved(rows[holds], squares, shapes)
+        yield ModesOfPoses(rows[holds], squares, shapes)
 
 
 def _allowed_motions(
-    conditions: Array, left_out: Array, starts: Integers, rows: Integers
+    conditions: Array, idle_conditions: Array, starts: Integers, rows: Integers
 ) -> Iterator[tuple[Integers, list[Array]]]:
-    """Poses with as many motions that obey all conditions, and these leg by leg.
+    """Give poses with as many motions that obey all conditions, and these motions leg by leg.
 
     A leg follows the platform by the least motion of its coordinates, and has motions of its own besides. What a leg
     cannot follow, the platform does not do.
 
     Args:
-        conditions, left_out, starts: see `solved_modes`.
-        rows: of the poses at which all is finite.
+        conditions: conditions of closed legs [n x conditions x coordinates].
+        idle_conditions: see `motions_left_out`.
+        starts: number of the first coordinate of each leg, and of all coordinates.
+        rows: numbers of the poses at which all is finite.
 
     Returns:
-        Rows of poses, and what they have: motions of the platform [k x ways x motions], then those of each leg
+        Numbers of poses, and their motions: those of the platform [k x ways x motions], then those of each leg
         [k x coordinates x motions], of which as many as the platform has come first and follow it.
     """
     size = int(starts[0])
     legs = []
     for number, (first, last) in enumerate(pairwise(starts)):
-        kept = left_out[rows, first - size : last - size, first:last]
-        kept = kept[:, kept.any(axis=(0, 2))]
+        idle = idle_conditions[rows, first - size : last - size, first:last]
         closing = conditions[rows, size * number : size * (number + 1), first:last]
-        legs.append(_following(closing, kept))
+        legs.append(_closed_leg(closing, idle[:, idle.any(axis=(0, 2))]))
     _, sizes, ways = np.linalg.svd(np.concatenate([leg.missed for leg in legs], axis=1), full_matrices=False)
     ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(leg.rank for leg in legs)], axis=1)
-    for each in np.unique(ranks, axis=0):
-        of_ranks = (ranks == each).all(axis=1)
-        platform = np.swapaxes(ways[of_ranks, each[0] :], 1, 2)
+    for platform_rank, *leg_ranks in np.unique(ranks, axis=0):
+        of_ranks = (ranks == [platform_rank, *leg_ranks]).all(axis=1)
+        platform = np.swapaxes(ways[of_ranks, platform_rank:], 1, 2)
         motions = [
-            np.concatenate([leg.inverse[of_ranks] @ platform, np.swapaxes(leg.right[of_ranks, rank:], 1, 2)], axis=2)
-            for leg, rank in zip(legs, each[1:], strict=True)
+            np.concatenate([leg.inverse[of_ranks] @ platform, np.swapaxes(leg.motions[of_ranks, rank:], 1, 2)], axis=2)
+            for leg, rank in zip(legs, leg_ranks, strict=True)
         ]
         yield rows[of_ranks], [platform, *motions]
 
 
 @dataclass(frozen=True)
-class _Following:
+class _ClosedLeg:
     """A leg as it follows the platform, at n poses.
 
     Attributes:
         inverse: least motion of its coordinates by the twist of the platform [n x coordinates x ways].
         missed: part of a twist that it cannot follow [n x conditions x ways].
         rank: number of its independent conditions [n].
-        right: motions of its coordinates as rows; those behind the first `rank` leave the platform where it is
+        motions: motions of its coordinates as rows; those behind the first `rank` leave the platform where it is
             [n x coordinates x coordinates].
     """
 
     inverse: Array
     missed: Array
     rank: Integers
-    right: Array
+    motions: Array
 
 
-def _following(closing: Array, kept: Array) -> _Following:
+def _closed_leg(closing: Array, idle: Array) -> _ClosedLeg:
     """Solve the conditions of a leg by singular values.
 
     Args:
         closing: the twist of its end per unit of each coordinate [n x ways x coordinates].
-        kept: conditions that leave out motions of the leg alone [n x conditions x coordinates].
+        idle: conditions that leave out motions of the leg alone [n x conditions x coordinates].
     """
     size = closing.shape[1]
-    left, sizes, right = np.linalg.svd(np.concatenate([closing, kept], axis=1))
+    left, sizes, right = np.linalg.svd(np.concatenate([closing, idle], axis=1))
     rank = (sizes > CLOSING_ROUND_OFF * sizes[:, :1]).sum(axis=1)
     count = sizes.shape[1]
-    acts = np.arange(count) < rank[:, None]
-    shrink = np.divide(1.0, sizes, where=acts, out=np.zeros_like(sizes))
-    back = left[:, :, :count] * acts[:, None]
-    by_twist = np.swapaxes(back, 1, 2)[:, :, :size]
-    inverse = np.swapaxes(right[:, :count], 1, 2) * shrink[:, None] @ by_twist
-    return _Following(inverse, np.eye(back.shape[1])[:, :size] - back @ by_twist, rank, right)
+    counts = np.arange(count) < rank[:, None]
+    reciprocals = np.divide(1.0, sizes, where=counts, out=np.zeros_like(sizes))
+    reached = left[:, :, :count] * counts[:, None]
+    by_twist = np.swapaxes(reached, 1, 2)[:, :, :size]
+    inverse = np.swapaxes(right[:, :count], 1, 2) * reciprocals[:, None] @ by_twist
+    missed = np.eye(reached.shape[1])[:, :size] - reached @ by_twist
+    return _ClosedLeg(inverse, missed, rank, right)
 
 
 def _places(basis: Sequence[Array]) -> Iterator[Integers]:
-    """Places of the motions of the platform, and then of each leg, among all."""
+    """Give the places of the motions of the platform, and then of each leg, among all."""
     common = basis[0].shape[2]
     end = common
     yield np.arange(common)
@@ -242,8 +248,8 @@ def _places(basis: Sequence[Array]) -> Iterator[Integers]:
         yield np.concatenate([np.arange(common), np.arange(begin, end)])
 
 
-def _within(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
-    """The symmetric part of a matrix over all coordinates, which couples none of different legs, over the motions."""
+def _over_motions(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
+    """Return the symmetric part of a matrix, which couples no coordinates of different legs, over the motions."""
     places = list(_places(basis))
     size = 1 + max(place.max(initial=-1) for place in places)
     result = np.zeros((len(rows), size, size))
@@ -253,15 +259,14 @@ def _within(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integ
     return result
 
 
-def _spread(combined: Array, basis: Sequence[Array]) -> Array:
-    """Combinations of motions as motions of all coordinates [k x coordinates x m]."""
-    return np.concatenate(
-        [part @ combined[:, place] for part, place in zip(basis, _places(basis), strict=True)], axis=1
-    )
+def _over_coordinates(combinations: Array, basis: Sequence[Array]) -> Array:
+    """Return combinations of motions as motions of all coordinates [k x coordinates x m]."""
+    pairs = zip(basis, _places(basis), strict=True)
+    return np.concatenate([part @ combinations[:, place] for part, place in pairs], axis=1)
 
 
-def _factors(stiff: Array) -> tuple[Mask, Array]:
-    """Whether matrices K are positive definite by a margin [k], and L^-1 of those that are, K = L L^T."""
+def _inverse_factors(stiff: Array) -> tuple[Mask, Array]:
+    """Return whether matrices K are positive definite by a margin [k], and L^-1 of those that are, K = L L^T."""
     with suppress(np.linalg.LinAlgError):
         factors = np.linalg.inv(np.linalg.cholesky(stiff))
         # Both traces are sums of positive eigenvalues, so that their product is at least the ratio of the extremes.
@@ -273,66 +278,66 @@ def _factors(stiff: Array) -> tuple[Mask, Array]:
 
 
 def motions_left_out(equations: Balance, mass: Array) -> Array:
-    """Conditions that leave out motions without a frequency [n x conditions x coordinates].
+    """Return conditions that leave out motions without a frequency [n x conditions x coordinates].
 
     Nothing leaves the plane of a planar machine. Motions of a leg that leave the platform where it is and deflect no
     spring, such as a strut that spins about its own axis, have the frequency 0: all other modes have no momentum with
     them.
 
     Args:
-        equations: of the states.
+        equations: equations of the states.
         mass: see `mass_matrix`.
     """
     starts, ways = starts_of(equations), equations.mechanism.ways
-    blocks = np.zeros((len(equations.left), starts[-1] - starts[0], starts[-1]))
-    pairs = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
-    for leg, terms, (first, last) in pairs:
-        inside, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
-        leaving = (inside <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
+    result = np.zeros((len(equations.left), starts[-1] - starts[0], starts[-1]))
+    parts = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
+    for leg, terms, (first, last) in parts:
+        within_ways, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
+        out_of_plane = (within_ways <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
         idle = idle_motions(terms.rates, leg.springs) if leg.idle.any() else leg.idle
-        apart = _without_momentum(idle, mass[:, first:last, first:last])
-        blocks[:, first - starts[0] : last - starts[0], first:last] = apart + leaving
-    return blocks
+        of_idle = _without_momentum(idle, mass[:, first:last, first:last])
+        result[:, first - starts[0] : last - starts[0], first:last] = of_idle + out_of_plane
+    return result
 
 
 def _without_momentum(idle: Array, mass: Array) -> Array:
-    """Rows that are 0 for motions without momentum along idle motions U, U^T M y [n x c x c].
+    """Return rows that are 0 for motions without momentum along idle motions U, U^T M y [n x c x c].
 
     Along idle motions that have no mass there is no momentum; their rows leave out these motions themselves, U^T y.
     Rows of momentum have unit length, as those of motions.
     """
     transposed = np.swapaxes(idle, 1, 2)
-    masses, turned = np.linalg.eigh(np.nan_to_num(transposed @ mass @ idle))  # poses out of reach have no numbers
-    motions = np.swapaxes(turned, 1, 2) @ transposed
-    heavy = masses > UNRESISTED * np.trace(mass, axis1=1, axis2=2)[:, None]
+    masses, axes = np.linalg.eigh(np.nan_to_num(transposed @ mass @ idle))  # poses out of reach have no numbers
+    motions = np.swapaxes(axes, 1, 2) @ transposed
+    has_mass = masses > UNRESISTED * np.trace(mass, axis1=1, axis2=2)[:, None]
     momenta = motions @ mass
-    sizes = np.where(heavy, np.linalg.norm(momenta, axis=2), 1.0)
-    return np.asarray(np.where(heavy[:, :, None], momenta / sizes[:, :, None], motions))
+    sizes = np.where(has_mass, np.linalg.norm(momenta, axis=2), 1.0)
+    return np.asarray(np.where(has_mass[:, :, None], momenta / sizes[:, :, None], motions))
 
 
 def hertz(squares: Array) -> Array:
-    """Frequencies of 1 / omega² in descending order [n x m]; infinite where nothing has mass."""
-    rings = squares > UNRESISTED * squares[:, :1]
-    return np.where(rings, 0.5 / np.pi / np.sqrt(np.where(rings, squares, 1.0)), np.inf)
+    """Return frequencies of 1 / omega² in descending order [n x m]; infinite where nothing has mass."""
+    has_mass = squares > UNRESISTED * squares[:, :1]
+    return np.where(has_mass, 0.5 / np.pi / np.sqrt(np.where(has_mass, squares, 1.0)), np.inf)
 
 
 def frequencies(equations: Balance, count: int = MODES) -> Array:
-    """The lowest natural frequencies of n states, Hz [n x count].
+    """Return the lowest natural frequencies of n states, Hz [n x count].
 
     Infinite where there are fewer modes with mass, NaN where springs and loads do not hold the machine.
     """
     result = np.full((len(equations.left), count), np.nan)
     for part in solved_modes(equations, shaped=False):
-        shown = min(count, part.squares.shape[1])
+        present = min(count, part.squares.shape[1])
         result[part.rows] = np.inf
-        result[part.rows, :shown] = hertz(part.squares[:, :shown])
+        result[part.rows, :present] = hertz(part.squares[:, :present])
     return result
 
 
 def modes(equations: Balance) -> Modes | None:
-    """The natural vibrations at a single pose; None where springs and loads do not hold the machine there.
+    """Return the natural vibrations at a single pose; None where springs and loads do not hold the machine there.
 
-    There are none of them where all is rigid.
+    A machine that is rigid throughout has none: the answer is then empty.
     """
     part = next(solved_modes(equations), None)
     if part is None:
@@ -343,25 +348,25 @@ def modes(equations: Balance) -> Modes | None:
 
 
 def _settled_shapes(squares: Array, shapes: Array, motions: Array, length: float) -> Array:
-    """The same modes with what is arbitrary in them settled, so that no round-off decides what is shown.
+    """Return the same modes with what is arbitrary in them settled, so that round-off does not decide it.
 
-    Of modes of equal frequency the first moves the tool along the first component that they move well, x y z rx ry rz,
-    the next one not at all along this one, and along the next such component; each moves along its own to the
-    positive side.
+    Of modes of equal frequency the first moves the tool along the first component, x y z rx ry rz, along which they
+    clearly move it; the next one does not move it along this component, but along the next such one. Each moves along
+    its own to the positive side.
 
     Args:
         squares, shapes: as in `Modes`, of one pose.
         motions: see `tool_motions`.
-        length: of the machine, by which turns are compared with displacements, m.
+        length: length of the machine, by which turns are compared with displacements, m.
     """
     result = shapes.copy()
-    scaled = np.roll(motions * np.array([length] * 3 + [1.0] * 3)[:, None], 3, axis=0)
+    translations_first = np.roll(motions * np.array([length] * 3 + [1.0] * 3)[:, None], 3, axis=0)
     borders = np.flatnonzero(squares[:-1] - squares[1:] > EQUAL_STIFFNESSES * squares[:-1]) + 1
     for first, last in pairwise([0, *borders.tolist(), len(squares)]):
         for place in range(first, last):
-            among = scaled @ result[:, place:last]
-            sizes = np.linalg.norm(among, axis=1)
-            row = among[int(np.argmax(sizes >= WELL * sizes.max()))]
+            of_equals = translations_first @ result[:, place:last]
+            sizes = np.linalg.norm(of_equals, axis=1)
+            row = of_equals[int(np.argmax(sizes >= CLEAR_SHARE * sizes.max()))]
             # The reflection that brings this row to its first entry.
             mirror = row - np.linalg.norm(row) * np.eye(last - place)[0]
             if mirror @ mirror > 0.0:
@@ -380,7 +385,7 @@ def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
 
 
 def tool_motions(equations: Balance) -> Array:
-    """Twist of the tool point of one pose per unit of each coordinate, SI, for energies in joules [6 x coordinates]."""
+    """Return the twist of the tool point per unit of each coordinate, SI, for energies in joules [6 x coordinates]."""
     mechanism, ways = equations.mechanism, equations.mechanism.ways
     shift = np.eye(6)
     shift[3:, :3] = -skew_of(equations.state.platform.translation)[0]

@@ -8,6 +8,7 @@ Source: theory (101)-(104). SI; at the tool point, base axes.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class ServoLoop:
 
 
 def servo_loops(state: MachineState) -> dict[str, ServoLoop]:
-    """The loop of each drive, by the name of its actuator.
+    """Return the loop of each drive, by the name of its actuator.
 
     Raises:
         InputError: a gain is zero, a rotor has no inertia, or a transmission is rigid.
@@ -123,7 +124,7 @@ def servo_loops(state: MachineState) -> dict[str, ServoLoop]:
 
 
 def with_standing_motors(machine: Machine) -> Machine:
-    """The machine whose motors stand still: rotors have no inertia, so that springs of drives are transmissions."""
+    """Return the machine with motors that stand still: without rotor inertia, springs of drives are transmissions."""
     return with_every_drive(machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
 
 
@@ -142,7 +143,7 @@ class ClosedLoops:
     loops: tuple[ServoLoop, ...]
 
     def receptance(self, frequencies: Array) -> Complex:
-        """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
+        """Return the motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m, N.
 
         Each loop changes the stiffness of its actuator from that of the transmission to its own. All together change
         the stiffness by a matrix whose rank is the number of drives: H' = H - H_d (Delta^-1 + D)^-1 H_d^T (Woodbury).
@@ -152,11 +153,10 @@ class ClosedLoops:
 
         Source: theory (103).
         """
-        given = np.asarray(frequencies, dtype=float)
         motions = np.vstack([self.modes.tool, *(drive.motion[None] for drive in self.modes.drives)])
-        whole = receptance(_with_motions(self.modes, motions), self.damping, given)
+        whole = receptance(replace(self.modes, tool=motions), self.damping, frequencies)
         tool, across, drives = whole[:, :6, :6], whole[:, :6, 6:], whole[:, 6:, 6:]
-        stiffness = np.array([loop.stiffness(given) for loop in self.loops]).T
+        stiffness = np.array([loop.stiffness(frequencies) for loop in self.loops]).T
         change = stiffness - np.array([loop.transmission for loop in self.loops])
         # The row of a rigid loop, whose Delta is infinite, is divided by it: (1 + Delta D) x = Delta H_d^T.
         rigid = ~np.isfinite(change)
@@ -179,35 +179,31 @@ class ClosedLoops:
         ports = np.array([drive.motion for drive in self.modes.drives])
         machine = state_space(self.modes, self.damping, ports, ports)
         count, size = len(self.loops), len(machine.states)
-        k, inertia, friction, gain, position, at_load = (
-            np.array([getattr(loop, name) for loop in self.loops])
+        k, inertia, friction, gain, position_gain, at_load = (
+            np.array([getattr(loop, name) for loop in self.loops])[:, None]
             for name in ("transmission", "inertia", "friction", "velocity_gain", "position_gain", "at_load")
         )
-        rate = np.array([gain[i] / t if (t := loop.integral_time) else 0.0 for i, loop in enumerate(self.loops)])
+        times = [loop.integral_time for loop in self.loops]
+        integral_gain = np.array([[row[0] / t if t else 0.0] for row, t in zip(gain, times, strict=True)])
         zero = np.zeros((count, count))
         # Rows by the states (machine, motors, speeds, integrals): a motor at x_m pulls its joint with k x_m.
-        joint = np.hstack([machine.c, machine.d * k, zero, zero])
+        joint = np.hstack([machine.c, machine.d * k.T, zero, zero])
         motor, speed, integral = (
             np.hstack([np.zeros((count, size)), *(np.eye(count) if i == place else zero for i in range(3))])
             for place in range(STATES_OF_DRIVE)
         )
-        measured = at_load[:, None] * joint + (1.0 - at_load)[:, None] * motor
-        torque = k[:, None] * (joint - motor) - friction[:, None] * speed
-        torque = torque - gain[:, None] * (position[:, None] * measured + speed)
-        torque = torque - rate[:, None] * (position[:, None] * integral + motor)
-        rows = [np.hstack([machine.a, machine.b * k, np.zeros((size, 2 * count))]), speed, torque / inertia[:, None]]
+        measured_position = at_load * joint + (1.0 - at_load) * motor
+        torque = k * (joint - motor) - friction * speed
+        torque = torque - gain * (position_gain * measured_position + speed)
+        torque = torque - integral_gain * (position_gain * integral + motor)
+        rows = [np.hstack([machine.a, machine.b * k.T, np.zeros((size, 2 * count))]), speed, torque / inertia]
         # A loop without an integral part has an integral state that decays at 1/s and that nothing reads.
-        integrates = rate[:, None] > 0.0
-        return np.asarray(np.linalg.eigvals(np.vstack([*rows, np.where(integrates, measured, -integral)])))
+        rows.append(np.where(integral_gain > 0.0, measured_position, -integral))
+        return np.asarray(np.linalg.eigvals(np.vstack(rows)))
 
 
-def _with_motions(modes: Modes, motions: Array) -> Modes:
-    """The modes with other motions in place of the tool's."""
-    return Modes(modes.squares, modes.shapes, motions, modes.drives)
-
-
-def slowest_decay(poles: Complex, frequencies: Sequence[float]) -> tuple[float, float] | None:
-    """Frequency (Hz) and damping ratio of the oscillating pole with the least damping ratio; None if none oscillates.
+def least_damped_pole(poles: Complex, frequencies: Sequence[float]) -> tuple[float, float] | None:
+    """Return frequency (Hz) and damping ratio of the oscillating pole of least damping ratio; None if none oscillates.
 
     Args:
         poles: poles of the closed loops, rad/s.
@@ -219,5 +215,5 @@ def slowest_decay(poles: Complex, frequencies: Sequence[float]) -> tuple[float, 
     if not len(oscillating):
         return None
     ratios = -oscillating.real / np.abs(oscillating)
-    worst = int(np.argmin(ratios))
-    return float(np.abs(oscillating[worst]) / (2.0 * math.pi)), float(ratios[worst])
+    least = int(np.argmin(ratios))
+    return float(np.abs(oscillating[least]) / (2.0 * math.pi)), float(ratios[least])

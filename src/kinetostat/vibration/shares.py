@@ -27,26 +27,26 @@ from kinetostat.vibration.modes import Modes
 TURNING_LOADS = "weight and wrenches as they turn"
 """Name of the share of the strain energy that no spring has."""
 SMALL_MOTION = 1e-6
-"""Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
+"""Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths: its square
+is what curvature adds, and its reciprocal times 1e-16 what round-off adds."""
 
 
 def strain_shares(equations: Balance, shapes: Array) -> dict[str, Array]:
-    """Shares of the strain energy by spring [modes]; wrenches and weights that turn have the rest."""
+    """Return shares of the strain energy by spring [modes]; wrenches and weights that turn have the rest."""
     elastic, geometric, _ = tangent_matrices(equations)
     shares: dict[str, Array] = {}
-    for leg, (first, _last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
+    for leg, first in zip(equations.mechanism.legs, starts_of(equations), strict=False):
         for number, spring in enumerate(leg.springs):
             if spring is not None:
                 place = first + number
                 amount = elastic[0, place, place] * shapes[place] ** 2
-                name = spring.name
-                shares[name] = shares.get(name, np.zeros(shapes.shape[1])) + amount
+                shares[spring.name] = shares.get(spring.name, 0.0) + amount
     turning = np.einsum("ik,ij,jk->k", shapes, geometric[0], shapes)
     return shares | ({TURNING_LOADS: turning} if np.abs(turning).max(initial=0.0) > 0.0 else {})
 
 
 def kinetic_shares(equations: Balance, solution: Modes) -> dict[str, Array]:
-    """Shares of the kinetic energy by part, of all modes with mass [modes]."""
+    """Return shares of the kinetic energy by part, of all modes with mass [modes]."""
     squares = solution.squares[: solution.ringing]
     shares: dict[str, Array] = {}
 
@@ -64,20 +64,20 @@ def kinetic_shares(equations: Balance, solution: Modes) -> dict[str, Array]:
 
 
 def effective_masses(equations: Balance, solution: Modes) -> list[tuple[float, float, float]]:
-    """Squares of the momentum of each mode along x, y, z as shares of all moving mass."""
-    momentum, whole = np.zeros((3, solution.ringing)), 0.0
+    """Return squares of the momentum of each mode along x, y, z as shares of all moving mass."""
+    momentum, moving_mass = np.zeros((3, solution.ringing)), 0.0
     for masses, rates, motions, _ in _moving_parts(equations, solution):
         for mass, part in zip(masses.mass[0], rates, strict=True):
-            momentum, whole = momentum + mass * (part.moving[0] @ motions), whole + mass
+            momentum, moving_mass = momentum + mass * (part.moving[0] @ motions), moving_mass + mass
     scaled = momentum**2 / np.sqrt(solution.squares[: solution.ringing]) ** 2 * float(equations.mechanism.length[0])
-    shares = scaled / whole if whole else scaled
+    shares = scaled / moving_mass if moving_mass else scaled
     return [(float(x), float(y), float(z)) for x, y, z in shares.T]
 
 
 def _moving_parts(
     equations: Balance, solution: Modes
 ) -> Iterator[tuple[Masses, list[PartRates], Array, ElasticLeg | None]]:
-    """The masses of the platform and of each leg, their rates, and the modes over the coordinates of these rates.
+    """Give the masses of the platform and of each leg, their rates, and the modes over the coordinates of these rates.
 
     Returns:
         Masses, rates, modes [coordinates x modes], and the leg; None for the platform.
@@ -85,14 +85,14 @@ def _moving_parts(
     mechanism, state, shapes = equations.mechanism, equations.state, solution.shapes[:, : solution.ringing]
     rates = platform_rates(mechanism.platform, state.platform)
     yield mechanism.platform, rates, mechanism.ways @ shapes[: mechanism.ways.shape[1]], None
-    given = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
     ends = pairwise(starts_of(equations))
     for leg, coordinates, (first, last) in zip(mechanism.legs, state.coordinates, ends, strict=True):
-        yield leg.masses, leg_rates(leg, leg.chain.place(coordinates, given)), shapes[first:last], leg
+        yield leg.masses, leg_rates(leg, leg.chain.place(coordinates, amounts)), shapes[first:last], leg
 
 
 def small_motions(response: Response, equations: Balance, solution: Modes, number: int) -> Deflection:
-    """The motions of the tool and of the ends of all links in a mode, for drawings.
+    """Return the motions of the tool and of the ends of all links in a mode, for drawings.
 
     They are differences of the exact motions of the links after a displacement so small that it is one to first order.
 
@@ -108,9 +108,9 @@ def small_motions(response: Response, equations: Balance, solution: Modes, numbe
         coordinates + amount * shape[None, first:last]
         for coordinates, (first, last) in zip(state.coordinates, pairwise(starts), strict=True)
     )
-    beside = replace(equations, state=replace(state, coordinates=displaced))
+    displaced_equations = replace(equations, state=replace(state, coordinates=displaced))
     legs, origin = response.configuration.legs, response.reference
-    links_before, links_after = (loaded_links(balanced, legs, origin) for balanced in (equations, beside))
+    links_before, links_after = (loaded_links(balanced, legs, origin) for balanced in (equations, displaced_equations))
     joule = float(equations.mechanism.force[0] * equations.mechanism.length[0])
     tool = (solution.tool[:, number] * amount * math.sqrt(joule)).tolist()
     return Deflection(

@@ -78,15 +78,15 @@ class SpringSizes:
             rows.reshape(len(rows), -1, self.springs) for rows in (twists, mixed_mass, mixed_stiffness, conditions)
         )
         projection = np.eye(self.springs) - inverse.reshape(len(inverse), self.springs, -1) @ conditions
-        products = [np.swapaxes(twists, 1, 2) @ mixed for mixed in (mixed_mass, mixed_stiffness)]
-        projected_mass, projected_stiffness = (
-            projection @ (mixed + np.swapaxes(mixed, 1, 2) + self._from_upper(rows)) @ projection
-            for mixed, rows in zip(products, (mass, stiffness), strict=True)
-        )
-        return projection, projected_mass, projected_stiffness
+        projected = []
+        for mixed, triangle in ((mixed_mass, mass), (mixed_stiffness, stiffness)):
+            product_with_twists = np.swapaxes(twists, 1, 2) @ mixed
+            whole = product_with_twists + np.swapaxes(product_with_twists, 1, 2) + self._from_upper(triangle)
+            projected.append(projection @ whole @ projection)
+        return projection, projected[0], projected[1]
 
     def _from_upper(self, rows: Array) -> Array:
-        """Symmetric matrices [n x springs x springs] from their upper triangles, row by row [n x entries]."""
+        """Return symmetric matrices [n x springs x springs] from their upper triangles, row by row [n x entries]."""
         result = np.zeros((len(rows), self.springs, self.springs))
         i, j = np.triu_indices(self.springs)
         result[:, i, j] = result[:, j, i] = rows
@@ -113,9 +113,9 @@ class SpringSizes:
         factors = axes / np.sqrt(sizes)[:, None]
         reduced = np.swapaxes(factors, 1, 2) @ (mass if massive else projection)[rows] @ factors
         shapes = factors @ np.linalg.eigh(reduced)[1][:, :, ::-1]
-        shown = min(count, self.springs - self.conditions)
+        present = min(count, self.springs - self.conditions)
         result[rows] = 0.0
-        result[rows, :shown] = np.swapaxes(shapes, 1, 2)[:, :shown]
+        result[rows, :present] = np.swapaxes(shapes, 1, 2)[:, :present]
         return result
 
 
@@ -129,7 +129,7 @@ def spring_sizes(machine: Cut) -> SpringSizes:
 
 
 def springs_follow_ways(machine: Cut) -> bool:
-    """Whether all springs of legs deflect in motions that the machine has; those of a planar machine may not."""
+    """Return whether all springs of legs deflect in motions that the machine has; those of a planar one may not."""
     outside = np.eye(6) - machine.mechanism.ways @ machine.mechanism.ways.T
     return all(not (leg.chain.twists.astype(float) @ outside).any() for leg in machine.legs)
 
@@ -139,7 +139,7 @@ class SpringMotions:
 
     Attributes:
         size: number of springs.
-        sure: whether the conditions of closed legs are independent.
+        sure: whether the conditions of closed legs are surely independent.
     """
 
     def __init__(self, machine: Cut, coordinates: Row) -> None:
@@ -153,18 +153,20 @@ class SpringMotions:
         self._machine, self._tangent = machine, tangent
         # Of each leg, the deflections of its springs per unit of y: 1 / sqrt(k).
         self._deflections = [
-            np.array([*(1.0 / sqrt(part) for part in leg.terms.carrying[0, leg.elastic]), None], dtype=object)[:-1]
+            array_of(
+                [[1.0 / sqrt(stiffness) for stiffness in leg.terms.carrying[0, leg.elastic]]], 1, len(leg.elastic)
+            )[0]
             for leg in tangent.legs
         ]
-        openings = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
-        openings += [leg.spring_loads * scale for leg, scale in zip(tangent.legs, self._deflections, strict=True)]
-        opening = block_diagonal(openings)  # by which y opens the cuts along the lines
-        self.size = opening.shape[1]
-        ways = machine.mechanism.ways.astype(object)
+        blocks = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
+        blocks += [leg.spring_loads * scale for leg, scale in zip(tangent.legs, self._deflections, strict=True)]
+        openings = block_diagonal(blocks)  # of the cuts along their lines, per unit of y
+        self.size = openings.shape[1]
+        ways, lines = machine.mechanism.ways.astype(object), len(tangent.lines)
         inverse, internal, _ = right_inverse(tangent.lines.T.tolist())
         count = len(internal)
-        self._twists = product(array_of(inverse, len(tangent.lines), ways.shape[1]).T, opening)
-        self._conditions = product(array_of(internal, count, len(tangent.lines)), opening)
+        self._twists = product(array_of(inverse, lines, ways.shape[1]).T, openings)
+        self._conditions = product(array_of(internal, count, lines), openings)
         self.sure: Scalar = True
         self._inverse = array_of([], self.size, 0)
         if count:
@@ -173,7 +175,7 @@ class SpringMotions:
         self._inertia = self._platform_inertia(ways)
 
     def _platform_inertia(self, ways: Array) -> Array:
-        """The inertia of the platform with the rotors of all rods, over the motions of the platform [ways x ways]."""
+        """Return the inertia of the platform with the rotors of all rods, over its motions [ways x ways]."""
         mechanism, tangent = self._machine.mechanism, self._tangent
         inertia = platform_inertia(mechanism.platform, tangent.platform, mechanism.length)[0]
         for rod, pull in zip(self._machine.rods, tangent.pulls, strict=True):
@@ -183,7 +185,7 @@ class SpringMotions:
         return np.asarray(ways.T @ inertia @ ways)
 
     def parts(self) -> list[Scalar]:
-        """The parts of the mass M and the stiffness K over y, row by row: `SpringSizes.matrices` puts them together.
+        """Return the parts of the mass M and the stiffness K over y, row by row, for `SpringSizes.matrices`.
 
         With the twists T y of the platform, M is T^T H + H^T T + D and K is 1 + T^T F + F^T T + E, of D and E the upper
         triangles. Legs stay closed where A y = 0.
@@ -197,7 +199,7 @@ class SpringMotions:
         return [entry for row in rows for entry in row.ravel().tolist()] + _triangle(mass) + _triangle(stiffness)
 
     def pencil(self, what: Modal) -> list[Scalar]:
-        """The parts of which eigenvalues are found, in the order of `engine.eigenvalues`.
+        """Return the parts of which eigenvalues are found, in the order of `engine.eigenvalues`.
 
         Args:
             what: natural frequencies, of which eigenvalues are 1 / omega², with relaxed springs or at rest; or the load
@@ -218,7 +220,7 @@ class SpringMotions:
         return result
 
     def _triangles(self, matrix: Array) -> list[Scalar]:
-        """The upper triangles of all legs."""
+        """Return the upper triangles of all legs."""
         ends = np.cumsum([len(self._machine.rods), *(len(scale) for scale in self._deflections)]).tolist()
         return [entry for first, last in pairwise(ends) for entry in _triangle(matrix[first:last, first:last])]
 
@@ -229,7 +231,7 @@ class SpringMotions:
         return self._form_over_springs(self._tangent.turning, self._leg_stiffnesses())
 
     def _leg_inertias(self) -> Iterator[Array]:
-        """The inertia of each leg over its coordinates."""
+        """Give the inertia of each leg over its coordinates."""
         length = self._machine.mechanism.length
         for leg, elastic in zip(self._tangent.legs, self._machine.legs, strict=True):
             matrix = np.diag(elastic.rotors[0].astype(object) * length[0])
@@ -238,7 +240,7 @@ class SpringMotions:
             yield matrix
 
     def _leg_stiffnesses(self) -> Iterator[Array]:
-        """The stiffness of each leg over its coordinates that comes from wrenches which turn with its parts."""
+        """Give the stiffness of each leg over its coordinates that comes from wrenches which turn with its parts."""
         return (leg.terms.geometric[0].astype(object) for leg in self._tangent.legs)
 
     def _form_over_springs(self, platform: Array, legs: Iterable[Array]) -> tuple[Array, Array]:
@@ -258,16 +260,14 @@ class SpringMotions:
             platform = platform + symmetric_product(by_twist.T, product(matrix, by_twist))
             mixed.append(product(by_twist.T, loads))
             without_twist.append(symmetric_product(by_springs.T, loads))
-        count = len(self._machine.rods)
-        platform = 0.5 * (platform + platform.T)
-        beside = np.concatenate([array_of([], len(platform), count), *mixed], axis=1)
-        return 0.5 * product(platform, self._twists) + beside, block_diagonal(
-            [array_of([], count, count), *without_twist]
-        )
+        count = len(self._machine.rods)  # rods have no coordinates of their own
+        of_platform = 0.5 * product(0.5 * (platform + platform.T), self._twists)
+        of_legs = np.concatenate([array_of([], len(platform), count), *mixed], axis=1)
+        return of_platform + of_legs, block_diagonal([array_of([], count, count), *without_twist])
 
     @staticmethod
     def _leg_motion(leg: CondensedLeg, scale: Array) -> tuple[Array, Array]:
-        """Rates of a leg's coordinates by the twist of the platform, and by the unknowns of the leg's springs."""
+        """Return the rates of a leg's coordinates by the twist of the platform, and by the unknowns of its springs."""
         size = len(leg.elastic) + len(leg.passive)
         by_twist = np.full((size, leg.wrenches.shape[1]), 0.0, dtype=object)
         by_springs = np.full((size, len(leg.elastic)), 0.0, dtype=object)
@@ -278,7 +278,7 @@ class SpringMotions:
         return by_twist, by_springs
 
     def square(self, mode: Sequence[Scalar]) -> Scalar:
-        """1 / omega² of a mode, s²: its kinetic energy over its elastic one, at omega = 1."""
+        """Return 1 / omega² of a mode, s²: its kinetic energy over its elastic one, at omega = 1."""
         twist, leg_motions, unknowns = self._motion(mode)
         machine, tangent, length = self._machine, self._tangent, self._machine.mechanism.length
         kinetic = twist @ (self._inertia @ twist)
@@ -288,14 +288,14 @@ class SpringMotions:
         return kinetic / (unknowns @ unknowns + self._work_of_turning(twist, leg_motions))
 
     def factor(self, mode: Sequence[Scalar]) -> Scalar:
-        """The factor by which the load may grow until the machine gives way in a mode; infinite if it never does."""
+        """Return the factor by which loads may grow until the machine gives way in a mode; else infinite."""
         twist, leg_motions, unknowns = self._motion(mode)
         share = -(self._work_of_turning(twist, leg_motions) / (unknowns @ unknowns))
         grows = share > UNRESISTED
         return where(grows, 1.0 / where(grows, share, 1.0), math.inf)
 
     def _motion(self, mode: Sequence[Scalar]) -> tuple[Array, list[Array], Array]:
-        """The twist of the platform in a mode, the motions of each leg's coordinates, and y that keeps legs closed."""
+        """Return the twist of the platform in a mode, motions of legs' coordinates, and y that keeps legs closed."""
         unknowns = of_scalars([*mode])[0]
         if len(self._conditions):
             unknowns = unknowns - self._inverse @ (self._conditions @ unknowns)
@@ -307,7 +307,7 @@ class SpringMotions:
         return twist, leg_motions, unknowns
 
     def _work_of_turning(self, twist: Array, leg_motions: Sequence[Array]) -> Scalar:
-        """Twice the work in a mode of loads and wrenches, which turn with the parts that they act on."""
+        """Return twice the work in a mode of loads and wrenches, which turn with the parts that they act on."""
         work = twist @ (self._tangent.turning @ twist)
         for leg, motion in zip(self._tangent.legs, leg_motions, strict=True):
             work = work + motion @ (leg.terms.geometric[0].astype(object) @ motion)
@@ -315,19 +315,18 @@ class SpringMotions:
 
 
 def _triangle(matrix: Array) -> list[Scalar]:
-    """The upper triangle of a symmetric matrix, row by row."""
+    """Return the upper triangle of a symmetric matrix, row by row."""
     return [matrix[i, j] for i in range(len(matrix)) for j in range(i, len(matrix))]
 
 
 def motions_without_loads(machine: Machine, response: Response, joints: Joints | None) -> SpringMotions:
-    """The motions of a machine with relaxed springs, with numbers of any kind; arguments as of `vibrating`."""
+    """Return the motions of a machine with relaxed springs and numbers of any kind; arguments as of `vibrating`."""
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None:
         raise ValueError("loops that cannot be cut have no motions over scalars")
     ways = machine_cut.mechanism.ways.shape[1]
-    return SpringMotions(
-        machine_cut, [0.0] * (machine_cut.carrier.size + sum(leg.size + ways for leg in machine_cut.legs))
-    )
+    size = machine_cut.carrier.size + sum(leg.size + ways for leg in machine_cut.legs)
+    return SpringMotions(machine_cut, [0.0] * size)
 
 
 @dataclass(frozen=True)
@@ -360,8 +359,8 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
     """Decide which modes over springs programs need for some quantities; None if they need none, or cannot use them.
 
     Args:
-        machine: with its masses.
-        names: of quantities.
+        machine: the machine with its masses.
+        names: names of quantities.
         varying: leaf paths of the parameters that vary.
     """
     rows = [QUANTITIES[name] for name in names]
@@ -375,11 +374,11 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
         return None
     sizes = spring_sizes(machine_cut)
     most = sizes.springs - sizes.conditions
-    highest = [
-        max([int(row.name.rpartition("_")[2]) for row in modal if row.modal and bool(row.loaded) == at_rest], default=0)
-        for at_rest in (True, False)
-    ]
-    loaded, free = (min(most, number + SPARE_MODES) if number and not alone else 0 for number in highest)
+    counts = []
+    for at_rest in (True, False):
+        numbers = [int(row.name.rpartition("_")[2]) for row in modal if row.modal and bool(row.loaded) == at_rest]
+        counts.append(min(most, max(numbers) + SPARE_MODES) if numbers and not alone else 0)
+    loaded, free = counts
     result = ModeCounts(loaded, int(any(row.loaded == "factor" for row in modal)), free)
     return result if result != ModeCounts() else None
 
