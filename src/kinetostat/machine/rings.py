@@ -32,6 +32,83 @@ from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.spec.fields import Field, Quantity, made_table, quantities, table
 
+Three = tuple[float, float, float]
+of_three_legs = partial(Quantity, count=3, per_leg=True)
+"""A quantity with a value for each of three legs."""
+
+
+@table
+class Rings:
+    """Part of a table [geometry]: the radii."""
+
+    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
+    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
+
+    @property
+    def size(self) -> Scalar:
+        """Characteristic length of the machine, m: the mean radius."""
+        return 0.5 * (self.base_radius + self.platform_radius)
+
+
+def joint_angles(ring_name: str, count: int) -> Quantity:
+    """Angles of the joints of a ring, "base" or "platform": one for each leg."""
+    meaning = f"angles of the {ring_name} joints from x, leg by leg"
+    return Quantity("angle", meaning, count=count, apart=True, per_leg=True)
+
+
+@table
+class ThreeLegs(Rings):
+    """Part of a table [geometry]: rings of three legs."""
+
+    base_angles: Annotated[Three, joint_angles("base", 3)]
+    platform_angles: Annotated[Three, joint_angles("platform", 3)]
+
+
+def ends(
+    rings: Rings,
+    base_angles: Sequence[Scalar],
+    platform_angles: Sequence[Scalar],
+    platform: Displacement,
+    heights: tuple[Scalar, Scalar] = (0.0, 0.0),
+) -> tuple[list[Vector], list[Vector]]:
+    """Base joints and platform joints of the legs in order, base frame, m.
+
+    Args:
+        rings: the radii.
+        base_angles, platform_angles: the angles of the joints of both rings from x, rad.
+        platform: the placement of the platform.
+        heights: z of the base ring in the base frame, and of the platform ring in the platform frame, m.
+    """
+    base = ring(rings.base_radius, base_angles, heights[0])
+    return base, [platform.apply(point) for point in ring(rings.platform_radius, platform_angles, heights[1])]
+
+
+def four_joints(radius: Scalar, angle: Scalar) -> list[Vector]:
+    """Joint centres at `radius` (m) and the angles T, 90 deg + T, -(90 deg + T), -T for T = `angle` (rad)."""
+    p = polar(radius, angle)
+    return [p, Vector(-p.y, p.x, 0.0), Vector(-p.y, -p.x, 0.0), Vector(p.x, -p.y, 0.0)]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A machine at its pose without its actuated legs; base frame, m.
+
+    Attributes:
+        platform: the placement of the platform; its translation is P.
+        joints: base joints and platform joints of the actuated legs, in order.
+        passive: the passive legs that guide the platform.
+        closures: what the passive legs need to close.
+    """
+
+    platform: Displacement
+    joints: tuple[Sequence[Vector], Sequence[Vector]]
+    passive: tuple[Leg, ...] = ()
+    closures: tuple[Closure, ...] = ()
+
+    def with_legs(self, legs: Sequence[Leg], size: Scalar, closures: Sequence[Closure] = ()) -> Configuration:
+        """The whole machine, with its actuated legs, their closures, and its characteristic length (m)."""
+        return Configuration(self.platform, (*self.passive, *legs), (*self.closures, *closures), size)
+
 
 @table
 class Cranks:
@@ -136,106 +213,6 @@ def crank_leg(name: str, base: Vector, tip: Vector, axis: Vector, stiffness: Sca
     return Leg(name, elements, (Line(tip, along),)), closures
 
 
-def crank_legs(
-    ends: tuple[Sequence[Vector], Sequence[Vector]],
-    sides: Sequence[Vector],
-    stiffness: Sequence[Scalar],
-    links: CrankLinks,
-) -> tuple[tuple[Leg, ...], tuple[Closure, ...]]:
-    """R-U-S legs "leg 1", "leg 2", ... whose cranks turn in vertical planes, and what they need to close.
-
-    For a platform joint above its base joint the crank points to its side, else away from it.
-
-    Args:
-        ends: base joints and platform joints in order, base frame, m.
-        sides: horizontal unit vectors in the planes of the cranks, see `outward`.
-        stiffness: the stiffness of the actuators, N·m/rad.
-        links: crank and rod, equal in all legs.
-    """
-    return legs_and_closures(
-        crank_leg(f"leg {i}", base, tip, Z_AXIS.cross(side), k, links)
-        for i, (base, tip, side, k) in enumerate(zip(*ends, sides, stiffness, strict=True), 1)
-    )
-
-
-Three = tuple[float, float, float]
-of_three_legs = partial(Quantity, count=3, per_leg=True)
-"""A quantity with a value for each of three legs."""
-
-
-@table
-class Rings:
-    """Part of a table [geometry]: the radii."""
-
-    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
-    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
-
-    @property
-    def size(self) -> Scalar:
-        """Characteristic length of the machine, m: the mean radius."""
-        return 0.5 * (self.base_radius + self.platform_radius)
-
-
-def joint_angles(ring_name: str, count: int) -> Quantity:
-    """Angles of the joints of a ring, "base" or "platform": one for each leg."""
-    meaning = f"angles of the {ring_name} joints from x, leg by leg"
-    return Quantity("angle", meaning, count=count, apart=True, per_leg=True)
-
-
-@table
-class ThreeLegs(Rings):
-    """Part of a table [geometry]: rings of three legs."""
-
-    base_angles: Annotated[Three, joint_angles("base", 3)]
-    platform_angles: Annotated[Three, joint_angles("platform", 3)]
-
-
-def ends(
-    rings: Rings,
-    base_angles: Sequence[Scalar],
-    platform_angles: Sequence[Scalar],
-    platform: Displacement,
-    heights: tuple[Scalar, Scalar] = (0.0, 0.0),
-) -> tuple[list[Vector], list[Vector]]:
-    """Base joints and platform joints of the legs in order, base frame, m.
-
-    Args:
-        rings: the radii.
-        base_angles, platform_angles: the angles of the joints of both rings from x, rad.
-        platform: the placement of the platform.
-        heights: z of the base ring in the base frame, and of the platform ring in the platform frame, m.
-    """
-    base = ring(rings.base_radius, base_angles, heights[0])
-    return base, [platform.apply(point) for point in ring(rings.platform_radius, platform_angles, heights[1])]
-
-
-def four_joints(radius: Scalar, angle: Scalar) -> list[Vector]:
-    """Joint centres at `radius` (m) and the angles T, 90 deg + T, -(90 deg + T), -T for T = `angle` (rad)."""
-    p = polar(radius, angle)
-    return [p, Vector(-p.y, p.x, 0.0), Vector(-p.y, -p.x, 0.0), Vector(p.x, -p.y, 0.0)]
-
-
-@dataclass(frozen=True)
-class Placement:
-    """A machine at its pose without its actuated legs; base frame, m.
-
-    Attributes:
-        platform: the placement of the platform; its translation is P.
-        joints: base joints and platform joints of the actuated legs, in order.
-        passive: the passive legs that guide the platform.
-        closures: what the passive legs need to close.
-    """
-
-    platform: Displacement
-    joints: tuple[Sequence[Vector], Sequence[Vector]]
-    passive: tuple[Leg, ...] = ()
-    closures: tuple[Closure, ...] = ()
-
-    def with_legs(self, legs: Sequence[Leg], size: Scalar, closures: Sequence[Closure] = ()) -> Configuration:
-        """The whole machine, with its actuated legs, their closures, and its characteristic length (m)."""
-        return Configuration(self.platform, (*self.passive, *legs), (*self.closures, *closures), size)
-
-
 PlatformOf = Callable[[Any, Any, Any], Placement]
 """From the tables geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
 
@@ -267,10 +244,14 @@ def with_struts_or_cranks(
 
     def with_cranks(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
         placement = platform_of(geometry, stiffness, pose)
-        sides = outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
-        legs, limits = crank_legs(placement.joints, sides, stiffness.actuator, bars)
-        return placement.with_legs(legs, geometry.size, limits)
+        # About this axis the crank points to its side if the platform joint is above the base joint, else away from it.
+        axes = [Z_AXIS.cross(side) for side in outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)]
+        legs, closures = legs_and_closures(
+            crank_leg(f"leg {i}", base, tip, axis, k, bars)
+            for i, (base, tip, axis, k) in enumerate(zip(*placement.joints, axes, stiffness.actuator, strict=True), 1)
+        )
+        return placement.with_legs(legs, geometry.size, closures)
 
     struts = LinkKind("legs", ("leg_axial",), straight_legs)
     cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}

@@ -94,12 +94,11 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
         tables: the numbers of the machine, SI, by keyword.
     """
     home = chains(plan, **tables)
-    remaining = iter(joints)
-    placed = [place(steps, remaining) for steps in home.legs]
-    chains_of = [with_rods(steps, chain) for steps, (chain, _) in zip(home.legs, placed, strict=True)]
+    coordinates = iter(joints)
+    placed = [place(steps, coordinates) for steps in home.legs]
     legs = tuple(
-        Leg(leg.name, chain, idle=leg.idle, centred=leg.centred)
-        for leg, chain in zip(plan.legs, chains_of, strict=True)
+        Leg(leg.name, with_rods(steps, elements), idle=leg.idle, centred=leg.centred)
+        for leg, steps, (elements, _) in zip(plan.legs, home.legs, placed, strict=True)
     )
     return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
 
@@ -137,12 +136,12 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 chain.append(placed)
                 continue
             placed, moved = placed.moved(amount)
-            if mover.point is None:
+            if mover.point is None:  # a slide, which leaves the rotation as it is
                 motion, home = Displacement(motion.rotation, motion.translation + moved.translation), ZERO
-            elif moved.rotation is IDENTITY or not is_zero(mover.pitch):
+            elif moved.rotation is IDENTITY or not is_zero(mover.pitch):  # a parallelogram or a screw
                 motion, home = moved @ motion, ZERO
             else:
-                if mover.point is home:
+                if mover.point is home:  # about the point of the revolute before it
                     placed = _with_line(placed, centre)
                 home, centre = mover.point, placed.mover.point
                 turn = motion.rotation @ step.element.moved(amount)[1].rotation
