@@ -262,10 +262,8 @@ def _point_text(point: Array, display: Display) -> str:
 def load_table(load: LoadCase, display: Display = ENGINEERING) -> FittedTable:
     """Return the load and the deflection of the reference point."""
     turning = [name in ROTATION_NAMES for name in load.components]
-    units, scales = (
-        [load_unit(turns) for turns in turning],
-        [display.deflection(motion_unit(turns)) for turns in turning],
-    )
+    units = [load_unit(turns) for turns in turning]
+    scales = [display.deflection(motion_unit(turns)) for turns in turning]
     motions = ", ".join(dict.fromkeys(scale.unit for scale in scales))
     title = f"Load ({display.names(units)}) and the deflection under it ({motions})"
     table = numeric_table(title, "", load.components)
@@ -306,12 +304,14 @@ def remarks(analysis: Analysis) -> list[str]:
         mobility = analysis.mobility
         extra = f", {mobility.here.redundant} redundant constraints" if mobility.here.redundant else ""
         lines.append(f"Mobility: {mobility.full_cycle} freedoms, {mobility.actuators} actuators{extra}.")
-        lines.append(f"{_sort_of_pose(mobility.kind)}.")
+        regular = mobility.kind is SortOfPose.REGULAR
+        lines.append("Regular pose." if regular else f"Singular pose ({mobility.kind}).")
     if analysis.internal_loads and analysis.internal_loads.degree:
-        legs = ", ".join(analysis.internal_loads.legs)
+        legs, undecided = ", ".join(analysis.internal_loads.legs), analysis.internal_loads.undecided
+        verdict = f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
         lines.append(
             f"Statically indeterminate internal loads: {analysis.internal_loads.degree}, in {legs}; "
-            f"elasticity {_internal_loads_sentence(analysis.internal_loads.undecided)}."
+            f"elasticity {verdict}."
         )
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
@@ -327,15 +327,6 @@ def remarks(analysis: Analysis) -> list[str]:
     if analysis.masses:
         lines.append(_mass_sentence(analysis))
     return lines
-
-
-def _sort_of_pose(kind: SortOfPose) -> str:
-    return "Regular pose" if kind is SortOfPose.REGULAR else f"Singular pose ({kind})"
-
-
-def _internal_loads_sentence(undecided: int) -> str:
-    """Return how many internal loads follow from the compliance of the legs."""
-    return f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
 
 
 def first_names(parts: Sequence[str]) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from kinetostat.accuracy.toleranced_parts import PossibleErrors, is_about, possible_errors
 from kinetostat.display import Display, number
@@ -236,10 +235,6 @@ def _exact_of(answer: Budget) -> dict[str, Any] | None:
     return {"machines": exact.machines, "failed": exact.failed, **by_measure}
 
 
-def _budget_file(answer: Budget) -> xr.Dataset | None:
-    return budget_dataset(answer) if len(answer.status) > 1 else None
-
-
 PART = (
     Field("path"),
     Field("meaning", "words"),
@@ -291,7 +286,7 @@ BUDGET = Description(
         "budget.json": "json",
         "contributions.csv": "csv",
         "poses.csv": poses_csv,
-        "budget.nc": _budget_file,
+        "budget.nc": lambda answer: budget_dataset(answer) if len(answer.status) > 1 else None,
     },
     figure_prefix="budget-",
 )

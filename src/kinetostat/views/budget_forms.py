@@ -134,12 +134,7 @@ def _over_poses(budget: Budget, title: str = "{}: error of the tool") -> "Figure
 
 
 def contributions_figure(budget: Budget, title: str = "{}: what the error of the tool is made of") -> "Figure":
-    """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance.
-
-    Args:
-        budget: budget of a machine with tolerances.
-        title: title of the figure, with braces for the name of the machine.
-    """
+    """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance."""
     names = ranked_by(budget)
     rows = budget.shares[[budget.measures.index(name) for name in names]]
     order = budget.ranking[:MOST_BARS]

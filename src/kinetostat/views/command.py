@@ -32,10 +32,6 @@ RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Digits as exponents."""
 
 
-def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
-    yield _single_pose_table(answer) if len(answer.coordinates) == 1 else _poses_table(answer)
-
-
 def _single_pose_table(answer: Command) -> FittedTable:
     """Return a row for each actuator: its coordinates with and without the loads, and their difference."""
     display, heads = answer.machine.display, ["commanded", "without loads", "difference"]
@@ -100,7 +96,7 @@ COMMAND = Description(
         Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
     ),
     lines=lambda answer: [("Commands", answer.message)],
-    tables=_command_tables,
+    tables=lambda answer, _full: [(_single_pose_table if len(answer.coordinates) == 1 else _poses_table)(answer)],
     state=lambda _answer: "commanded under load",
     answered=lambda answer: bool(answer.settled.any()),
     makers={"csv": command_csv},

@@ -201,12 +201,7 @@ def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
 
 
 def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> "Figure":
-    """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each.
-
-    Args:
-        answer: the answer of a machine that comes to rest.
-        title: over the figure, with braces for the name of the machine.
-    """
+    """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each."""
     panels = _panels(answer)
     rows = -(-len(panels) // 2)
     heights = answer.machine.display.scale("rad")

@@ -137,7 +137,8 @@ def _tables(dataset: xr.Dataset, full: bool) -> Iterator[FittedTable]:
     if len(dataset["status"].dims) == 1 and (full or rows <= MOST_ROWS_OF_A_SWEEP):
         yield _curve_table(dataset, names)
     else:
-        extremes = {name: _extremes(dataset[name]) for name in names}
+        of_names = ((name, dataset[name]) for name in names)
+        extremes = {name: Extremes(float(v.min()), float(v.mean()), float(v.max())) for name, v in of_names}
         yield _extremes_table(size_of(dataset), extremes, display_of(dataset))
 
 
@@ -168,10 +169,6 @@ def _of_unit(dataset: xr.Dataset, name: str, names: Sequence[str]) -> Iterator[f
     """Return all values of the quantities that have the unit of one of them."""
     unit = QUANTITIES[name].unit
     return (float(v) for other in names if QUANTITIES[other].unit == unit for v in dataset[other].values.flat)
-
-
-def _extremes(data: xr.DataArray) -> Extremes:
-    return Extremes(float(data.min()), float(data.mean()), float(data.max()))
 
 
 def _extremes_table(size: str, extremes: Mapping[str, Extremes], display: Display) -> FittedTable:

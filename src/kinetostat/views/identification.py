@@ -37,8 +37,11 @@ MOST_LISTED_OUTLIERS = MOST_LISTED_POSES = 40
 NOT_EXPLAINED = 1.5
 """Residuals over their standard deviations from which something else must be said to move the tool."""
 NOT_SEEN = "not seen"
-SI_UNITS = {"length": "m", "angle": "rad"}
-MEASURED_KINDS = {"length": "positions and distances", "angle": "angles"}
+"""Word in the place of an interval that has no end."""
+MEASURED_KINDS = {"length": ("positions and distances", "m"), "angle": ("angles", "rad")}
+"""Kinds of measured values, each with its words and its SI unit."""
+USUAL_TOWER_ANGLES = (210.0, 330.0, 90.0)
+"""Angles of the towers of a printer, deg, from which firmware counts."""
 
 
 def _record(answer: Identification) -> FitRecord:
@@ -46,12 +49,12 @@ def _record(answer: Identification) -> FitRecord:
 
 
 def _fit_lines(record: FitRecord) -> Lines:
-    hidden, aside = len(record.unknowns) - record.rank, len(record.outliers)
+    unseen_count = len(record.unknowns) - record.rank
     text = (
         f"{len(record.unknowns)} unknowns from {record.values} values at {record.poses} poses; {record.rank} "
-        f"combinations are seen{f', {hidden} are not' if hidden else ''}"
+        f"combinations are seen{f', {unseen_count} are not' if unseen_count else ''}"
     )
-    text += f"; {aside} values are set aside as outliers." if aside else "."
+    text += f"; {len(record.outliers)} values are set aside as outliers." if record.outliers else "."
     if record.known and record.scatter > NOT_EXPLAINED:
         text += (
             f" The residuals are {number(record.scatter, digits=2)} times as large as the standard deviations say: the "
@@ -112,10 +115,9 @@ def _tables(answer: Identification, _full: bool) -> Iterator[FittedTable]:
 
 def _residual_table(record: FitRecord, display: Display) -> FittedTable:
     table = numeric_table("Residuals, root mean square", "", ["as drawn", "as identified", "of poses left out"])
-    for kind, name in MEASURED_KINDS.items():
+    for kind, (name, unit) in MEASURED_KINDS.items():
         sizes = [residuals.get(kind) for residuals in record.residuals]
         if any(size is not None for size in sizes):
-            unit = SI_UNITS[kind]
             table.add_row(name, *(DASH if size is None else display.show_deflection(size, unit) for size in sizes))
     return table
 
@@ -125,21 +127,21 @@ def _number_table(record: FitRecord, display: Display) -> FittedTable:
     for column in table.columns[1:3]:
         column.justify = "right"
     for unknown in record.unknowns:
-        scale = scale_of(display, unknown.unit, unknown.group)
-        table.add_row(unknown.path, *value_and_half(unknown.value, unknown.half, scale), scale.unit, unknown.words)
+        scale = _scale_of(display, unknown.unit, unknown.group)
+        table.add_row(unknown.path, *_value_and_half(unknown.value, unknown.half, scale), scale.unit, unknown.words)
     return table
 
 
-def value_and_half(value: float, half: float, scale: Scale) -> tuple[str, str]:
+def _value_and_half(value: float, half: float, scale: Scale) -> tuple[str, str]:
     """Return an identified number and half of its 95 % interval in a unit, to the digits that are known."""
     if not np.isfinite(half):
         return number(value * scale.factor), NOT_SEEN
     return number_and_uncertainty(value * scale.factor, half * scale.factor)
 
 
-def scale_of(display: Display, unit: str, group: str) -> Scale:
+def _scale_of(display: Display, unit: str, group: str) -> Scale:
     """Return the unit in which an error is read: that of small motions, ppm for gains, percent for compliances."""
-    if unit in SI_UNITS.values():
+    if unit in ("m", "rad"):
         return display.deflection(unit)
     return SHARE if group == "compliances" else RATIO
 
@@ -147,8 +149,8 @@ def scale_of(display: Display, unit: str, group: str) -> Scale:
 def _outlier_table(record: FitRecord) -> FittedTable:
     table = numeric_table("Outliers, set aside", "line", ["value", "standard deviations"])
     ordered = sorted(record.outliers, key=lambda outlier: -abs(outlier[2]))
-    for line, name, off in ordered[:MOST_LISTED_OUTLIERS]:
-        table.add_row(str(line), name, number(off, digits=3))
+    for line, name, deviations in ordered[:MOST_LISTED_OUTLIERS]:
+        table.add_row(str(line), name, number(deviations, digits=3))
     if len(ordered) > MOST_LISTED_OUTLIERS:
         table.add_row("...", f"{len(ordered) - MOST_LISTED_OUTLIERS} more", "")
     return table
@@ -165,27 +167,27 @@ def _pose_table(proposed: NextPoses, machine: Machine) -> FittedTable:
 
 
 def _firmware_table(numbers: FirmwareNumbers) -> FittedTable:
-    """The numbers of a printer's controller: words of Klipper, letters of M665 and M666, values and intervals."""
+    """Return the numbers of a printer's controller: words of Klipper, letters of M665 and M666, and values."""
     table = text_table("In the words of firmware (mm, deg)", "Klipper", "Marlin", "RepRapFirmware", "value", "±")
     for column in table.columns[3:]:
         column.justify = "right"
+    halves, words_of_scale = numbers.halves, ("rotation_distance, factor", "1 / M92", "1 / M92")
     (marlin, height), (reprap, homed) = numbers.marlin_endstops, numbers.reprap_endstops
-    halves = {name: iter(rows) for name, rows in numbers.halves.items()}
-
-    def row(words: tuple[str, str, str], value: float, name: str) -> None:
-        table.add_row(*words, *number_and_uncertainty(value, next(halves[name])))
-
-    row(("delta_radius", "M665 R", "M665 R"), numbers.radius, "radius")
-    for tower, rod in zip("abc", numbers.rods, strict=True):
-        row((f"arm_length {tower}", "M665 L", "M665 L"), rod, "rods")
-    for tower, letter, nominal, angle in zip("abc", "XYZ", (210.0, 330.0, 90.0), numbers.angles, strict=True):
-        row((f"angle {tower} - {nominal:g}", f"M665 {letter}", f"M665 {letter}"), angle, "angles")
-    for place, tower in enumerate("abc"):
-        letters = f"M666 {'XYZ'[place]} {marlin[place]:+.4f}", f"M666 {'XYZ'[place]} {reprap[place]:+.4f}"
-        row((f"position_endstop {tower}, change", *letters), numbers.raised[place], "raised")
+    angles = zip("abc", "XYZ", USUAL_TOWER_ANGLES, strict=True)
+    endstops = zip("abc", "XYZ", marlin, reprap, strict=True)
+    rows = [
+        ("delta_radius", "M665 R", "M665 R"),
+        *((f"arm_length {tower}", "M665 L", "M665 L") for tower in "abc"),
+        *((f"angle {tower} - {usual:g}", f"M665 {letter}", f"M665 {letter}") for tower, letter, usual in angles),
+        *((f"position_endstop {t}, change", f"M666 {x} {m:+.4f}", f"M666 {x} {r:+.4f}") for t, x, m, r in endstops),
+    ]
+    values = [numbers.radius, *numbers.rods, *numbers.angles, *numbers.raised]
+    widths = [*halves["radius"], *halves["rods"], *halves["angles"], *halves["raised"]]
+    for words, value, half in zip(rows, values, widths, strict=True):
+        table.add_row(*words, *number_and_uncertainty(value, half))
     table.add_row("", f"M665 H {height:+.4f}", f"M665 H {homed:+.4f}", "", "")
-    if any(numbers.halves["scale"]):
-        row(("rotation_distance, factor", "1 / M92", "1 / M92"), numbers.scale, "scale")
+    if any(halves["scale"]):
+        table.add_row(*words_of_scale, *number_and_uncertainty(numbers.scale, halves["scale"][0]))
     return table
 
 
@@ -207,15 +209,6 @@ def _unknowns(answer: Identification) -> list[dict[str, Any]]:
         }
         for unknown, value, half in zip(answer.unknowns, answer.fit.values, answer.fit.half_intervals, strict=True)
     ]
-
-
-def _fit_file(answer: Identification) -> dict[str, Any]:
-    """Return the record of the fit, with what commands of the machine as built need."""
-    return with_home(answer, json_of(IDENTIFICATION, answer))
-
-
-def _next_file(answer: Identification) -> str | None:
-    return None if answer.next is None else as_csv(answer.machine, answer.next)
 
 
 IDENTIFICATION = Description(
@@ -248,8 +241,9 @@ IDENTIFICATION = Description(
     state=lambda answer: f"as built, by {answer.observed.data.path}",
     files={
         "machine.toml": "exchange.leg_by_leg.fitted_text",
-        "fit.json": _fit_file,
-        "next-poses.csv": _next_file,
+        # Commands of the machine as built need the coordinates of its home pose as well.
+        "fit.json": lambda answer: with_home(answer, json_of(IDENTIFICATION, answer)),
+        "next-poses.csv": lambda answer: None if answer.next is None else as_csv(answer.machine, answer.next),
         "klipper.cfg": partial(_firmware_file, klipper_text),
         "marlin.gcode": partial(_firmware_file, marlin_text),
         "reprapfirmware.g": partial(_firmware_file, reprap_text),

@@ -231,12 +231,7 @@ def strut_table(state: LoadedState, display: Display) -> FittedTable:
 
 
 def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "Figure":
-    """Draw displacement and spring loads over the share of the load, with the linear answer as thin lines.
-
-    Args:
-        state: the state of the machine under its whole load.
-        title: over the figure, with braces for the name of the machine.
-    """
+    """Draw displacement and spring loads over the share of the load, with the linear answer as thin lines."""
     machine, curve = state.machine, load_curve(state.state)
     display, share = machine.display, 100.0 * curve.shares
     rotations = [i for i, name in enumerate(state.components) if name.startswith("r")]
@@ -267,12 +262,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "F
 
 
 def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
-    """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed.
-
-    Args:
-        state: the state of a machine that is at rest.
-        title: over the figure, with braces for the name of the machine.
-    """
+    """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed."""
     machine, response = state.machine, state.state.free
     moved, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
     draw, factor = moved_machine(machine, response, moved, state.slack_legs)

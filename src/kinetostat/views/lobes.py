@@ -81,12 +81,7 @@ def lobes_figures(answer: Lobes) -> dict[str, Drawing]:
 
 
 def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> "Figure":
-    """Draw the width of cut that stays stable over the speed of the spindle.
-
-    Args:
-        answer: an answer with lobes.
-        title: the title over the figure, with braces for the name of the machine.
-    """
+    """Draw the width of cut that stays stable over the speed of the spindle."""
     scale = answer.machine.display.scale("m")
     least = answer.least * scale.factor
     top, out_of_view = HEADROOM * least, 2.0 * HEADROOM * least

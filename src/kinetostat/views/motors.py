@@ -78,12 +78,7 @@ def _figures(answer: MotorChoice) -> dict[str, Drawing]:
 
 
 def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion") -> "Figure":
-    """Draw the speed-torque diagram of the best motors, with the motion and its mean squares in it.
-
-    Args:
-        answer: an answer with motors.
-        title: over the figure, with braces for the name of the machine.
-    """
+    """Draw the speed-torque diagram of the best motors, with the motion and its mean squares in it."""
     shown = answer.fits[:MOST_DRAWN]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)

@@ -131,9 +131,7 @@ def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
 def path_figure(answers: PoseAnswers, title: str = "{}") -> "Figure":
     """Draw quantities along a path, a panel for each unit, and the coordinates that vary below; grey without a result.
 
-    Args:
-        answers: the answers at the poses, which are taken as neighbours in the order in which they are given.
-        title: over the figure, with braces for the name of the machine.
+    The poses are taken as neighbours in the order in which they are given.
     """
     quantities, coordinates = _quantity_panels(answers), _coordinate_panels(answers)
     heights = [QUANTITY_HEIGHT] * len(quantities) + [COORDINATE_HEIGHT] * len(coordinates)

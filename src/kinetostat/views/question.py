@@ -116,11 +116,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of an answer, which a call draws; `title=""` draws it without a title, for use with a caption.
+    """A figure of an answer, which a call draws.
 
     Attributes:
         caption: a sentence for a report.
-        draw: function that draws the figure.
+        draw: function that draws the figure. Its argument `title` stands over the figure, with braces for the name of
+            the machine; a figure with a caption has none ("").
         minor: whether a report leaves the figure out.
         file: name of its file without the suffix, if that is not the name of the figure.
     """

@@ -141,10 +141,6 @@ def servo_figures(answer: Servo) -> dict[str, Drawing]:
 def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops closed") -> "Figure":
     """Draw the dynamic stiffness along directions over frequency, with loops closed and with motors that stand still.
 
-    Args:
-        answer: an answer with loops.
-        title: over the figure, with braces for the name of the machine.
-
     Raises:
         ValueError: the answer has no loops.
     """

@@ -63,10 +63,6 @@ def verdict(validation: Validation) -> str:
     return f"{engine}, an independent engine, {agree}: {worst}; {AGREED:g} is allowed."
 
 
-def _engine_lines(validation: Validation) -> Lines:
-    return [("Verdict", verdict(validation)), ("Engine", REBUILT)]
-
-
 def _engine_tables(validation: Validation, full: bool) -> Iterator[FittedTable]:
     """Give the diagonals of C side by side and how far they differ; with `full` both matrices, last."""
     yield _diagonal_table(validation)
@@ -152,7 +148,7 @@ VALIDATION = Description(
             forms=("json",),
         ),
     ),
-    lines=_engine_lines,
+    lines=lambda validation: [("Verdict", verdict(validation)), ("Engine", REBUILT)],
     tables=_engine_tables,
     axes=tuple(Axis(name, _components) for name in ROW_AND_COLUMN),
     state=lambda validation: f"compared with an independent engine, {validation.engine} {validation.version}",
@@ -239,10 +235,6 @@ def _measured_lines(answer: "MeasuredComparison") -> Lines:
         )
 
 
-def _measured_tables(answer: "MeasuredComparison", _full: bool) -> Iterator[FittedTable]:
-    yield measured_table(answer)
-
-
 def measured_figure(answer: "MeasuredComparison", title: str = "{}: measured and computed stiffness") -> "Figure":
     """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
     differences = np.array([row.error / row.u_val for row in answer.rows])
@@ -325,7 +317,7 @@ MEASURED_STIFFNESS = Description(
         Records("entries", "entry", ENTRY, "rows", forms=("json",)),
     ),
     lines=_measured_lines,
-    tables=_measured_tables,
+    tables=lambda answer, _full: [measured_table(answer)],
     figures=measured_figures,
     state=lambda answer: f"beside {answer.path}",
     files={"measured.json": "json"},

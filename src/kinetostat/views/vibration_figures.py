@@ -50,9 +50,7 @@ def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
 def response_figure(answer: Vibration, title: str = "{}: motion of the tool per force") -> Figure:
     """Draw magnitude, phase and real part of the receptance over frequency, and the Nyquist curve.
 
-    Args:
-        answer: an answer with modes; along x, y and z where it has no direction.
-        title: over the figure, with braces for the name of the machine.
+    They are those along the direction that was asked for; along x, y and z if there was none.
     """
     machine, frequencies = answer.machine, frequency_range(answer)
     still = "" if answer.loops is None else " with motors that stand still"
@@ -139,12 +137,7 @@ def _number_modes(panel: Axes, answer: Vibration, frequencies: Array) -> None:
 def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figure:
     """Draw the shapes of the first modes over the machine at rest, seen from in front above; a planar one in plan.
 
-    All stand side by side in one panel without numbers: a panel each takes twice the time.
-
-    Args:
-        answer: an answer with modes.
-        title: over the figure, with braces for the name of the machine.
-    """
+    All stand side by side in one panel without numbers: a panel each takes twice the time."""
     machine, response = answer.machine, answer.state.free
     planar = response.configuration.plane is not None
     view = _view_of(machine, response.configuration)

@@ -129,11 +129,8 @@ def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
     ahead = (step + 1) % count
     quads = np.stack([step, ahead, ahead + count, step + count], axis=1)
     quads = (quads + 2 * count * np.arange(bands)[:, None, None]).reshape(-1, 4)
-    return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), _halved_quads(quads))
-
-
-def _halved_quads(quads: Integers) -> Integers:
-    return np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
+    halves = np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
+    return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), halves)
 
 
 def _without_slivers(points: Array, normals: Array, triangles: Integers) -> Mesh:
@@ -158,9 +155,11 @@ def _extruded_mesh(shape: Extruded) -> Mesh:
     outline = outline[np.any(outline != np.roll(outline, 1, axis=0), axis=1)]
     chamfer = min(shape.chamfer, 0.5 * shape.height)
     steps = [0.5 * math.pi * k / CHAMFER_STEPS for k in range(CHAMFER_STEPS + 1)] if chamfer > 0.0 else [0.5 * math.pi]
+    # Rings of corners from below upwards: how far each lies inside the outline, its height, and the surface's tilt.
     lower = [(chamfer * (1.0 - math.sin(a)), chamfer * (1.0 - math.cos(a)), a) for a in steps]
-    rows = [*lower, *((inset, shape.height - up, math.pi - a) for inset, up, a in reversed(lower))]
-    rings = np.stack([_level(inset_outline(outline, inset) if inset else outline, height) for inset, height, _ in rows])
+    rows = [*lower, *((inset, shape.height - height, math.pi - a) for inset, height, a in reversed(lower))]
+    flat = [(inset_outline(outline, inset) if inset else outline, height) for inset, height, _ in rows]
+    rings = np.stack([np.column_stack([corners, np.full(len(corners), height)]) for corners, height in flat])
     tilts = np.array([tilt for *_, tilt in rows])
     caps = [_cap(rings[-1], 1.0), _cap(rings[0], -1.0)]
     return _joined_meshes([_wall(rings, tilts, _edge_normals(outline)), *caps])
@@ -215,10 +214,6 @@ def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) ->
 def turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     """Twice the area of a triangle, positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _level(flat: Array, height: float) -> Array:
-    return np.column_stack([flat, np.full(len(flat), height)])
 
 
 def _wall(rings: Array, tilts: Array, outward: Array) -> Mesh:
