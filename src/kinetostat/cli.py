@@ -37,12 +37,12 @@ from kinetostat.views.questions import QUESTION_GROUPS
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
-DOING = "computing"
+WORDS_OF_COMMANDS = "computing"
 """Words while a command takes long that has none of its own."""
-LOOKING = "computing; if the pose is out of reach, the nearest one is looked for"
+WORDS_OF_CHECK = "computing; if the pose is out of reach, the nearest one is looked for"
 """Words while a check takes long."""
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -100,8 +100,8 @@ def _run(arguments: Sequence[str] | None, watch: SilenceWatch | None) -> int:
     try:
         options = _options(arguments)
         if watch is not None:
-            watch.say(getattr(options, "doing", DOING))
-            watch.once = getattr(options, "serves", False)
+            watch.say(getattr(options, "doing", WORDS_OF_COMMANDS))
+            watch.ends_with_any_output = getattr(options, "serves", False)
         code = int(options.run(options))
         sys.stdout.flush()
         return code
@@ -114,7 +114,7 @@ def _run(arguments: Sequence[str] | None, watch: SilenceWatch | None) -> int:
         _forget_output()
         return DONE
     except OSError as error:
-        if error.errno not in FULL:
+        if error.errno not in UNWRITABLE:
             raise
         _forget_output()
         print(
@@ -188,7 +188,7 @@ def _add_file_commands(commands: "Commands") -> None:
         "a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a long grid or "
         "search, whose checksums are then compared",
     )
-    check.set_defaults(doing=LOOKING)
+    check.set_defaults(doing=WORDS_OF_CHECK)
 
 
 def _add_new_command(commands: "Commands") -> None:

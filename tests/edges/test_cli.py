@@ -333,8 +333,8 @@ def terminals_of(monkeypatch):
 
     No fixture: pytest takes both streams back between the fixtures and the test.
     """
-    monkeypatch.setattr(silence, "PATIENCE", 0.0)
-    monkeypatch.setattr(silence, "COURTESY", 0.001)
+    monkeypatch.setattr(silence, "SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(silence, "HEAD_START_SECONDS", 0.001)
     streams = Terminal(), Terminal()
     monkeypatch.setattr("sys.stdout", streams[0])
     monkeypatch.setattr("sys.stderr", streams[1])
@@ -375,7 +375,7 @@ def test_a_command_says_what_it_does_and_clears_it_before_its_answer(monkeypatch
 
 
 def test_a_pipe_hears_no_words(monkeypatch, capsys):
-    monkeypatch.setattr(silence, "PATIENCE", 0.0)
+    monkeypatch.setattr(silence, "SILENT_SECONDS", 0.0)
     with silence.spoken_silence("looking") as watch:
         assert watch is None
     assert capsys.readouterr().err == ""

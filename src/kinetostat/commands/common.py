@@ -34,9 +34,8 @@ DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
-MEMORY = 600.0
-"""Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
-
+PROGRESS_SECONDS = 600.0
+"""Time of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
 _WORDS = re.compile(r"""(?:-[\w-]+ (?!-))?(?:[^\s"']|"[^"]*"|'[^']*')+""")
 """Words of a command: an option with its value, what stands in quotes, or any other word."""
@@ -341,7 +340,9 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=MEMORY) as bar:
+    with Progress(
+        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=PROGRESS_SECONDS
+    ) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total, words: bar.update(
             task, completed=done, total=total, description=f"{what} {words}".rstrip()

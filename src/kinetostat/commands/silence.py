@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-PATIENCE = 0.3
-"""Seconds for which nothing may be printed without a word: below it nobody wonders whether the program works."""
-COURTESY = 0.1
-"""Seconds that a progress bar has for its next picture where one computation has held up all threads."""
+SILENT_SECONDS = 0.3
+"""Time for which nothing may be printed without a word: below it nobody wonders whether the program works."""
+HEAD_START_SECONDS = 0.1
+"""Time that a progress bar has for its next picture where one computation has held up all threads."""
 CLEAR_LINE = "\r\x1b[K"
 """Makes a terminal empty the line that it is in."""
 
@@ -23,10 +23,10 @@ class SilenceWatch:
     """Says on a terminal what a command is doing while nothing is printed, until its result is.
 
     Attributes:
-        once: whether a word on standard error is the last as well, as that of a server, which then waits.
+        ends_with_any_output: whether a word on standard error ends it as well, as that of a server, which then waits.
     """
 
-    once = False
+    ends_with_any_output = False
 
     def __init__(self, terminal: Any, words: str) -> None:
         self._words = words
@@ -46,7 +46,7 @@ class SilenceWatch:
 
     def hear(self) -> None:
         """Note that something is about to be printed; the words make room for it."""
-        if self.once:
+        if self.ends_with_any_output:
             self._over.set()
         with self._lock:
             if self._spoken:
@@ -60,8 +60,8 @@ class SilenceWatch:
         self.hear()
 
     def _watch(self) -> None:
-        while not self._over.wait(max(self._heard + PATIENCE - time.monotonic(), COURTESY)):
-            if self._is_silent() and not self._over.wait(COURTESY) and self._is_silent():
+        while not self._over.wait(max(self._heard + SILENT_SECONDS - time.monotonic(), HEAD_START_SECONDS)):
+            if self._is_silent() and not self._over.wait(HEAD_START_SECONDS) and self._is_silent():
                 with self._lock:
                     if self._is_silent() and not self._over.is_set():
                         self._write(f"{self._words} ...")
@@ -72,7 +72,7 @@ class SilenceWatch:
         self._terminal.flush()
 
     def _is_silent(self) -> bool:
-        return not self._spoken and time.monotonic() >= self._heard + PATIENCE
+        return not self._spoken and time.monotonic() >= self._heard + SILENT_SECONDS
 
 
 class HeardStream:

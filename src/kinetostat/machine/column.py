@@ -119,9 +119,9 @@ class Column:
 
 def _wrap(values: AnyArray) -> Column:
     """Make a column without the call of `__init__`, which would cost a tenth of the whole batch."""
-    made = _new(Column)
-    made.values = values
-    return made
+    wrapped = _new(Column)
+    wrapped.values = values
+    return wrapped
 
 
 class _Functions:

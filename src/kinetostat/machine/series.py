@@ -21,7 +21,7 @@ from kinetostat.spec.fields import Field, made_table, optional, quantities
 from kinetostat.units import KINDS
 
 MOST_PARTS = 12
-"""Parts of a series: more is a mistake."""
+"""Parts that a series may have: a drive has some five between motor and platform, so that more is a mistake."""
 
 _PART = re.compile(r"\s*([^\W\d_][^.]*?)[\s:]+([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?:\s*[^\d\s].*)?|rigid)\s*")
 
@@ -73,15 +73,15 @@ def springs_in_a_row(spring: Spring, named: Sequence[tuple[str, Scalar]], joint:
     for number, (key, stiffness) in enumerate(named):
         title = f"{joint} {label(key)}".strip()
         name = PartName(spring.of.leg, title) if isinstance(spring.of, PartName) else f"{spring.of} {label(key)}"
-        first = number == 0
+        is_first = number == 0
         row.append(
             replace(
                 spring,
                 name=name,
                 part=name,
                 stiffness=stiffness,
-                actuated=spring.actuated and first,
-                hinge=spring.hinge and first,
+                actuated=spring.actuated and is_first,
+                hinge=spring.hinge and is_first,
             )
         )
     return tuple(row)
@@ -140,12 +140,12 @@ def _stiffnesses(family: Family) -> set[str]:
 
 @lru_cache(KEPT_FAMILIES)
 def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
-    whole = family.tables["stiffness"]
-    known, by_field = quantities(whole), dict(series)
-    rest = {
-        name: Field(quantity, getattr(whole, name) if name in optional(whole) else None)
+    stiffness_table = family.tables["stiffness"]
+    known, in_parts = quantities(stiffness_table), dict(series)
+    single = {
+        name: Field(quantity, getattr(stiffness_table, name) if name in optional(stiffness_table) else None)
         for name, quantity in known.items()
-        if name not in by_field
+        if name not in in_parts
     }
     rows = {
         f"stiffness.{field}": made_table(
@@ -154,7 +154,7 @@ def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]]
         )
         for field, keys in series
     }
-    tables = {**family.tables, "stiffness": made_table("Stiffness", rest), **rows}
+    tables = {**family.tables, "stiffness": made_table("Stiffness", single), **rows}
     return replace(
         family,
         tables=tables,
@@ -169,18 +169,18 @@ class SeriesStiffness(tuple[tuple[str, Scalar], ...]):
 
 def _configuration(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...], **tables: Any) -> Configuration:
     """The machine at its pose, with the parts of each series as springs in the place of one."""
-    whole, rest = family.tables["stiffness"], tables["stiffness"]
-    known, given = quantities(whole), dict(vars(rest))
+    stiffness_table = family.tables["stiffness"]
+    known, stiffnesses = quantities(stiffness_table), dict(vars(tables["stiffness"]))
     for field, keys in series:
         numbers = tables.pop(f"stiffness.{field}")
         columns = [getattr(numbers, key) for key in keys]
         if known[field].count is None:
-            given[field] = SeriesStiffness(zip(keys, columns, strict=True))
+            stiffnesses[field] = SeriesStiffness(zip(keys, columns, strict=True))
         else:
-            given[field] = tuple(
+            stiffnesses[field] = tuple(
                 SeriesStiffness(zip(keys, entries, strict=True)) for entries in zip(*columns, strict=True)
             )
-    configuration = family.configure(**{**tables, "stiffness": whole(**given)})
+    configuration = family.configure(**{**tables, "stiffness": stiffness_table(**stiffnesses)})
     return replace(configuration, legs=tuple(_in_parts(leg) for leg in configuration.legs))
 
 

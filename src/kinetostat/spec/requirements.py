@@ -13,9 +13,12 @@ from kinetostat.spec.document import Document, override, read_text, toml_key, to
 from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
-MOST_POSES, MOST_CONDITIONS, MOST_RANGES = 10_000, 50, 6
-"""Entries of a requirement at most: each pose is solved for whenever a requirement is judged, and a box has no more
-axes than a pose."""
+MOST_POSES = 10_000
+"""Poses of a requirement: each is solved for whenever the requirement is judged, which takes seconds for so many."""
+MOST_CONDITIONS = 50
+"""Conditions of a requirement: more than there are quantities that anybody bounds."""
+MOST_RANGES = 6
+"""Axes of a box: no pose has more coordinates."""
 LONGEST_REQUIREMENT_NAME = 80
 """Characters of the name of a requirement: a row of a table has room for it."""
 FILES = ("motion", "catalogue")

@@ -136,9 +136,9 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 chain.append(placed)
                 continue
             placed, moved = placed.moved(amount)
-            if mover.point is None:  # a slide, which leaves the rotation as it is
+            if mover.point is None:  # a slide or a parallelogram, which turns nothing
                 motion, home = Displacement(motion.rotation, motion.translation + moved.translation), ZERO
-            elif moved.rotation is IDENTITY or not is_zero(mover.pitch):  # a parallelogram or a screw
+            elif not is_zero(mover.pitch):  # a screw
                 motion, home = moved @ motion, ZERO
             else:
                 if mover.point is home:  # about the point of the revolute before it
