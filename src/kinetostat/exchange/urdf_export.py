@@ -46,9 +46,11 @@ TOOL = "tool"
 ROD_RADIUS = 0.02
 """Radius of a link in the picture, as a share of the machine's characteristic length: that of a slender strut."""
 STROKE = 10.0
-"""Limit of a slide from the pose, in machine lengths: URDF requires one and the machine file has none."""
-EFFORT, VELOCITY = 1e6, 1.0
-"""Limits of effort (N) and velocity (m/s), which URDF wants as well."""
+"""Limit of a slide from the pose, in machine lengths: URDF requires one, which should stop no motion of the machine."""
+EFFORT = 1e6
+"""Limit of the effort of a slide, N: URDF requires one, and no machine of these sizes carries as much."""
+VELOCITY = 1.0
+"""Limit of the velocity of a slide, m/s: URDF requires one, and nothing that we write depends on it."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,9 @@ class UrdfJoint:
     """A joint as URDF has it, with an extension for what URDF cannot say.
 
     Attributes:
-        name: not yet unique.
+        name: its name, which need not be unique yet.
         kind: "continuous", "prismatic" or "fixed".
-        at: its origin, base frame, m.
+        origin: its origin, base frame, m.
         axis: unit vector; None if it is fixed.
         extension: attributes of its element <kinetostat>.
         mimics: whether it turns as far as the joint before it, the other way.
@@ -66,10 +68,25 @@ class UrdfJoint:
 
     name: str
     kind: str
-    at: Array
+    origin: Array
     axis: Array | None = None
     extension: dict[str, str] = field(default_factory=dict)
     mimics: bool = False
+
+
+@dataclass(frozen=True)
+class _Carrier:
+    """A link of the URDF within a leg.
+
+    Attributes:
+        elements: number of elements of the leg's chain that end with its joint.
+        joint: the joint before it.
+        link: its name.
+    """
+
+    elements: int
+    joint: UrdfJoint
+    link: str
 
 
 class _Tree:
@@ -86,14 +103,13 @@ class _Tree:
         self.loops: list[tuple[str, str]] = []
         self._platform = array(configuration.platform.translation)
         self._links: dict[str, tuple[ElementTree.Element, Array]] = {}
-        self._carriers: list[list[tuple[int, UrdfJoint, str]]] = []
-        self.link(BASE)
-        self._first, *others = [self._leg(leg) for leg in configuration.legs]
-        name, at = self._first
-        self._join(UrdfJoint(f"{name} {PLATFORM}", "fixed", self._platform), name, PLATFORM, at)
-        self._join(UrdfJoint(TOOL, "fixed", np.array(reference_point(analysis))), PLATFORM, TOOL, self._platform)
-        for tip, place in others:
-            self._close(tip, place)
+        self._carriers: list[list[_Carrier]] = []
+        self._add_link(BASE, np.zeros(3))
+        first_tip, *other_tips = [self._add_leg(leg) for leg in configuration.legs]
+        self._add_joint(UrdfJoint(f"{first_tip} {PLATFORM}", "fixed", self._platform), first_tip, PLATFORM)
+        self._add_joint(UrdfJoint(TOOL, "fixed", np.array(reference_point(analysis))), PLATFORM, TOOL)
+        for tip in other_tips:
+            self._close(tip)
 
     def weigh(self, machine: Machine, response: Response, joints: Joints | None) -> None:
         """Add what weighs something to the links, as far as a link carries it whole.
@@ -105,98 +121,92 @@ class _Tree:
         parts: dict[str, list[Heavy]] = {
             PLATFORM: [part for part in on_platform(machine, response.configuration.platform) if part.mass]
         }
-        left: list[Heavy] = []
+        missing_mass = 0.0
         names = [leg.name for leg in response.configuration.legs]
-        free = next((i for i, leg in enumerate(response.configuration.legs) if leg.number is None), 0)
+        passive = next((i for i, leg in enumerate(response.configuration.legs) if leg.number is None), 0)
         for member in located_members(machine, response.configuration, None if joints is None else joints.coordinates):
             if member.mass:
-                number = names.index(member.leg) if member.leg else free
-                link, part = _whole(member, self._carriers[number])
-                (parts.setdefault(link, []) if link else left).append(part)
+                number = names.index(member.leg) if member.leg else passive
+                link, part = _rigid_part(member, self._carriers[number])
+                if link:
+                    parts.setdefault(link, []).append(part)
+                else:
+                    missing_mass += part.mass
         for name, heavy in parts.items():
             if heavy and name != BASE:
-                self._inertial(*self._links[name], one_body(heavy))
-        if left:
+                self._add_inertial(*self._links[name], one_body(heavy))
+        if missing_mass:
             text = "Links that bend, telescope or are parallelograms have a mass that is not written here"
-            self.robot.append(ElementTree.Comment(f" {text}: {sum(part.mass for part in left):.6g} kg. "))
+            self.robot.append(ElementTree.Comment(f" {text}: {missing_mass:.6g} kg. "))
 
-    def _inertial(self, link: ElementTree.Element, origin: Array, part: Heavy) -> None:
+    def _add_inertial(self, link: ElementTree.Element, origin: Array, part: Heavy) -> None:
         element = SubElement(link, "inertial")
-        SubElement(element, "origin", xyz=_n(*(part.centre - origin)), rpy="0 0 0")
-        SubElement(element, "mass", value=_n(part.mass))
-        entries = {
-            f"i{'xyz'[i]}{'xyz'[j]}": _n(part.inertia[i, j]) for i, j in combinations_with_replacement(range(3), 2)
-        }
+        SubElement(element, "origin", xyz=_numbers(*(part.centre - origin)), rpy="0 0 0")
+        SubElement(element, "mass", value=_numbers(part.mass))
+        pairs = combinations_with_replacement(range(3), 2)
+        entries = {f"i{'xyz'[i]}{'xyz'[j]}": _numbers(part.inertia[i, j]) for i, j in pairs}
         SubElement(element, "inertia", entries)
 
-    def link(self, name: str, reach: Array | None = None, at: Array | None = None) -> None:
-        """Add a link at a place (base frame, m), drawn as a rod from its origin to the point `reach` on it, m."""
+    def _add_link(self, name: str, origin: Array, reach: Array | None = None) -> None:
+        """Add a link with its origin (base frame, m), drawn as a rod from there to the point `reach` on it, m."""
         element = SubElement(self.robot, "link", name=name)
-        self._links[name] = element, np.zeros(3) if at is None else at
+        self._links[name] = element, origin
         length = 0.0 if reach is None else float(np.linalg.norm(reach))
         if reach is not None and length > ROD_RADIUS * self._size:
             visual = SubElement(element, "visual")
-            tilt = (
-                0.0,
-                float(np.arctan2(np.hypot(reach[0], reach[1]), reach[2])),
-                float(np.arctan2(reach[1], reach[0])),
-            )
-            SubElement(visual, "origin", xyz=_n(*(reach / 2.0)), rpy=_n(*tilt))
+            x, y, z = reach
+            pitch, yaw = float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))
+            SubElement(visual, "origin", xyz=_numbers(*(reach / 2.0)), rpy=_numbers(0.0, pitch, yaw))
             geometry = SubElement(visual, "geometry")
-            SubElement(geometry, "cylinder", radius=_n(ROD_RADIUS * self._size), length=_n(length))
+            SubElement(geometry, "cylinder", radius=_numbers(ROD_RADIUS * self._size), length=_numbers(length))
 
     def _unique(self, name: str) -> str:
-        word = _word(name)
+        word = _plain_name(name)
         self._names[word] += 1
         return word if self._names[word] == 1 else self._unique(f"{word}_{self._names[word]}")
 
-    def _leg(self, leg: Leg) -> tuple[str, Array]:
-        """Add a whole leg; return the name and the place of its last link."""
-        parent, at = BASE, np.zeros(3)
-        row = list(joints_of(leg))
-        joints = [joint for _, joint in row]
-        before, carriers = "", []
-        for i, (elements, joint) in enumerate(row):
-            last = i == len(joints) - 1
-            child = self._unique(f"{leg.name}{TIP}" if last else f"{leg.name} body {i + 1}")
-            reach = (self._platform if last else joints[i + 1].at) - joint.at
-            before = self._join(joint, parent, child, at, reach, before)
-            parent, at = child, joint.at
-            carriers.append((elements, joint, child))
+    def _add_leg(self, leg: Leg) -> str:
+        """Add a whole leg, and return the name of its last link."""
+        row = list(joints_of(leg)) or [(0, UrdfJoint(f"{leg.name} foot", "fixed", self._platform))]
+        ends = [*(joint.origin for _, joint in row[1:]), self._platform]
+        link, joint_before, carriers = BASE, "", []
+        for i, ((elements, joint), end) in enumerate(zip(row, ends, strict=True), 1):
+            child = self._unique(f"{leg.name}{TIP}" if i == len(row) else f"{leg.name} body {i}")
+            joint_before = self._add_joint(joint, link, child, end - joint.origin, joint_before)
+            link = child
+            if elements:  # a foot carries nothing that moves
+                carriers.append(_Carrier(elements, joint, child))
         self._carriers.append(carriers)
-        if not joints:
-            parent, at = self._unique(f"{leg.name}{TIP}"), self._platform
-            self._join(UrdfJoint(f"{leg.name} foot", "fixed", at), BASE, parent, np.zeros(3))
-        return parent, at
+        return link
 
-    def _join(
-        self, joint: UrdfJoint, parent: str, child: str, at: Array, reach: Array | None = None, before: str = ""
+    def _add_joint(
+        self, joint: UrdfJoint, parent: str, child: str, reach: Array | None = None, joint_before: str = ""
     ) -> str:
-        """Add a joint and the link after it and return the joint's name; `at` is the parent's origin, base frame, m."""
-        self.link(child, reach, joint.at)
+        """Add a joint and the link after it, and return the joint's name; for `reach` see `_add_link`."""
+        self._add_link(child, joint.origin, reach)
         name = self._unique(joint.name)
         element = SubElement(self.robot, "joint", name=name, type=joint.kind)
         SubElement(element, "parent", link=parent)
         SubElement(element, "child", link=child)
-        SubElement(element, "origin", xyz=_n(*(joint.at - at)), rpy="0 0 0")
+        SubElement(element, "origin", xyz=_numbers(*(joint.origin - self._links[parent][1])), rpy="0 0 0")
         if joint.axis is not None:
-            SubElement(element, "axis", xyz=_n(*joint.axis))
+            SubElement(element, "axis", xyz=_numbers(*joint.axis))
         if joint.kind == "prismatic":
-            stroke = STROKE * self._size
-            limit = {"lower": _n(-stroke), "upper": _n(stroke), "effort": _n(EFFORT), "velocity": _n(VELOCITY)}
-            SubElement(element, "limit", limit)
+            limits = {"lower": -STROKE * self._size, "upper": STROKE * self._size}
+            limits |= {"effort": EFFORT, "velocity": VELOCITY}
+            SubElement(element, "limit", {limit: _numbers(value) for limit, value in limits.items()})
         if joint.mimics:
-            SubElement(element, "mimic", joint=before, multiplier=_n(MIMIC_RATIO), offset="0")
+            SubElement(element, "mimic", joint=joint_before, multiplier=_numbers(MIMIC_RATIO), offset="0")
         if joint.extension:
             SubElement(element, "kinetostat", joint.extension)
         if joint.extension.get("actuated"):
             self.motors.append(name)
         return name
 
-    def _close(self, tip: str, at: Array) -> None:
+    def _close(self, tip: str) -> None:
         """Close a loop: fix the tip of a leg to its seat on the platform."""
         seat = self._unique(f"{tip} seat")
-        self._join(UrdfJoint(seat, "fixed", at), PLATFORM, seat, self._platform)
+        self._add_joint(UrdfJoint(seat, "fixed", self._links[tip][1]), PLATFORM, seat)
         loop = SubElement(self.robot, "loop", name=self._unique(f"{tip} loop"), type="fixed")
         for end, link in (("predecessor", seat), ("successor", tip)):
             SubElement(SubElement(loop, end, link=link), "origin", xyz="0 0 0", rpy="0 0 0")
@@ -219,12 +229,12 @@ def texts_of(analysis: Analysis) -> tuple[str, str]:
     return text, "".join(f"{name}: {json.dumps(entries)}\n" for name, entries in lists.items())
 
 
-def _word(name: str) -> str:
+def _plain_name(name: str) -> str:
     """Return a name without blanks and signs, which not every reader of URDF takes."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "unnamed"
 
 
-def _n(*numbers: float) -> str:
+def _numbers(*numbers: float) -> str:
     """Return the numbers with all their digits."""
     return " ".join(repr(float(number)) for number in numbers)
 
@@ -247,49 +257,54 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     return [path, loops_path]
 
 
-def _whole(link: Member, carriers: Sequence[tuple[int, UrdfJoint, str]]) -> tuple[str, Heavy]:
+def _rigid_part(link: Member, carriers: Sequence[_Carrier]) -> tuple[str, Heavy]:
     """Return the URDF link that carries a link of the machine, or an empty name, and the link as a rigid mass.
 
     A hinge through the end of a uniform rod moves that end with what is on either side of it.
     """
-    behind = [BASE, *(child for _, _, child in carriers)]
+    names = [BASE, *(carrier.link for carrier in carriers)]
     mass = float(link.mass)
     if link.centre is not None:
         elements, centre = link.centre()
         inertia = np.zeros((3, 3)) if link.inertia is None else matrix_of(link.inertia())
-        return behind[sum(number <= elements for number, *_ in carriers)], Heavy(mass, array(centre), inertia)
+        return names[_count_within(carriers, elements)], Heavy(mass, array(centre), inertia)
     ends = link.ends() if link.ends else ()
     if len(ends) != 2:
         return "", Heavy(mass, np.zeros(3), np.zeros((3, 3)))
-    first, last = (sum(number <= elements for number, *_ in carriers) for elements, _ in ends)
+    first, last = (_count_within(carriers, elements) for elements, _ in ends)
     start, end = (array(point) for _, point in ends)
-    while first < last and _hinged_at(carriers[first][1], start):
+    while first < last and _is_hinge_at(carriers[first].joint, start):
         first += 1
-    while first < last and _hinged_at(carriers[last - 1][1], end):
+    while first < last and _is_hinge_at(carriers[last - 1].joint, end):
         last -= 1
-    return behind[first] if first == last else "", thin_rod(mass, start, end)
+    return names[first] if first == last else "", thin_rod(mass, start, end)
 
 
-def _hinged_at(joint: UrdfJoint, point: Array) -> bool:
+def _count_within(carriers: Sequence[_Carrier], elements: int) -> int:
+    """Return the number of carriers whose joints end within the first elements of a leg's chain."""
+    return sum(carrier.elements <= elements for carrier in carriers)
+
+
+def _is_hinge_at(joint: UrdfJoint, point: Array) -> bool:
     """Return whether a joint turns about a line through a point, and nothing else."""
     if joint.kind != "continuous" or joint.axis is None or "pitch" in joint.extension:
         return False
-    return float(np.linalg.norm(np.cross(joint.at - point, joint.axis))) < COINCIDENT_HINGES
+    return float(np.linalg.norm(np.cross(joint.origin - point, joint.axis))) < COINCIDENT_HINGES
 
 
 def joints_of(leg: Leg) -> Iterator[tuple[int, UrdfJoint]]:
-    """Return the joints of a leg at the pose, from base to platform, each with how many elements end with its own.
+    """Give the joints of a leg at the pose, from base to platform, each with the number of elements up to its own.
 
     A joint, or a spring that is driven or a hinge, becomes a joint that moves. The springs of one link or bearing
     together become a fixed joint with a compliance. A parallelogram becomes two revolutes, of which the second turns
     back what the first turned.
     """
-    at = np.zeros(3)
-    for i, element in enumerate(leg.chain):
-        places = [at, *(array(p) for after in leg.chain[i + 1 :] for p in _places(after))]
-        for joint in _of_element(leg.name, element, at, places[min(1, len(places) - 1)]):
-            yield i + 1, joint
-            at = joint.at
+    last_origin = np.zeros(3)
+    for i, element in enumerate(leg.chain, 1):
+        following = (array(point) for other in leg.chain[i:] for point in _places(other))
+        for joint in _joints_of_element(leg.name, element, last_origin, next(following, last_origin)):
+            yield i, joint
+            last_origin = joint.origin
 
 
 def _places(element: Element) -> Sequence[Vector]:
@@ -298,21 +313,22 @@ def _places(element: Element) -> Sequence[Vector]:
     return element.path or (() if point is None else (point,))
 
 
-def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iterator[UrdfJoint]:
+def _joints_of_element(leg: str, element: Element, before: Array, after: Array) -> Iterator[UrdfJoint]:
+    """Give the joints of an element between two points: the last joint's origin, and the next element's place."""
     if isinstance(element, Parallelogram):
         yield from _parallelogram(element)
     elif isinstance(element, Joint):
-        yield _moving(element.name or f"{leg} joint", element, after, {})
+        yield _moving_joint(element.name or f"{leg} joint", element, after, {})
     elif isinstance(element, Spring) and (element.actuated or element.hinge):
         role = {"actuated": "true"} if element.actuated else {}
         stiffness = "rigid" if math.isinf(element.stiffness) else repr(float(element.stiffness))
         name = (element.part or element.name).replace("actuator", "drive")  # an actuator is named after its joint again
-        yield _moving(name, element.joint, after, {"stiffness": stiffness, **role})
+        yield _moving_joint(name, element.joint, after, {"stiffness": stiffness, **role})
     else:
         yield from _bearings(element.springs, before)
 
 
-def _moving(name: str, joint: Joint, after: Array, extension: dict[str, str]) -> UrdfJoint:
+def _moving_joint(name: str, joint: Joint, after: Array, extension: dict[str, str]) -> UrdfJoint:
     """Return a joint that moves; a slide, which has no place, is put where the next element is."""
     if joint.pitch != 0.0:
         extension = {**extension, "pitch": repr(float(joint.pitch))}
@@ -322,24 +338,23 @@ def _moving(name: str, joint: Joint, after: Array, extension: dict[str, str]) ->
 
 
 def _bearings(springs: Sequence[Spring], before: Array) -> Iterator[UrdfJoint]:
-    """The springs of one part as a fixed joint with a 6x6 compliance; a spring without stiffness as a free joint."""
-    for (part, free), group in groupby(springs, lambda s: (s.part or s.name, s.stiffness == 0.0)):
+    """Give the springs of one part as a fixed joint with a 6x6 compliance; one without stiffness as a free joint."""
+    for (part, is_free), group in groupby(springs, lambda s: (s.part or s.name, s.stiffness == 0.0)):
         part_springs = list(group)
-        if free:
-            yield from (_moving(spring.name, spring.joint, before, {}) for spring in part_springs)
+        if is_free:
+            yield from (_moving_joint(spring.name, spring.joint, before, {}) for spring in part_springs)
             continue
         points = [spring.joint.point for spring in part_springs if spring.joint.point is not None]
-        at = array(points[0]) if points else before
-        matrix = compliance_at(part_springs, Vector(*at.tolist()))
+        origin = array(points[0]) if points else before
+        matrix = compliance_at(part_springs, Vector(*origin.tolist()))
         if np.any(matrix):
-            numbers = " ".join(repr(c) for c in matrix.ravel().tolist())
-            yield UrdfJoint(part, "fixed", at, None, {"compliance": numbers})
+            yield UrdfJoint(part, "fixed", origin, extension={"compliance": _numbers(*matrix.ravel())})
 
 
 def _parallelogram(piece: Parallelogram) -> Iterator[UrdfJoint]:
     normal = array(piece.normal)
     bar = "rigid" if math.isinf(piece.bar) else repr(float(piece.bar))
-    side = " ".join(repr(c) for c in array(piece.side).tolist())
+    side = _numbers(*array(piece.side))
     extension = {"parallelogram": side, "width": repr(float(piece.width)), "bar_stiffness": bar}
     yield UrdfJoint(f"{piece.name} near", "continuous", array(piece.near), normal)
     yield UrdfJoint(f"{piece.name} far", "continuous", array(piece.far), normal, extension, mimics=True)
