@@ -246,7 +246,7 @@ class PopulationResults:
     """Quantities of every design at every pose.
 
     Attributes:
-        values: by name [designs x poses]; NaN where the status is not OK.
+        values: results by name [designs x poses]; NaN where the status is not OK.
         status: `Status` codes [designs x poses].
         slopes: derivatives of each quantity by each path [quantities x paths x designs x poses]; None if they were not
             computed.

@@ -34,7 +34,7 @@ class Work:
 
     Attributes:
         machine: gives all parameters that do not vary.
-        points: where.
+        points: the points at which it is evaluated.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         chunk: points of one chunk, a multiple of a slab.
     """
@@ -89,8 +89,8 @@ class Crew:
     """The processes that compute: workers on this machine, a cluster, or neither.
 
     Attributes:
-        workers: so many processes on this machine.
-        address: of the scheduler of an existing cluster, e.g. "tcp://10.0.0.1:8786".
+        workers: number of processes on this machine.
+        address: address of the scheduler of an existing cluster, e.g. "tcp://10.0.0.1:8786".
     """
 
     workers: int | None = None

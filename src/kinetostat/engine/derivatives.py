@@ -46,11 +46,14 @@ MACHINE_CODE_FROM = 20_000
 """Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
 SMALL_SLAB = 512
 """Points in a slab for NumPy and for linear systems: some thousand arrays of this length are in memory at once."""
-BESIDE = 1e-5
+JOINT_STEP = 1e-5
 """Displacement of joints, rad or in units of the machine's length, whose differences are second derivatives: squares of
 it and round-off over it are equally small."""
-TRIAL_DISTANCE, TRIAL_POINTS = 0.03, 5
-"""Closed forms are tried at this share of the machine's numbers away from them, and at so many points."""
+TRIAL_DISTANCE = 0.03
+"""Share of the machine's numbers by which they differ at the points at which closed forms are tried: so little that
+legs still close, and so much that an error of a derivative shows."""
+TRIAL_POINTS = 5
+"""Points at which closed forms are tried: some may be out of reach, and one is enough to show an error."""
 
 Objective: TypeAlias = str | Mapping[str, float]
 """The name of a quantity, or a weighted sum of several: their weights, in any units, by name."""
@@ -61,7 +64,8 @@ class Gradients:
     """Values and derivatives at every point, in order.
 
     Attributes:
-        values: of the objectives [objectives x points]; NaN where the status is not OK, infinite where rigid or free.
+        values: values of the objectives [objectives x points]; NaN where the status is not OK, infinite where something
+            is rigid or free.
         gradients: derivatives by the parameters, SI [objectives x paths x points]. They are NaN where the value is not
             finite, for the stiffness of a free spring, and for a parameter that cannot change alone without opening a
             leg; they are 0 for the stiffness of a rigid spring.
@@ -271,17 +275,17 @@ class _Routes:
         chains = self._machine.chains()
         joints, first = np.stack(given[-chains.size - 1 : -1]), len(self._differentiated)
         length, rates = rates_at(joints)
-        rates, longer = rates[:-1], rates[-1]
+        rates, length_rates = rates[:-1], rates[-1]
         units = units_of(chains, length).T
-        slid = (joints - units_of(chains, np.zeros(count)).T * joints) / units
+        slides = (joints - units_of(chains, np.zeros(count)).T * joints) / units  # 0 of turns, whose unit has no length
         idle = _IdleMotions.of(np.moveaxis(rates[:, first:] * units, 2, 0), (joints / units).T)
         rows = []
         for motion in np.moveaxis(idle.motions, 1, 0):
-            aside = BESIDE * motion.T * units
-            change = (rates_at(joints + aside)[1] - rates_at(joints - aside)[1])[:-1] / (2.0 * BESIDE)
+            shift = JOINT_STEP * motion.T * units
+            change = (rates_at(joints + shift)[1] - rates_at(joints - shift)[1])[:-1] / (2.0 * JOINT_STEP)
             row = -np.einsum("np,pin->in", idle.pulls, change)
             row[first:] += motion.T / units
-            row[:first] -= 2.0 * (motion.T * slid).sum(axis=0) * longer[:first] / length
+            row[:first] -= 2.0 * (motion.T * slides).sum(axis=0) * length_rates[:first] / length
             rows.append(row * length)
         return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 

@@ -152,7 +152,7 @@ class _PencilCode:
         """Write a matrix that couples no springs of different legs, with a number on its diagonal.
 
         Args:
-            matrix: where it begins in the workspace.
+            matrix: the place at which it begins in the workspace.
             column: the first column of the upper triangles of its legs.
             diagonal: what is added to its diagonal.
         """
@@ -253,7 +253,7 @@ class _PencilCode:
         """Find the reflection 1 - beta v v^T that turns a row onto its last coordinate, and write its mirror v.
 
         Args:
-            start: where the row begins in the workspace.
+            start: the place at which the row begins in the workspace.
             size: number of its entries.
             first: what is added to the start.
 
@@ -287,7 +287,7 @@ class _PencilCode:
         The lower triangle is kept, and whole blocks on the diagonal. Beyond the size, mirrors are zero.
 
         Args:
-            matrix: where it begins in the workspace.
+            matrix: the place at which it begins in the workspace.
             size: number of rows.
             update: whether to subtract v w^T + w v^T of the last reflection.
             multiply: whether to write the image A v of the next mirror.

@@ -94,9 +94,9 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
 
     Args:
         operation, operands: as `rule` gives them; operands over any scalar.
-        value: of the node.
-        place: of the operand.
-        slope: of the result by the node.
+        value: value of the node.
+        place: place of the operand.
+        slope: slope of the result by the node.
     """
     match operation:
         case "add" | "sub" | "neg":

@@ -50,7 +50,7 @@ def fill_some(chosen: Any, fill: Fill, columns: Mapping[str, Array], results: Ar
         chosen: an index of the points: numbers or a mask.
         fill: evaluates them.
         columns: values of the varying parameters of all points by leaf path, SI [points].
-        results, status: of all points; only those of the chosen ones are written.
+        results, status: results and status codes of all points; only those of the chosen ones are written.
     """
     part, codes = np.ascontiguousarray(results[:, chosen]), status[chosen]
     fill({path: column[chosen] for path, column in columns.items()}, part, codes)
@@ -159,7 +159,7 @@ class ProgramFill:
 
     Attributes:
         machine: its family, and all parameters that do not vary.
-        form: of it.
+        form: form of its programs.
         fixed: values of the program's fixed inputs.
         program: the program.
         closed: whether the program computes joint coordinates itself, in closed form. Otherwise they are found slab by
@@ -225,7 +225,7 @@ def program_columns(
 
     Args:
         machine: gives all parameters that do not vary.
-        form: of it.
+        form: form of its programs.
         columns: values of the varying parameters by leaf path, SI [points].
         count: number of points.
         closed: whether the program closes the legs itself.

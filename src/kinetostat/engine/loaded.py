@@ -79,10 +79,10 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     """Choose how to find the loaded states of a machine, and its natural vibrations.
 
     Args:
-        machine: with its loads; gives all parameters that do not vary.
+        machine: the machine with its loads; gives all parameters that do not vary.
         paths: leaf paths of those that vary.
         quantities: names from `QUANTITIES`.
-        count: of points; infinity if the same will be asked many times, so that compiling pays for few points too.
+        count: number of points; infinity if the same will be asked many times, so that compiling pays for few as well.
     """
     if all(QUANTITIES[name].cables for name in quantities) and not limits_set(machine.tables["limits"]):
         return Way.CABLES
@@ -107,7 +107,7 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
     """Return the fill of quantities of which some are about the machine under load, or about its vibrations.
 
     Args:
-        machine: with its loads; gives all parameters that do not vary.
+        machine: the machine with its loads; gives all parameters that do not vary.
         paths: leaf paths of those that vary.
         quantities: names from `QUANTITIES`.
         way: how to find the states.
@@ -227,7 +227,7 @@ class ModalFill:
 
         Args:
             machine, paths, quantities: as for `program_fill`.
-            counts: of modes that the quantities need.
+            counts: numbers of modes that the quantities need.
         """
         needing = [name for name in quantities if counts.needed_by(QUANTITIES[name])]
         others = [name for name in quantities if name not in needing]

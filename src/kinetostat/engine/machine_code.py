@@ -48,7 +48,7 @@ class MachineCode:
 
     Attributes:
         image: its bytes: linked, or an object file.
-        entry: where in linked bytes the function begins; -1 of an object file.
+        entry: place in linked bytes at which the function begins; -1 of an object file.
         lanes: points of a vector.
         rows: number of results.
     """

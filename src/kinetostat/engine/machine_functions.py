@@ -53,11 +53,14 @@ ENTRIES = [name for name in QUANTITIES if name.partition("_")[0] in ("compliance
 """Quantities that are the entries of C and then of K, on and above the diagonal."""
 DISPLACEMENTS = [name for name in QUANTITIES if name.startswith("displacement_")]
 """Quantities that are the motion of the tool under the loads: rotation vector, then displacement."""
-STEPS_FORWARD, SHORTEST_SHARE = 30, 1e-4
-"""Steps of forward kinematics, and the share of a step below which no shorter one is tried."""
-SAMPLES, AROUND = 9, 0.02
-"""Points at which functions are compared: that of the file and others near it, so far away in rad or in units of the
-machine's length."""
+STEPS_FORWARD = 30
+"""Most steps of forward kinematics: Newton's method takes some five, more where steps are shortened."""
+SHORTEST_SHARE = 1e-4
+"""Share of a step of forward kinematics below which no shorter one is tried."""
+SAMPLES = 9
+"""Points at which functions are compared: the pose of the file and others near it."""
+SAMPLE_DISTANCE = 0.02
+"""Greatest distance of these poses from that of the file, rad or in units of the machine's length."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,9 @@ class TracedPlacement:
     """Places of the actuators, the tool and the legs of a traced machine.
 
     Attributes:
-        formula: whose results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
+        formula: its results are the coordinates of the actuators (m or rad), the tool point T (m), the columns of Q,
             and the `drawn_points` of the legs (m), in the base frame; its code is the `Status` by reach alone.
-        actuators: with traced coordinates.
+        actuators: the actuators, with traced coordinates.
     """
 
     formula: TracedFormula
@@ -86,7 +89,7 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
     """Trace the places of actuators, tool and legs of a machine.
 
     Args:
-        kind: of a machine whose joints have closed forms.
+        kind: kind of a machine whose joints have closed forms.
         form: how its parameters enter; numbers of joints in the drawing are constant.
         paths: leaf paths of the parameters to differentiate by.
         closed: whether joints are computed inside the program, as legs written leg by leg need it.
@@ -117,7 +120,7 @@ class TracedShares:
     """The compliance that parts of a machine contribute.
 
     Attributes:
-        formula: whose results are what each part contributes to each diagonal entry of C, [part x 6] row by row, SI;
+        formula: its results are what each part contributes to each diagonal entry of C, [part x 6] row by row, SI;
             NaN where the status is not OK.
         parts: names of the parts, those of springs that are not rigid.
     """
@@ -130,7 +133,7 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
     """Trace what the parts of a machine contribute to its compliance.
 
     Args:
-        kind: of a machine.
+        kind: kind of the machine.
         form: how its parameters enter.
         closed: as in `TraceOptions`.
     """
@@ -153,7 +156,7 @@ class MachineFunctions:
     """Arguments and results of the functions of a machine, whatever language they are written in.
 
     Attributes:
-        machine: at its pose; free, whatever its file says, where its states of rest have no programs.
+        machine: the machine at its pose; free, whatever its file says, where its states of rest have no programs.
         inputs: leaf paths of the arguments: coordinates of the pose, then parameters that were chosen.
         coordinates: number of the coordinates.
         quantities: names of the quantities.
@@ -238,7 +241,7 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     """Choose what functions of a machine take and give.
 
     Args:
-        machine: at its pose.
+        machine: the machine at its pose.
         inputs: leaf paths of parameters that become arguments after the coordinates of the pose, as "load.force.2".
         outputs: names of quantities, as "compliance_x".
 
@@ -271,7 +274,15 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     form = form_with_numbers(machine, paths)
     placement = placement_of(Specimen(at_home(machine, paths)), form, paths, closed)
     return MachineFunctions(
-        machine, paths, len(pose), tuple(dict.fromkeys(wanted)), form, closed, placement, rests, counts
+        machine=machine,
+        inputs=paths,
+        coordinates=len(pose),
+        quantities=tuple(dict.fromkeys(wanted)),
+        form=form,
+        closed=closed,
+        placement=placement,
+        rests=rests,
+        mode_counts=counts,
     )
 
 
@@ -291,7 +302,7 @@ def quantities_at(functions: MachineFunctions, columns: Mapping[str, Array], nam
 def sample_points(functions: MachineFunctions) -> dict[str, Array]:
     """Return the pose of the file and some near it, those at which the machine has an answer: values by leaf path."""
     numbers = values(functions.machine)
-    drawn = np.random.default_rng(0).uniform(-AROUND, AROUND, (SAMPLES, len(functions.inputs)))
+    drawn = np.random.default_rng(0).uniform(-SAMPLE_DISTANCE, SAMPLE_DISTANCE, (SAMPLES, len(functions.inputs)))
     drawn[0], drawn[:, functions.coordinates :] = 0.0, 0.0
     units = np.where(np.array(functions.kinds) == "length", functions.length, 1.0)
     rows = np.array([float(numbers[path]) for path in functions.inputs]) + drawn * units

@@ -143,7 +143,7 @@ class ModalNumbers:
         """Trace and compile the programs.
 
         Args:
-            machine: with its masses.
+            machine: the machine with its masses.
             form: how its parameters enter.
             closed: whether joints are closed inside the programs.
             what: the numbers.

@@ -51,8 +51,8 @@ class Path:
 
     Attributes:
         pose: coordinates of the pose by name, m or rad [n].
-        rates: of these, per second [n].
-        accelerations: of these, per second squared [n].
+        rates: rates of these coordinates, per second [n].
+        accelerations: their second rates, per second squared [n].
         loads: forces and moments on the platform that the motion says, by leaf path, N or N·m [n]; others are those of
             the machine.
     """
@@ -86,7 +86,7 @@ class PathForces:
 
     Attributes:
         drives: numbers of each drive, see `machine_at_pose.NUMBERS_OF_DRIVE` [drives x numbers x n], SI.
-        wrench: at the tool point, see `machine_at_pose.tool_wrench` [6 x n], N·m and N; none if nobody asked.
+        wrench: wrench of the tool, see `machine_at_pose.tool_wrench` [6 x n], N·m and N; none if nobody asked.
         joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
         inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
         status: `Status` codes [n].
@@ -108,7 +108,7 @@ def motion_of(
     masses of so many links.
 
     Args:
-        kind: of the machine.
+        kind: kind of the machine.
         form: how its parameters enter; its pose varies, and loads may.
         plan: which motions there are.
         links: how many links have a mass that does not follow the pose; 0 for masses as they are at each pose.
@@ -140,9 +140,9 @@ class RigidForm:
     """The form of a machine's equations, found once: the motions that it has, and the masses of its links.
 
     Attributes:
-        machine: at the pose at which its telescopic legs have their mass.
+        machine: the machine at the pose at which its telescopic legs have their mass.
         plan: which motions there are.
-        masses: of its links, kg; none of a machine written leg by leg, whose file says them.
+        masses: masses of its links, kg; none of a machine written leg by leg, whose file says them.
     """
 
     machine: Machine
@@ -166,7 +166,7 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
     """Compute what drives do along a motion, and if wanted what joints pass on.
 
     Args:
-        form: of the machine.
+        form: form of the machine's equations.
         path: the points of the motion.
         joints: whether loads of joints and reflected inertia are wanted.
         compiled: whether by machine code; if None, where there are many points.

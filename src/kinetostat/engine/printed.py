@@ -46,7 +46,7 @@ class Printed:
 
     Attributes:
         first: declarations of constants that the condition and the code need, in order.
-        condition: of which all results but the code are NaN unless it holds; empty if there is none.
+        condition: condition without which all results but the code are NaN; empty if there is none.
         code: expression of the code.
         then: declarations of what else the results need.
         results: expressions of the results, in order, where the condition holds.

@@ -43,7 +43,11 @@ KEPT_SHARE = 0.75
 """Share of these bytes that stay when there are more, so that not each new program asks for room: the files used
 last."""
 DAY, HOUR = 86400.0, 3600.0
-SECRET, SECRET_SIZE, HASH_SIZE = "secret", 32, 32
+"""Seconds: times of use are noted once a day, and files of killed processes are removed after an hour."""
+SECRET = "secret"
+"""Name of the file of the folder's secret."""
+SECRET_SIZE, HASH_SIZE = 32, 32
+"""Bytes of the secret and of a hash: 256 bits, which nobody can guess."""
 PRIVATE = 0o077
 """Bits of the rights of group and others: a folder with programs is not used where one of them is set."""
 

@@ -144,7 +144,7 @@ class RestFill:
         Args:
             given: columns of the programs before those of the states.
             results, status: see `Fill`.
-            states: where the coordinates of the states of rest go [size x points], if they are wanted.
+            states: array for the coordinates of the states of rest [size x points], if they are wanted.
         """
         count = len(status)
         together = max(1, min(count, NUMBERS_TOGETHER // self._step.rows))

@@ -34,8 +34,9 @@ class Tridiagonal:
     """A symmetric tridiagonal matrix in the workspace.
 
     Attributes:
-        diagonal: where its diagonal begins.
-        squares: where the squares of the entries beside the diagonal begin, in rows from the second; the first is zero.
+        diagonal: place at which its diagonal begins.
+        squares: place at which the squares of the entries beside the diagonal begin, in rows from the second; the first
+            is zero.
         size: number of rows.
     """
 

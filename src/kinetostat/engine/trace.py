@@ -273,8 +273,8 @@ class Runnable(Protocol):
         Args:
             fixed: values of the fixed inputs.
             columns: values of the others [points], or of several of them [k x points]; those of a row are contiguous.
-            results: where results go [results x points]; rows may lie apart, the points of a row may not.
-            codes: where the codes go [points].
+            results: array for the results [results x points]; rows may lie apart, the points of a row may not.
+            codes: array for the codes [points].
         """
 
 

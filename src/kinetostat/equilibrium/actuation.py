@@ -33,14 +33,14 @@ class CommandedState:
 
     Attributes:
         solution: the machine at rest with these amounts; they are in its state.
-        off: twist from the wanted to the reached pose, at the origin [n x 6]: what no actuator can change.
-        before: the same twist without a correction [n x 6].
+        error: twist from the wanted to the reached pose, at the origin [n x 6]: what no actuator can change.
+        first_error: the same twist without a correction [n x 6].
         rates: twist of the platform per unit of each amount, at the origin [n x 6 x actuators].
     """
 
     solution: Equilibria
-    off: Array
-    before: Array
+    error: Array
+    first_error: Array
     rates: Array
 
 
@@ -48,21 +48,24 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
     """Find the amounts of least norm; a pose that actuators cannot reach exactly is reached as nearly as they can."""
     ways, count = mechanism.ways, len(mechanism.length)
     state, settled = free_state(mechanism), np.zeros(count, dtype=bool)
-    rates, before = np.zeros((count, ways.shape[1], len(mechanism.driven))), np.full((count, 6), np.nan)
+    rates, first_error = np.zeros((count, ways.shape[1], len(mechanism.driven))), np.full((count, 6), np.nan)
 
     def equations(amounts: Array, rows: Integers) -> tuple[Array, Steps]:
         nonlocal state
         rest = at_rest(mechanism.at(rows), replace(state.at(rows), amounts=amounts))
         state, settled[rows] = state.with_part(rows, rest.state), rest.settled
-        off = logarithm(rest.state.platform)
-        before[rows] = np.where(np.isnan(before[rows]), off, before[rows])
+        error = logarithm(rest.state.platform)
+        first_error[rows] = np.where(np.isnan(first_error[rows]), error, first_error[rows])
         rates[rows] = solve(rest.balance, -rest.balance.by_actuators())[:, : ways.shape[1]]
-        change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), off @ ways)
-        return np.where(rest.settled, largest(off), np.nan), lambda going: change[going]
+        change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), error @ ways)
+        return np.where(rest.settled, largest(error), np.nan), lambda unsolved: change[unsolved]
 
     newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, step_goal=COMMANDED)
     return CommandedState(
-        Equilibria(mechanism, state, settled, settled), logarithm(state.platform), before, ways @ rates
+        solution=Equilibria(mechanism, state, settled, settled),
+        error=logarithm(state.platform),
+        first_error=first_error,
+        rates=ways @ rates,
     )
 
 
@@ -177,7 +180,7 @@ def _internal_amounts(base: Array, change: Array, least: float, most: float, rul
     across, sizes, along = np.linalg.svd(change, full_matrices=False)
     kept = sizes > UNRESISTED * max(sizes.max(initial=0.0), UNRESISTED)
     across, inverse = across[:, kept], along[kept].T / sizes[kept]
-    # base + change z = given + across y with y = across^T (base + change z), and given is at right angles to it.
+    # base + change z = rest + across y with y = across^T (base + change z), and the rest is at right angles to it.
     balances = Balancing((base - across @ (across.T @ base))[None], across[None], np.array([True]))
     loads, exist = within_bounds(balances, np.array([least]), np.array([most]), rule)
     return np.asarray(inverse @ (across.T @ (loads[0] - base))) if exist[0] else None

@@ -249,7 +249,7 @@ class Balance:
 
     Attributes:
         mechanism: the mechanism.
-        state: where everything is.
+        state: the place of everything, and the wrenches of the legs.
         legs: what each leg contributes.
         left: what is left of the equations, 0 at rest [n x unknowns].
         load: the load on the platform at the origin [n x 6].

@@ -172,7 +172,7 @@ def leaving_points(guides: Array, ends: Array, radius: Array, slope: Array) -> t
     leaves it along its own slope.
 
     Args:
-        guides: where cables enter their pulleys [n x cables x 3], m.
+        guides: points at which cables enter their pulleys [n x cables x 3], m.
         ends: their ends at the platform [n x cables x 3], m.
         radius: radius of the wheels, m [n].
         slope: angles by which the cables rise where they leave [n x cables], rad.

@@ -39,11 +39,14 @@ BISECTIONS = 50
 """Number of halvings in the search for the shift of the stiffness with which a step is as long as the radius."""
 MOST_SWITCHES = 8
 """Greatest number of times that one-sided springs switch between carrying and slack within a step."""
-WIDENING, NARROWING = 2.0, 0.25
-"""Radius in lengths of the last step, after one that fell as foreseen and after one that is not taken (the usual ones
-of trust regions)."""
-LEAST_SHARE, GOOD_SHARE = 0.1, 0.75
-"""Share of the foreseen fall of the potential from which a step is taken, and from which the radius may grow."""
+WIDENING = 2.0
+"""Radius in lengths of the last step, after one that fell as foreseen; usual for trust regions, as the next three."""
+NARROWING = 0.25
+"""Radius in lengths of the last step, after one that is not taken."""
+LEAST_SHARE = 0.1
+"""Share of the foreseen fall of the potential from which a step is taken."""
+GOOD_SHARE = 0.75
+"""Share of the foreseen fall from which the radius may grow."""
 
 
 def descent_from(mechanism: Mechanism, start: State) -> State:
@@ -81,8 +84,8 @@ def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
     count = len(mechanism.length)
 
     def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
-        there = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
-        return gaps_of(there), lambda going: _closing_steps(there)[going]
+        evaluated = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
+        return gaps_of(evaluated), lambda unsolved: _closing_steps(evaluated)[unsolved]
 
     end = newton(
         equations, start, count, move=partial(state_after, mechanism), most_steps=MOST_CLOSINGS, residual_goal=CLOSED
@@ -202,7 +205,7 @@ def _model(equations: Balance, part: Admissible) -> _Model:
             elastic[:, start + i, start + i] = 0.0
             left[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
     force = -(np.swapaxes(part.motions, 1, 2) @ left[:, :, None])[:, :, 0]
-    columns = [np.stack(each, axis=1) for each in (lines, loads, springs) if each]
+    columns = [np.stack(column, axis=1) for column in (lines, loads, springs) if column]
     nothing = np.zeros((len(part.rows), 0))
     no_springs = (np.zeros((len(part.rows), 0, part.motions.shape[2])), nothing, nothing)
     return _Model(within(elastic + geometric, part.motions), force, *(columns or no_springs))

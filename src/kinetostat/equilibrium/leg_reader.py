@@ -285,8 +285,8 @@ def elastic_leg(
         units: the units in which it is counted.
         amounts: the given amounts of the legs before; those of this leg are added.
         members: links that belong to it.
-        travels: for each element, how far what moves there or last before it is from the home pose, rad or m [n]; empty
-            where no flexure hinge asks for it.
+        travels: travel from the home pose, for each element, of the joint there or the last one before it, rad or m
+            [n]; empty where no flexure hinge asks for it.
     """
     links: list[tuple[Member, Station, Station]] = []
     for link in members:

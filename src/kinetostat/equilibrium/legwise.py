@@ -67,7 +67,7 @@ class CondensedLeg:
     v are those by which the leg's wrench changes: C v - A d = h, and A^T v + S d is what the leg takes of the load.
 
     Attributes:
-        placed: where it is.
+        placed: its chain at these coordinates.
         terms: its contribution to the equations there, or in the free state.
         elastic, passive: which of its coordinates are those of springs, and which are those of joints.
         passive_by_twist: P [passive x ways].

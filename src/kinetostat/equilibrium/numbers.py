@@ -94,8 +94,8 @@ def status_with_rest(machine: Machine, names: Iterable[str], free: Scalar, at_re
     there (theory section 12).
 
     Args:
-        machine: whose state says to which machine the loads of actuators belong.
-        names: of the quantities.
+        machine: the machine; the state in which it is meant says where the loads of its actuators are found.
+        names: names of the quantities.
         free: `Status` code of the pose without loads.
         at_rest: `Status` code of the state of rest.
     """

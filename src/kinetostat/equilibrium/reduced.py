@@ -98,8 +98,8 @@ class Reduced:
     """Equilibrium of a machine in the coordinates of its carrier.
 
     Attributes:
-        machine: whose equations they are.
-        cut: it, with its loops cut.
+        machine: the machine.
+        cut: the machine with its loops cut.
         components: the components of twists that it has.
     """
 
@@ -145,7 +145,7 @@ class Reduced:
             coordinates: the coordinates of the state, up to a last step.
             wanted: which of the numbers are needed.
             response: the response of the pose without loads.
-            names: of all quantities of the question, those of the free machine among them.
+            names: names of all quantities of the question, those of the free machine among them.
 
         Returns:
             The numbers by name, with the coordinates after this step and the square of its size as "after"; and the

@@ -27,9 +27,10 @@ LONGEST_STEP = 0.2
 FEW_STEPS = 8
 """Number of Newton's steps that lead to a state nearby; where more are needed, or one is shortened, they wander, and
 round-off decides which state they meet."""
-FIRST_LOAD_STEP, LEAST_LOAD_STEP = 0.125, 1e-5
-"""The first step by which the loads grow where Newton's steps wander, and the step below which the state counts as
-lost: shares of all loads."""
+FIRST_LOAD_STEP = 0.125
+"""The first step, as a share of all loads, by which these grow where Newton's steps wander."""
+LEAST_LOAD_STEP = 1e-5
+"""Step of the loads, as a share of all of them, below which the state counts as lost."""
 MOST_LOAD_STEPS = 60
 """Number of tries with which a state is followed: a machine that moves very far before it is lost takes seconds."""
 MISSED_BY_TANGENTS = 0.5
@@ -125,15 +126,15 @@ def _follow_loads(mechanism: Mechanism, state: State) -> Equilibria:
     share, step, rows = np.zeros(count), np.full(count, FIRST_LOAD_STEP), np.arange(count)
     for _ in range(MOST_LOAD_STEPS):
         part, start = mechanism.at(rows), state.at(rows)
-        more = np.minimum(share[rows] + step[rows], 1.0)
-        before, after = with_share(part, share[rows]), with_share(part, more)
+        next_share = np.minimum(share[rows] + step[rows], 1.0)
+        before, after = with_share(part, share[rows]), with_share(part, next_share)
         solution = states_near(after, start, FEW_STEPS)
-        going = np.flatnonzero(solution.sure)
+        sure = np.flatnonzero(solution.sure)
         nearby = solution.sure.copy()
-        nearby[going] = are_near(before.at(going), start.at(going), after.at(going), solution.state.at(going))
-        taken = np.flatnonzero(nearby)
-        state = state.with_part(rows[taken], solution.state.at(taken))
-        share[rows] = np.where(nearby, more, share[rows])
+        nearby[sure] = are_near(before.at(sure), start.at(sure), after.at(sure), solution.state.at(sure))
+        accepted = np.flatnonzero(nearby)
+        state = state.with_part(rows[accepted], solution.state.at(accepted))
+        share[rows] = np.where(nearby, next_share, share[rows])
         step[rows] *= np.where(nearby, 2.0, 0.25)
         rows = rows[(share[rows] < 1.0) & (step[rows] > LEAST_LOAD_STEP)]
         if not len(rows):
@@ -153,12 +154,13 @@ def are_near(before: Mechanism, start: State, after: Mechanism, end: State) -> M
     """
     ahead, behind = (states_near(loads, state, 1).state for loads, state in ((after, start), (before, end)))
     pairs = ((ahead, start), (end, behind), (end, start))
-    first, last, moved = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
-    across = last - first
-    share = ((moved - first) * across).sum(axis=1) / np.maximum((across * across).sum(axis=1), ZERO_PIVOT)
-    foreseen = first + np.clip(share, 0.0, 1.0)[:, None] * across
-    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
-    return np.asarray((size <= LONGEST_PLATFORM_STEP) & (wrong <= MISSED_BY_TANGENTS * size + AT_REST))
+    by_start, by_end, motion = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
+    difference = by_end - by_start
+    squares = np.maximum((difference * difference).sum(axis=1), ZERO_PIVOT)
+    share = ((motion - by_start) * difference).sum(axis=1) / squares
+    foreseen = by_start + np.clip(share, 0.0, 1.0)[:, None] * difference
+    size, error = np.abs(motion).max(axis=1), np.abs(motion - foreseen).max(axis=1)
+    return np.asarray((size <= LONGEST_PLATFORM_STEP) & (error <= MISSED_BY_TANGENTS * size + AT_REST))
 
 
 def _by_descent(mechanism: Mechanism, start: State, reached: Equilibria) -> Equilibria:
@@ -182,13 +184,13 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
         preload: share of its preloads; that of the loads if None.
     """
 
-    def part(values: Array, of: float | Array) -> Array:
-        return np.asarray((values.T * of).T)
+    def scale(values: Array, factor: float | Array) -> Array:
+        return np.asarray((values.T * factor).T)
 
-    tension = share if preload is None else preload
-    legs = tuple(replace(leg, preload=part(leg.preload, tension)) for leg in mechanism.legs)
+    of_preload = share if preload is None else preload
+    legs = tuple(replace(leg, preload=scale(leg.preload, of_preload)) for leg in mechanism.legs)
     loads: dict[str, Any] = {
-        name: part(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")
+        name: scale(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")
     }
     return replace(mechanism, legs=legs, **loads)
 
@@ -204,8 +206,8 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
     count = len(mechanism.length)
 
     def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
-        there = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
-        return largest(there.left), lambda going: solve(there, -there.left[:, :, None])[going, :, 0]
+        evaluated = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
+        return largest(evaluated.left), lambda unsolved: solve(evaluated, -evaluated.left[:, :, None])[unsolved, :, 0]
 
     # The first step may only find what the legs carry and move nothing, so that one step alone shows nothing.
     end = newton(

@@ -253,7 +253,7 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
 
     Args:
         machine: the machine with its pose.
-        joints: where its joints are, if it is written leg by leg and they are known.
+        joints: its joint coordinates, if it is written leg by leg and they are known.
     """
     if machine.family.chains is None:
         return actuators_of(machine.configure())

@@ -42,7 +42,8 @@ class Check:
     @property
     def at_most(self) -> bool:
         """Whether the measure must not exceed the bound, otherwise it must not fall short of it."""
-        return self.limit.at_most is not self.limit.falling
+        # A greatest value is a least measure where the measure falls as the value rises.
+        return self.limit.at_most != self.limit.falling
 
     @property
     def kept(self) -> Scalar:
@@ -65,14 +66,14 @@ def geometric_checks(machine: Machine, configuration: Configuration, joints: Seq
 
     Args:
         machine: the machine with its limits.
-        configuration: it, placed.
-        joints: its coordinates from the home pose (m, rad) where it is written leg by leg.
+        configuration: the placed machine.
+        joints: joint coordinates from the home pose, rad or m, of a machine written leg by leg; empty for others.
     """
     rows = [limit for limit in limits_set(machine.tables["limits"]) if limit.about is not About.LOAD]
     if not rows:
         return []
-    counted = machine.family.chains and joints and any(limit.about is About.TRAVEL for limit in rows)
-    slides = travels(machine.chains(), joints) if counted else []
+    needs_travels = bool(machine.family.chains and joints) and any(limit.about is About.TRAVEL for limit in rows)
+    slides = travels(machine.chains(), joints) if needs_travels else []
     return _checks(machine, rows, parts_of(machine, configuration, slides), configuration.length)
 
 
@@ -83,8 +84,8 @@ def load_checks(
 
     Args:
         machine: the machine with its limits.
-        configuration: it, placed.
-        actuators: each with the size of its load, N or N·m.
+        configuration: the placed machine.
+        actuators: the springs of the actuators, each with the size of its load, N or N·m.
     """
     rows = [limit for limit in limits_set(machine.tables["limits"]) if limit.about is About.LOAD]
     return _checks(machine, rows, parts_of(machine, configuration, (), actuators), configuration.length)
@@ -122,14 +123,14 @@ def _checks(machine: Machine, rows: Sequence[Limit], parts: Parts, length: Scala
 def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]]:
     """Return the actuated slides whose travel counts from the home pose, each with its coordinate (m), leg by leg."""
     coordinates = iter(joints)
-    moved = []
+    result = []
     for steps in chains.legs:
-        counted = driven_slides([step.element for step in steps])
+        slides = driven_slides([step.element for step in steps])
         for i, step in enumerate(steps):
-            amount = next(coordinates) if step.moves else None
-            if i in counted:
-                moved.append((step.element.part, amount))
-    return moved
+            coordinate = next(coordinates) if step.moves else None
+            if i in slides:
+                result.append((step.element.part, coordinate))
+    return result
 
 
 def why_beyond(checks: Sequence[Check], display: Display) -> str:

@@ -39,14 +39,14 @@ class Statics:
     """The statics of a machine: shares of its springs in any load, and in the resistance to any motion.
 
     Attributes:
-        wrenches: per leg, a basis of what it carries.
-        sharing: per leg, a twist for each wrench of its basis: its work with a platform wrench is the amount that the
-            leg carries of this basis wrench.
-        flexibility: per spring, the load in it per unit platform wrench (xi_e); in a machine without redundancy also
-            the platform twist per unit deformation of it alone.
-        compliance: per spring, s_e.
-        resistance: per spring, a platform wrench (b_e or c_e).
-        stiffness: per spring, its weight in K (k_e or s_e).
+        wrenches: for each leg, a basis of what it carries.
+        sharing: for each leg, a twist for each wrench of its basis: its work with a platform wrench is the amount that
+            the leg carries of this basis wrench.
+        flexibility: for each spring, the load in it per unit platform wrench (xi_e); in a machine without redundancy
+            also the platform twist per unit deformation of it alone.
+        compliance: for each spring, s_e.
+        resistance: for each spring, a platform wrench (b_e or c_e).
+        stiffness: for each spring, its weight in K (k_e or s_e).
         motions: the fewest shares that add up to C: one per spring, or per wrench of a leg that has more springs.
         actions: the fewest shares that add up to K; infinite against what is rigid.
         length: characteristic length, m; rotations and translations compare through it where rounding is judged.
@@ -76,9 +76,9 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
     """Solve the statics of the whole machine, redundant or not, rigid or flexible.
 
     Args:
-        legs: at the reference point, base axes; together they carry six wrenches or more.
+        legs: screws of the legs at the reference point, base axes; together they carry six wrenches or more.
         length: characteristic length, m; scales rows, the result does not depend on it.
-        guide: of a planar machine, the wrenches against twists that do not exist there.
+        guide: wrenches of a planar machine against twists that do not exist there.
 
     Source: theory (4), (8) and (9), eqs. 21 and 32.
     """
@@ -167,9 +167,9 @@ def _round_off(
     36 / (n m^2), divided by the square of the length for a moment.
 
     Args:
-        loads: of springs or modes, their compliances, and the squares of what a unit of a leg's wrenches loads them by.
-        wrenches: how many the legs carry.
-        singularity_margin: of them: it tells how much of each a unit load may need.
+        loads: compliance of each spring or mode, and the square of its load by a unit of a leg's wrenches.
+        wrenches: number of wrenches that the legs carry.
+        singularity_margin: their singularity margin, which tells how much of each a unit load may need.
         length: characteristic length, m.
     """
     scaled_margin = singularity_margin * length
@@ -215,7 +215,7 @@ def without_round_off(compliance: Symmetric6, length: Scalar, round_off: Scalar)
     Args:
         compliance: C at any point (rad, m per N·m, N).
         length: characteristic length, m, through which rotations and translations compare.
-        round_off: of the loads of its springs, as in `Statics`.
+        round_off: what round-off in the loads of its springs makes, as in `Statics`.
     """
     area = length * length
     turns, moves = (total([compliance.entry(i, i) for i in rows]) for rows in (range(3), range(3, SIZE)))
@@ -253,7 +253,7 @@ def dual_twists(
 
     Args:
         wrenches: columns of W, at P in base axes.
-        length: m; moments are compared with forces through it.
+        length: characteristic length, m, through which moments are compared with forces.
         squares: as for `solve.dual_basis`.
 
     Returns:
@@ -274,9 +274,10 @@ def least_energy_rows(
     displacement depends on it: the undecided internal load is left out.
 
     Args:
-        modes: of the legs.
-        wrenches: of all legs in order, and of a guide, which does not deflect: columns of W, at P in base axes.
-        length: m, scales rows.
+        modes: modes of the legs.
+        wrenches: wrenches of all legs in order, and of a guide, which does not deflect: columns of W, at P in base
+            axes.
+        length: characteristic length, m, which scales rows.
 
     Returns:
         Amounts of the modes per unit platform wrench [wrenches x 6]; the doubt as in `Statics`; and the singularity

@@ -19,7 +19,7 @@ class DriveLimits:
     """Greatest loads and speed of a drive.
 
     Attributes:
-        spring: of its actuator.
+        spring: the spring of its actuator.
         lower, upper: least and greatest load, N or N·m: positive in the sense in which the actuator's joint is pulled
             open; infinite if not limited.
         speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
@@ -64,8 +64,8 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
     No integral part of its loop must remove the friction of the rotor. That of guide or bearing is a load on the joint.
 
     Args:
-        machine: with its tables [drives] and [servo].
-        spring: of the actuator.
+        machine: the machine with its tables [drives] and [servo].
+        spring: the spring of the actuator.
 
     Returns:
         m, or rad of a rotary drive.
@@ -94,8 +94,8 @@ def softness(machine: Machine, spring: Spring) -> Scalar:
     """Compliance of the joint of a drive at rest, m/N or rad/(N·m): with its servo loop if it has one.
 
     Args:
-        machine: with its tables [drives] and [servo].
-        spring: of the actuator; its stiffness is that of the transmission if there is a loop.
+        machine: the machine with its tables [drives] and [servo].
+        spring: the spring of the actuator; its stiffness is that of the transmission if there is a loop.
 
     Source: theory (102).
     """

@@ -36,12 +36,12 @@ class Element:
     """Springs that belong together: a joint or link, or one in each of several legs that are alike.
 
     Attributes:
-        name: for people, e.g. "actuator".
+        name: name for people, e.g. "actuator".
         parts: names of the joints and links.
         springs: their places in the order of all springs of the machine.
         actuated: whether they are actuators.
-        unit: of their stiffness; empty where one part has several springs.
-        stiffness: of each, SI; None where they differ or one part has several springs.
+        unit: unit of their stiffness; empty where one part has several springs.
+        stiffness: stiffness of each, SI; None where they differ or one part has several springs.
     """
 
     name: str
@@ -136,8 +136,8 @@ def rigid_from(response: Response, element: Element, excess: float) -> Array:
     infinity where even the softest element adds less.
 
     Args:
-        response: of the machine at one pose, or at several as arrays.
-        element: whose springs are changed together.
+        response: response of the machine at one pose, or at several as arrays.
+        element: the element whose springs are changed together.
         excess: e.g. 0.01.
 
     Returns:

@@ -33,8 +33,8 @@ def free_stiffness(response: Response, row: int) -> Scalar:
     """Free stiffness along one component, with all other motions free: 1 / C_ii, N/m or N·m/rad; at most K_ii.
 
     Args:
-        response: of a pose; at T, base axes.
-        row: of rx ry rz x y z = 0 ... 5.
+        response: response of a pose; at T, base axes.
+        row: number of the component, of rx ry rz x y z = 0 ... 5.
 
     Returns:
         0 where the direction is free, infinity where nothing deflects in it.
@@ -46,7 +46,7 @@ def least_stiffness(response: Response, block: Sequence[int]) -> Scalar:
     """Stiffness of the softest direction of a block, the other block free to follow: 1 / max eig(C_bb).
 
     Args:
-        response: of a pose.
+        response: response of a pose.
         block: `ROTATIONS` (N·m/rad) or `TRANSLATIONS` (N/m).
 
     Returns:
@@ -123,8 +123,8 @@ def reversal_error(response: Response, row: int) -> Scalar:
     """Motion of the tool along a component that is lost where all drives reverse, at worst, m or rad.
 
     Args:
-        response: of a pose; at T, base axes.
-        row: of rx ry rz x y z = 0 ... 5.
+        response: response of a pose; at T, base axes.
+        row: number of the component, of rx ry rz x y z = 0 ... 5.
 
     Returns:
         NaN where it has not been computed what friction of passive joints holds back (`motion.response`).

@@ -59,9 +59,9 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
     """Find how drives and platform act on each other, as rigid bodies: flexures bend freely.
 
     Args:
-        configuration: of the machine.
+        configuration: the machine at its pose.
         legs: their screws at the tool point, base axes.
-        guide: of a planar machine, the wrenches against twists that do not exist there.
+        guide: wrenches of a planar machine against twists that do not exist there.
 
     Source: theory (81).
     """
@@ -124,7 +124,7 @@ def _by_drives(
     """Split what a leg carries into a wrench for each of its drives, and wrenches that load none of them.
 
     Args:
-        wrenches: of the leg.
+        wrenches: the wrenches that the leg carries.
         rows: for each drive, its load per unit of each of them.
 
     Returns:
@@ -245,8 +245,8 @@ def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar
     block; negative where the drives do not even hold the loads that count already.
 
     Args:
-        faces: of the set of wrenches.
-        block: of `BLOCKS`.
+        faces: faces of the set of wrenches.
+        block: one of `BLOCKS`.
         length: characteristic length, m.
 
     Source: theory (83).
@@ -288,7 +288,7 @@ def greatest_speed(given: Transmission, speeds: Sequence[Scalar], block: slice) 
     Args:
         given: how drives and platform act on each other.
         speeds: greatest speed of each drive, m/s or rad/s.
-        block: of `BLOCKS`.
+        block: one of `BLOCKS`.
 
     Source: theory (84).
     """
@@ -347,9 +347,9 @@ def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: sli
     drives do not hold what they carry at rest; infinite where nothing that moves has a mass; NaN where nothing moves.
 
     Args:
-        faces: of the set of accelerations.
+        faces: faces of the set of accelerations.
         given: how drives and platform act on each other.
-        block: of `BLOCKS`.
+        block: one of `BLOCKS`.
     """
     grow, turning, structure = given.length, block.start == 0, _structure(given, block)
     radius: Scalar = math.inf
@@ -367,7 +367,7 @@ def greatest_acceleration_along(faces: Sequence[Face], given: Transmission, row:
 
     Args:
         faces, given: see `greatest_acceleration`.
-        row: of rx ry rz x y z = 0 ... 5.
+        row: number of the component, of rx ry rz x y z = 0 ... 5.
     """
     return _where_structure_allows(given, row, greatest_along(faces, row, given.length))
 
@@ -377,7 +377,7 @@ def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int
 
     Args:
         given, speeds: see `greatest_speed`.
-        row: of rx ry rz x y z = 0 ... 5.
+        row: number of the component, of rx ry rz x y z = 0 ... 5.
     """
     if given.wrenches is None:
         return math.nan

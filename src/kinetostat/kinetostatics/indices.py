@@ -152,7 +152,7 @@ def free_stiffness_along(
     """Force along n over the displacement along n it causes, all else free to follow: 1 / (n^T C_bb n).
 
     Args:
-        direction: along n, base axes, of any length [3]; along an axis that has no component it must be zero.
+        direction: n times any length, base axes [3]; along an axis that has no component it must be zero.
         block: "translation" for a force (N/m), "rotation" for a moment (N·m/rad).
         stiffness, compliance, components: as for `free_stiffnesses`.
 

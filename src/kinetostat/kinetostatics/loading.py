@@ -168,8 +168,8 @@ class Deflection:
     """Small motions of a loaded machine.
 
     Attributes:
-        load: at the tool point, base axes, N·m and N.
-        motion: of the tool point, rad and m.
+        load: the wrench at the tool point, base axes, N·m and N.
+        motion: motion of the tool point, rad and m.
         links: deflected links of the legs.
     """
 
@@ -205,7 +205,7 @@ def leg_links(leg: Leg, moved: Callable[[int, Vector], Twist]) -> Iterator[Defle
     """The links between the points of a chain.
 
     Args:
-        leg: at the pose.
+        leg: the leg at the pose.
         moved: the motion, in base axes (rad, m), of a point of the body after so many elements.
     """
     at: Vector | None = None

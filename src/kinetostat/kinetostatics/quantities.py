@@ -55,10 +55,10 @@ class MapQuantity:
     """One scalar at one pose.
 
     Attributes:
-        name: as in files and on the command line.
+        name: name in files and on the command line.
         unit: SI, for people.
-        symbol: for axis labels (matplotlib mathematics).
-        value: from a response; NaN where the machine lacks the part that it is about.
+        symbol: symbol for axis labels (matplotlib mathematics).
+        value: function that takes it from a response; NaN where the machine lacks the part that it is about.
         components: names of those that it is about: the machine must have them.
         better: whether more or less of it is better for a design; None where that depends on the machine.
         needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
@@ -386,8 +386,8 @@ def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -
     is judged by them, whatever quantity it is asked for.
 
     Args:
-        machine: with its limits, and its state.
-        names: of quantities.
+        machine: the machine with its limits, and the state in which it is meant.
+        names: names of quantities.
         limited: whether poses are judged by limits; derivatives are not.
     """
     names = list(names)

@@ -28,8 +28,8 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
     """Explain why the status of a pose is not OK.
 
     Args:
-        machine: with its pose.
-        response: of the machine, with that status.
+        machine: the machine with its pose.
+        response: its response, with that status.
         nearby: the machine at poses around it, to tell what holds in general; may be empty.
     """
     status = Status(int(response.status))

@@ -42,10 +42,10 @@ class Response:
     """Everything that is computed of a machine at a pose.
 
     Attributes:
-        configuration: where everything is.
+        configuration: the machine at the pose.
         reference: the tool point T (P itself unless the machine has a tool), in its plane if it has one, base frame, m.
         legs: screws of every leg at T, base axes.
-        guide: of a planar machine, the wrenches against twists that do not exist there; at T, base axes.
+        guide: wrenches of a planar machine against twists that do not exist there; at T, base axes.
         statics: how the springs share loads.
         stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
             machine only rz, x, y have a meaning, and the other entries are 0.
@@ -54,12 +54,12 @@ class Response:
         status: a `Status` code.
         load: all loads on the platform with its weight, at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
-        mass: of what moves, as far as it is known, kg.
+        mass: mass of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
         place_status: as `status`, but a singular pose within the limits of geometry is OK, and one beyond them
             JOINT_LIMIT: loads can hold a machine there.
         frequencies: the lowest natural frequencies, Hz, where they have been computed.
-        cutting_pressure: of the machine's table [cutting], N/m².
+        cutting_pressure: cutting pressure in the machine's table [cutting], N/m².
         meant_loaded: whether the machine is meant at rest under its loads (`Machine.loaded`): its actuators then carry
             what they carry there, and limits of their loads are judged there.
         softest: the least real part of the receptance across the cut, m/N, where it has been computed.
@@ -139,9 +139,9 @@ def respond(machine: Machine, joints: Joints | None = None, configuration: Confi
     """Compute K, C and the status of a machine at its pose.
 
     Args:
-        machine: with its pose.
-        joints: where its joints are, if known; otherwise they are found where the family has no closed form.
-        configuration: where everything is then, if known.
+        machine: the machine with its pose.
+        joints: its joint coordinates, if they are known; otherwise they are found where the family has no closed form.
+        configuration: the machine placed with them, if it has been.
     """
     if joints is None:
         joints = closure.solve_joints(machine) if machine.family.chains else CLOSED_FORM
@@ -187,8 +187,8 @@ def compliance_at(machine: Machine, configuration: Configuration) -> Symmetric6:
     """C of a machine whose legs are where a configuration says, at its tool point, base axes (rad, m per N·m, N).
 
     Args:
-        machine: whose tool counts.
-        configuration: of its legs, which need not be that of its own numbers.
+        machine: the machine whose tool counts.
+        configuration: the place of its legs, which need not follow from its own numbers.
     """
     return compliance_matrix(_statics(machine, configuration)[3])
 
@@ -233,11 +233,11 @@ def pose_status(
     Args:
         placed: `Status` code of the joints.
         reached: whether all legs close.
-        singularity_margin: of the pose.
+        singularity_margin: singularity margin of the pose.
         allowed: whether the limits of geometry are kept.
         borne: whether the actuators bear the load, which means something where the pose is regular.
         doubt: 1 where it is undecided which rigid parts share a load, else 0.
-        singular: code of a singular pose.
+        singular: status code of a singular pose.
     """
     kept = where(allowed, where(borne, int(Status.OK), int(Status.JOINT_LIMIT)), int(Status.JOINT_LIMIT))
     decided = where(doubt > 0.5, int(Status.UNDECIDED), kept)
@@ -251,8 +251,8 @@ def actuator_loads(configuration: Configuration, statics: Statics, load: Wrench)
     Actuators that are free by form carry nothing and are left out.
 
     Args:
-        configuration, statics: of a machine at its pose.
-        load: at the tool point, base axes.
+        configuration, statics: a machine at its pose, and its statics there.
+        load: the wrench at the tool point, base axes.
     """
     pairs = zip(springs(configuration), statics.flexibility, strict=True)
     driven = [(spring, twist) for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
@@ -265,8 +265,8 @@ def actuator_checks(machine: Machine, configuration: Configuration, statics: Sta
     A machine that is meant under its loads is judged where it is at rest (`equilibrium.numbers`), not here.
 
     Args:
-        machine: with [limits] and [load].
-        configuration, statics: of it at its pose.
+        machine: the machine with [limits] and [load].
+        configuration, statics: the machine at its pose, and its statics there.
     """
     if machine.loaded or not limits_loads(machine.tables["limits"]):
         return []
