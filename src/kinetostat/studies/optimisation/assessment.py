@@ -17,18 +17,20 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.space import Variable
 from kinetostat.tolerances import ROUND_OFF_OF_SHARE
 
 POINTS_AT_ONCE = 1 << 20
 """Points that are evaluated before they are summed up: a few quantities of them fit in a hundred megabytes."""
-
 LARGEST_MET_EXCESS = 1e-9
 """Relative excess up to which a constraint counts as met, so that a design at its bound is not refused by round-off."""
-
 MOST_CORNERS = 12
 """Greatest number of tolerances of which all combinations of ends are tried: 4096 machines."""
 SIGMAS_IN_TOLERANCE = 3.0
-"""Standard deviations of a normal distribution within the tolerance; a deviation beyond it is moved to its end."""
+"""Standard deviations of a normal distribution from its middle to the end of the tolerance: those of a process whose
+capability index is 1. A deviation beyond is moved to the end."""
+COMMON_SHARE = 0.95
+"""Share of the machines that keep within `Scatter.usual`."""
 SEARCH_STREAM, ROBUSTNESS_STREAM = 0, 1
 """Streams of random numbers: robustness is judged by other machines than those that the search has seen."""
 
@@ -49,9 +51,11 @@ class DesignVerdict(IntEnum):
     @property
     def phrase(self) -> str:
         """The verdict in words."""
-        return {5: "a constraint is violated", 6: "an objective is infinite"}.get(
-            self.value, self.name.lower().replace("_", " ")
-        )
+        phrases = {
+            DesignVerdict.CONSTRAINT: "a constraint is violated",
+            DesignVerdict.NOT_FINITE: "an objective is infinite",
+        }
+        return phrases.get(self, self.name.lower().replace("_", " "))
 
 
 VERDICT_BY_STATUS = np.array([DesignVerdict.FEASIBLE, *(DesignVerdict[status.name] for status in Status if status)])
@@ -124,12 +128,12 @@ class Assessor:
         """Judge designs by columns in which so many machines of each design follow each other."""
         problem = self.problem
         answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), problem.names)
-        there = answers.status == Status.OK
+        reached = answers.status == Status.OK
         pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
-        numbers = [self._over_machines(term.values(answers.values, there), machines, sign > 0) for term, sign in pairs]
+        terms = [self._over_machines(term.values(answers.values, reached), machines, sign > 0) for term, sign in pairs]
         status = answers.status.reshape(-1, machines * answers.status.shape[1])
-        numbers_of_designs, count = np.array(numbers).T.reshape(len(status), len(pairs)), len(problem.objectives)
-        return _outcome(problem, numbers_of_designs[:, :count], numbers_of_designs[:, count:], status)
+        by_design, count = np.array(terms).T.reshape(len(status), len(pairs)), len(problem.objectives)
+        return _outcome(problem, by_design[:, :count], by_design[:, count:], status)
 
     def _over_machines(self, values: Array, machines: int, high_is_bad: bool) -> Array:
         """One number for each design, as the study sums up the numbers of its machines."""
@@ -140,10 +144,15 @@ class Assessor:
 
 
 def _outcome(problem: Problem, objectives: Array, constraints: Array, status: Codes) -> Outcome:
-    """The verdicts on designs by their numbers and the status of all their poses [designs x poses].
+    """The verdicts on designs by their objectives and constraints, and by the status of all their poses.
 
     The violations order them: any that lacks poses is worse than any without finite objectives, and that is worse than
     any with violated constraints, each of which counts at most 1.
+
+    Args:
+        problem: the problem of the designs.
+        objectives, constraints: values of their terms, SI [designs x terms each].
+        status: `Status` codes of the poses of all machines of a design [designs x poses].
     """
     most = len(problem.constraints)
     excess = np.zeros(constraints.shape)
@@ -161,8 +170,7 @@ def _outcome(problem: Problem, objectives: Array, constraints: Array, status: Co
     lacking = (missing > ROUND_OFF_OF_SHARE) | (counts[0] == 0)
     verdict[lacking] = VERDICT_BY_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
     violation[lacking] = most + 2.0 + missing[lacking]
-    known = np.where(lacking[:, None], np.nan, objectives)
-    return Outcome(known, constraints, violation, verdict.astype(np.int8))
+    return Outcome(np.where(lacking[:, None], np.nan, objectives), constraints, violation, verdict.astype(np.int8))
 
 
 def join_outcomes(parts: Sequence[Outcome]) -> Outcome:
@@ -176,23 +184,27 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
     """Draw the deviations of machines made to the tolerances, SI, by variable [samples]; the first machine has none.
 
     Args:
-        problem: with tolerances and the seed.
+        problem: the problem, with tolerances and the seed.
         samples: number of machines, the nominal one included.
         stream: number of the stream of random numbers; streams are independent.
     """
-    source = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
-    tolerated = [variable for variable in problem.space.variables if variable.tolerance]
+    rng = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
+    tolerated = _tolerated(problem)
     if problem.study.robustness.distribution == "normal":
-        drawn = np.clip(source.standard_normal((samples, len(tolerated))) / SIGMAS_IN_TOLERANCE, -1.0, 1.0)
+        drawn = np.clip(rng.standard_normal((samples, len(tolerated))) / SIGMAS_IN_TOLERANCE, -1.0, 1.0)
     else:
-        drawn = source.uniform(-1.0, 1.0, (samples, len(tolerated)))
+        drawn = rng.uniform(-1.0, 1.0, (samples, len(tolerated)))
     drawn[0] = 0.0
     return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, drawn.T, strict=True)}
 
 
+def _tolerated(problem: Problem) -> list[Variable]:
+    return [variable for variable in problem.space.variables if variable.tolerance]
+
+
 def corners(problem: Problem) -> dict[str, Array]:
     """Return all combinations of the ends of the tolerances, SI, by variable; empty if there are too many."""
-    tolerated = [variable for variable in problem.space.variables if variable.tolerance]
+    tolerated = _tolerated(problem)
     if not 0 < len(tolerated) <= MOST_CORNERS:
         return {}
     ends = np.array(list(product((-1.0, 1.0), repeat=len(tolerated))))
@@ -207,7 +219,7 @@ class Scatter:
         label, unit: name and unit of the objective.
         nominal: its value for the design itself.
         mean, deviation: mean and standard deviation over all machines that can be judged.
-        usual: the value that 95 percent of these machines keep within.
+        usual: the value within which 95 percent of these machines keep.
         worst: the worst value of all machines, those with every tolerance at an end included.
         samples: the values of the random machines; NaN where one cannot be judged.
     """
@@ -242,7 +254,7 @@ class Robustness:
 def robustness_of(assess: Assessor, genes: Array) -> Robustness | None:
     """Return the objectives of a design [variables] under the tolerances of its study; None where there are none."""
     problem = assess.problem
-    if not any(variable.tolerance for variable in problem.space.variables):
+    if not _tolerated(problem):
         return None
     made = assess.judge_machines(genes, deviations(problem, problem.study.robustness.samples, ROBUSTNESS_STREAM))
     ends = corners(problem)
@@ -260,12 +272,12 @@ def _scatter(assess: Assessor, number: int, made: Outcome, extreme: Outcome) -> 
     if not known.size:
         known = with_ends = np.array([np.nan])
     return Scatter(
-        objective.term.label,
-        objective.term.unit,
-        float(samples[0]),
-        float(objective.sign * known.mean()),
-        float(known.std()),
-        float(objective.sign * np.quantile(known, 0.95)),
-        float(objective.sign * with_ends.max()),
-        samples,
+        label=objective.term.label,
+        unit=objective.term.unit,
+        nominal=float(samples[0]),
+        mean=float(objective.sign * known.mean()),
+        deviation=float(known.std()),
+        usual=float(objective.sign * np.quantile(known, COMMON_SHARE)),
+        worst=float(objective.sign * with_ends.max()),
+        samples=samples,
     )

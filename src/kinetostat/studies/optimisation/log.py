@@ -28,7 +28,7 @@ class Step:
         genes: designs that it judged, in order [designs x variables].
         outcome: their objectives, constraints and verdicts.
         kept: numbers in the log, these designs included, of those that the search goes on with, the best first.
-        notes: plain data about it.
+        notes: further plain data for the note about the step.
     """
 
     genes: Array
@@ -41,17 +41,18 @@ class Log:
     """The designs of a search, as rows of one table: genes, objectives, constraints, violation, verdict.
 
     Attributes:
-        problem: of the search.
-        count: designs so far.
-        steps: what is noted about each step.
-        repaired: steps that were damaged in their folder and have been computed again.
-        cleaned: whether its history in the folder had lines that were no steps, which have been removed.
+        problem: the problem of the search.
+        count: number of designs so far.
+        steps: the note about each step.
+        repaired: number of steps that were damaged in their folder and have been computed again.
+        cleaned: whether the history in the folder had lines that were no steps, which have been removed.
         unchecked: whether the folder was begun without checksums.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self._sizes = np.cumsum([problem.space.size, len(problem.objectives), len(problem.constraints), 1])
+        # Ends of the genes, objectives, constraints and the violation in a row; the verdict follows.
+        self._ends = np.cumsum([problem.space.size, len(problem.objectives), len(problem.constraints), 1])
         self._rows: Array = np.empty((0, self.width))
         self.count = self.repaired = 0
         self.cleaned = False
@@ -61,7 +62,7 @@ class Log:
     @property
     def width(self) -> int:
         """Numbers in a row."""
-        return int(self._sizes[-1]) + 1
+        return int(self._ends[-1]) + 1
 
     @property
     def rows(self) -> Array:
@@ -84,11 +85,11 @@ class Log:
 
     def genes(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Array:
         """Genes of some designs."""
-        return self.rows[numbers, : self._sizes[0]]
+        return self.rows[numbers, : self._ends[0]]
 
     def outcome(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Outcome:
         """Objectives, constraints and verdicts of some designs."""
-        _, objectives, constraints, violation, verdict = np.split(self.rows[numbers], self._sizes, axis=1)
+        _, objectives, constraints, violation, verdict = np.split(self.rows[numbers], self._ends, axis=1)
         return Outcome(objectives, constraints, violation[:, 0], verdict[:, 0].astype(np.int8))
 
     def as_rows(self, step: Step) -> Array:
@@ -111,11 +112,11 @@ class Log:
 
 
 def record_of(log: Log, step: Step) -> dict[str, Any]:
-    """Return the note about a step: its number, how many designs it judged, what it kept, and how good that is."""
-    problem, old = log.problem, step.kept < log.count
-    every = join_outcomes([log.outcome(step.kept[old]), step.outcome])
-    place = np.where(old, np.cumsum(old) - 1, old.sum() + step.kept - log.count)
-    kept = every.selection(place)
+    """Return the note about a step: its number, how many designs it judged, which it kept, and how good these are."""
+    problem, is_logged = log.problem, step.kept < log.count
+    outcomes = join_outcomes([log.outcome(step.kept[is_logged]), step.outcome])
+    new_places = is_logged.sum() + step.kept - log.count
+    kept = outcomes.selection(np.where(is_logged, np.cumsum(is_logged) - 1, new_places))
     feasible = kept.violation == 0.0
     notes: dict[str, Any] = {}
     if len(problem.objectives) == 1 and feasible.any():
@@ -144,10 +145,11 @@ def front_of(log: Log) -> Integers:
     feasible = np.flatnonzero(outcome.violation == 0.0)
     if not feasible.size:
         return feasible
-    wanted = _signed_objectives(log)[log.survivors[feasible]]
-    _, single = np.unique(wanted, axis=0, return_index=True)
-    first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)
-    return log.survivors[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
+    candidates = log.survivors[feasible]
+    signed = _signed_objectives(log)[candidates]
+    _, single = np.unique(signed, axis=0, return_index=True)  # of equal designs, one
+    front = single[NonDominatedSorting().do(signed[single], only_non_dominated_front=True)]
+    return candidates[front[np.argsort(signed[front, 0], kind="stable")]]
 
 
 def knee_of(log: Log, front: Integers) -> int:
@@ -157,9 +159,9 @@ def knee_of(log: Log, front: Integers) -> int:
 
     Source: Das, On characterizing the "knee" of the Pareto curve, Structural Optimization 18 (1999).
     """
-    wanted = _signed_objectives(log)[front]
-    spans = np.ptp(wanted, axis=0)
-    shares = (wanted - wanted.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
+    signed = _signed_objectives(log)[front]
+    spans = np.ptp(signed, axis=0)
+    shares = (signed - signed.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
     return int(np.argmin(shares.sum(axis=1)))
 
 

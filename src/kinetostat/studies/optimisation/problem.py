@@ -30,19 +30,19 @@ if TYPE_CHECKING:
 else:
     workspace_verdicts = LateModule("kinetostat.studies.workspace_verdicts")
 
-MACHINE_GIVEN = (
+NOT_A_STUDY = (
     "is a machine, but this command takes a study, which names the machine and says what may change and what is "
     "better; `kinetostat new study` prints a study to start from."
 )
 """The message for a machine in the place of a study."""
 NOMINAL = "nominal"
+"""Word for designs that are judged as they are, without what manufacture makes of them."""
 MOST_EVALUATIONS = 5_000_000
-"""Designs of one study: their table then fits in half a gigabyte."""
-
+"""Greatest number of designs of one study: their table then fits in half a gigabyte."""
 MOST_POINTS = 2_000_000
-"""Poses of one design: a few quantities of them fit in some hundred megabytes."""
+"""Greatest number of poses of one design: a few quantities of them fit in some hundred megabytes."""
 MOST_DIFFERENTIATED = 50_000
-"""Likewise with derivatives by a dozen variables."""
+"""The same with derivatives by a dozen variables."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Objective:
 
     @property
     def goal(self) -> str:
-        """In a word."""
+        """The goal in a word."""
         return "minimise" if self.sign > 0 else "maximise"
 
 
@@ -68,12 +68,12 @@ class Constraint:
 
     @property
     def label(self) -> str:
-        """As files have it, SI."""
+        """The constraint as files name it, SI."""
         unit = "" if self.term.unit == "1" else f" {self.term.unit}"
         return f"{self.term.label} {self._relation} {self.bound:.6g}{unit}"
 
     def in_words(self, display: Display) -> str:
-        """As people read it."""
+        """The constraint as people read it."""
         return f"{plain_name(self.term.label)} {self._relation} {display.show(self.bound, self.term.unit)}"
 
     @property
@@ -91,12 +91,13 @@ class Problem(Immutable):
     """An optimisation problem.
 
     Attributes:
-        study: as written, overrides included.
-        machine: as it is before.
-        space: what may change.
-        poses: where it is judged.
-        objectives, constraints: what is wanted and what must hold.
-        robust: how objectives are taken over what manufacture makes; None where the design itself counts.
+        study: the study file, overrides included.
+        machine: the machine before the search.
+        space: the variables, with their bounds or choices.
+        poses: the poses at which designs are judged.
+        objectives, constraints: the terms that are wanted small or large, and those that must keep a bound.
+        robust: the way in which the numbers of all machines that manufacture makes of a design become one; None
+            where the design itself counts.
         method: genetic, gradient, hybrid or nsga2.
     """
 
@@ -119,7 +120,7 @@ class Problem(Immutable):
 
     @property
     def points(self) -> int:
-        """Poses at which one design is evaluated: of every machine that manufacture makes of it."""
+        """Number of poses at which one design is evaluated, over all machines that manufacture makes of it."""
         return self.poses.count * (self.study.robustness.search_samples if self.robust else 1)
 
     @property
@@ -131,12 +132,12 @@ class Problem(Immutable):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The quantities that have to be known."""
+        """Names of the quantities of which the terms are made."""
         return tuple(dict.fromkeys(name for term in self.terms for name in term.names))
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of what varies: of designs, then of poses."""
+        """Leaf paths of all numbers that vary: those of designs, then those of poses."""
         return *self.space.paths, *self.poses.columns
 
 
@@ -149,21 +150,21 @@ def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
         settings: overrides "path=value" of the study's fields, as `--set` takes them.
 
     Raises:
-        InputError: no such study or machine, or a mistake in it or in an override.
+        InputError: there is no such study or machine, or it or an override has a mistake.
     """
     name, shipped = str(study), bundled_studies()
     if name in shipped:
         return build_problem(study_of(name, settings))
     path = Path(study)
     if name in bundled():
-        raise InputError(f'"{name}" {MACHINE_GIVEN}')
+        raise InputError(f'"{name}" {NOT_A_STUDY}')
     if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled studies: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled study; {hint}")
     document = documents.read(path)
     if "family" in document:
-        raise InputError(f'"{name}" {MACHINE_GIVEN}')
+        raise InputError(f'"{name}" {NOT_A_STUDY}')
     return build_problem(read_study(document, name, settings), path.parent)
 
 
@@ -171,7 +172,7 @@ def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:
     """The problem of a study; a machine that is not bundled is looked for from `folder`.
 
     Raises:
-        InputError: a field, quantity, bound or value that does not fit the machine.
+        InputError: a field, quantity, bound or value does not fit the machine.
     """
     named = study.machine in bundled()
     machine = load(study.machine if named else folder / study.machine, list(settings_of(study.changes)))
@@ -183,7 +184,7 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     """The problem of a study about a machine in which the study's changes are made already.
 
     Raises:
-        InputError: a field, quantity, bound or value that does not fit the machine.
+        InputError: a field, quantity, bound or value does not fit the machine.
     """
     machine = replace(machine, requirements={**machine.requirements, **study.requirements})
     poses = read_poses(machine, study.poses)

@@ -75,7 +75,7 @@ class Result(Immutable):
     Attributes:
         problem: the problem that was solved.
         log: the log of all designs.
-        initial: what the machine is worth as its file says, by the same measure.
+        initial: objectives, constraints and verdict of the machine as its file says.
         front: numbers of the Pareto-optimal designs, by the first objective; of one objective the best design alone.
         knee: place in `front` of the design that is called the best.
         compliance_changes: the compliances before and after.
@@ -132,13 +132,11 @@ class Result(Immutable):
     @property
     def message(self) -> str:
         """The outcome of the search in a sentence."""
-        lacking = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in self.counts.items() if verdict)
+        reasons = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in self.counts.items() if verdict)
         if not self.solved:
-            return INFEASIBLE.format(lacking)
-        feasible = self.counts[DesignVerdict.FEASIBLE]
-        return f"{self.log.count:,} designs judged, {feasible:,} of them feasible" + (
-            f" ({lacking})." if lacking else "."
-        )
+            return INFEASIBLE.format(reasons)
+        sentence = f"{self.log.count:,} designs judged, {self.counts[DesignVerdict.FEASIBLE]:,} of them feasible"
+        return f"{sentence} ({reasons})." if reasons else f"{sentence}."
 
     @property
     def loads_left_out(self) -> str:
@@ -170,8 +168,8 @@ def result_of(assess: Assessor, log: Log) -> Result:
 
 def _as_it_is(problem: Problem) -> Array:
     """Genes of the machine as its file says; a value that its catalogue does not contain counts as the first one."""
-    picked = problem.space.catalogue > 0
-    return np.where(picked, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
+    is_choice = problem.space.catalogue > 0
+    return np.where(is_choice, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
 
 
 def _explain(assess: Assessor, result: Result) -> Result:

@@ -38,11 +38,10 @@ else:
     result_file = LateModule("kinetostat.studies.result_file")
 
 STUDY_VERSION = 1
+"""Version of the question in a study folder, as far as this module writes it."""
 
 Watch = Callable[[int, int, float | None], None]
 """Called with (steps done, steps in all, best objective so far) after each step."""
-
-
 Stop = Callable[[], bool]
 """Called after each step; True leaves the rest for later."""
 
@@ -122,7 +121,7 @@ def optimize(
         problem: from `load_problem`.
         folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
         watch: called with the progress and the best objective.
-        resume: insist that the folder holds a part of the search.
+        resume: whether the folder must hold a part of the search.
         stop: called after each step of a search with a folder; True ends it with the result so far.
 
     Raises:
@@ -151,10 +150,10 @@ def search_into(
     """Search into a folder, continuing a search of the same study that is there; return the log of all designs.
 
     Args:
-        assess: of the problem.
-        folder: of this study alone.
+        assess: judges designs of the problem.
+        folder: the folder of this study alone.
         watch: called with the progress.
-        resume: insist that the folder holds a part of it.
+        resume: whether the folder must hold a part of the search.
         stop: called after each step; True ends the search for now.
 
     Raises:
@@ -164,23 +163,18 @@ def search_into(
         raise InputError(f'"{folder}" does not hold a study that could be resumed; check -o, or leave out --resume.')
     with study_folder(folder) as study:
         log, method = Log(assess.problem), method_of(assess)
-        _take_up(assess.problem, study, log)
-        known = study.records()
-        last = max(known, default=-1) + study.damaged
+        _begin_or_check(assess.problem, study, log)
+        noted = study.records()
+        last_noted = max(noted, default=-1) + study.damaged  # a damaged line was that of a step, too
         with result_file.RowFile(folder / ROWS, log.width) as file:
             while len(log.steps) < method.steps:
-                number, start = len(log.steps), log.count
-                record = known.get(number, {})
-                rows = file.read(start, record["designs"], record.get(DATA)) if record else None
-                if rows is not None:
-                    log.add(rows, record)
-                    if log.repaired:
-                        study.note(record)
+                if _read_step(study, file, noted.get(len(log.steps)), log):
                     continue
-                if number <= last:
-                    if not log.repaired:
+                if len(log.steps) <= last_noted:
+                    if not log.repaired:  # the history begins again with the steps before the first damaged one
                         study.keep(log.steps)
                     log.repaired += 1
+                start = log.count
                 _take(method, log)
                 log.steps[-1][DATA] = file.write(start, log.rows[start:])
                 study.note(log.steps[-1])
@@ -193,14 +187,26 @@ def search_into(
         return log
 
 
+def _read_step(study: StudyFolder, file: "result_file.RowFile", record: Record | None, log: Log) -> bool:
+    """Add the next step from the folder to the log, if it is there without damage, and return whether it was."""
+    rows = file.read(log.count, record["designs"], record.get(DATA)) if record else None
+    if record is None or rows is None:
+        return False
+    log.add(rows, record)
+    if log.repaired:
+        study.note(record)
+    return True
+
+
 def _take(method: Method, log: Log) -> None:
+    """Make the next step of a search and add it to the log."""
     step = method.step(len(log.steps), log)
     record = {**record_of(log, step), "of": method.steps}
     log.add(log.as_rows(step), record)
 
 
-def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
-    """Check that the folder holds this study, or begin it."""
+def _begin_or_check(problem: Problem, study: StudyFolder, log: Log) -> None:
+    """Begin the folder of a study, or check that it holds this one."""
     question = question_of(problem, log.width)
     stored = study.question(question, _restate)
     if stored is None:
@@ -245,14 +251,14 @@ def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
     """Return the designs that a step kept as a separate log; another process may be writing to the folder.
 
     Args:
-        problem: of the folder.
-        folder: of the search.
-        record: what was noted about the step.
+        problem: the problem of the search.
+        folder: the folder of the search.
+        record: the note about the step.
     """
     log = Log(problem)
     number = result_file.ROW_NUMBER
-    known = (folder / ROWS).stat().st_size // (log.width * number.itemsize)
-    rows = np.memmap(folder / ROWS, number, "r", shape=(known, log.width))[record["kept"]].astype(float)
+    count = (folder / ROWS).stat().st_size // (log.width * number.itemsize)
+    rows = np.memmap(folder / ROWS, number, "r", shape=(count, log.width))[record["kept"]].astype(float)
     log.add(rows, {**record, "kept": list(range(len(rows)))})
     return log
 

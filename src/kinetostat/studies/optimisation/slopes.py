@@ -16,7 +16,7 @@ from kinetostat.engine.derivatives import SMALL_SLAB, differentiate
 from kinetostat.engine.points import Population
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.optimisation.assessment import deviations
+from kinetostat.studies.optimisation.assessment import SEARCH_STREAM, deviations
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.terms import PoseTerm, Term
 from kinetostat.tolerances import ROUND_OFF_OF_SHARE
@@ -32,9 +32,13 @@ FLAT_CURVATURE = 1e-4
 RIDGE_STEP = 0.02
 """Length of a step along a ridge, in genes."""
 MOST_RIDGE_STEPS = 150
-"""Greatest number of steps along a ridge in each direction."""
+"""Greatest number of steps along a ridge in each direction: three times the range of a gene."""
 LARGEST_RIDGE_CHANGE = 1e-6
-"""Greatest relative change at which the objective counts as the same."""
+"""Greatest relative change at which the objective counts as the same: far below what manufacture changes."""
+SETTLING_STEPS = 3
+"""Newton's steps across a ridge after each step along it: from so near, each doubles the digits."""
+LEAST_RIDGE = 0.1
+"""Length of a ridge, in steps, up to which it is a point; also that of a step that leads no further."""
 LEAST_MOVE_SHARE = 0.02
 """A variable belongs to a ridge if it moves by more than this share of the variable that moves most."""
 
@@ -67,29 +71,28 @@ class Local:
         """Compute a term and its derivatives by the genes; at a kink, those of the pose or machine that decides."""
         numbers, slopes = [], []
         for k, reached in enumerate(self.reached):
-            at_machine = {name: rows[k] for name, rows in self.values.items()}
-            numbers.append(float(term.values({name: at_machine[name][None] for name in term.names}, reached[None])[0]))
-            parts = term.slopes(at_machine, reached)
-            slopes.append(sum(np.where(reached, self.slopes[name][:, k], 0.0) @ outer for name, outer in parts.items()))
-        at_machines = np.array(numbers)
-        if self.problem.robust is None or len(at_machines) == 1:
-            return at_machines[0], np.asarray(slopes[0])
-        every = np.ones(len(at_machines), dtype=bool)
-        shares = self.problem.robust.weights(at_machines, every, high_is_bad)
-        return float(shares @ at_machines), shares @ np.array(slopes)
+            of_machine = {name: rows[k] for name, rows in self.values.items()}
+            numbers.append(float(term.values({name: of_machine[name][None] for name in term.names}, reached[None])[0]))
+            outer = term.slopes(of_machine, reached)  # derivatives of the term by each quantity
+            slopes.append(sum(np.where(reached, self.slopes[name][:, k], 0.0) @ rate for name, rate in outer.items()))
+        by_machine = np.array(numbers)
+        if self.problem.robust is None or len(by_machine) == 1:
+            return by_machine[0], np.asarray(slopes[0])
+        shares = self.problem.robust.weights(by_machine, np.ones(len(by_machine), dtype=bool), high_is_bad)
+        return float(shares @ by_machine), shares @ np.array(slopes)
 
     def worst(self, term: PoseTerm, most: int) -> Integers:
-        """Return where a term is worst, the worst first: at most `most` indices into the flattened machines x poses."""
+        """Return where a term is worst: at most `most` indices into flattened [machines x poses], the worst first."""
         at_poses = term.at_poses(self.values)
         badness = np.where(self.reached, at_poses if term.high_is_bad else -at_poses, -np.inf)
         return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.reached.sum()))]
 
     def pieces(self, term: PoseTerm, indices: Integers) -> tuple[Array, Array]:
         """Return a term at indices of `worst` [pieces], and its derivatives by the genes there [pieces x genes]."""
-        total = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
-        slopes = total.reshape(len(total), -1)[:, indices].T
-        chosen = term.at_poses(self.values).flat[indices]
-        return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
+        sum_slopes = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
+        slopes = sum_slopes.reshape(len(sum_slopes), -1)[:, indices].T
+        values = term.at_poses(self.values).flat[indices]
+        return values, -slopes * (values * values)[:, None] if term.inverse else slopes
 
 
 COMPILE_FROM = 60
@@ -113,18 +116,17 @@ class Surveyor:
         """
         self.problem, self._evaluations = problem, COMPILE_FROM if searching else 0
         self._free = np.flatnonzero(problem.space.catalogue == 0)
-        self._rates = self._chain()
-        by = tuple(dict.fromkeys(path for rates in self._rates for path in rates))
-        self._by = {path: k for k, path in enumerate(by)}
-        robust = problem.robust is not None
-        self._made = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
+        self._leaf_rates = self._rates_of_leaves()
+        self._leaves = list(dict.fromkeys(leaf for rates in self._leaf_rates for leaf in rates))
+        samples = problem.study.robustness.search_samples
+        self._deviations = {} if problem.robust is None else deviations(problem, samples, SEARCH_STREAM)
 
     @property
     def free(self) -> Integers:
         """Indices of the continuous variables among those searched."""
         return self._free
 
-    def _chain(self) -> list[Mapping[str, float]]:
+    def _rates_of_leaves(self) -> list[Mapping[str, float]]:
         """Return for each continuous gene the scalars of the machine that it changes, each with its rate per gene."""
         searched = self.problem.space.searched_variables
         return [
@@ -143,17 +145,18 @@ class Surveyor:
     def at(self, designs: Array) -> list[Local]:
         """Evaluate designs as `__call__` does one, all of them together; given by genes [designs x variables]."""
         problem, count = self.problem, len(designs)
-        machines = len(next(iter(self._made.values()), (0.0,)))
-        made = {path: np.tile(deviations, count) for path, deviations in self._made.items()}
-        columns = problem.space.columns(np.repeat(designs, machines, axis=0), made)
+        machines = len(next(iter(self._deviations.values()), (0.0,)))
+        added = {name: np.tile(sizes, count) for name, sizes in self._deviations.items()}
+        columns = problem.space.columns(np.repeat(designs, machines, axis=0), added)
         population = Population(columns, problem.poses.columns)
         self._evaluations += -(-population.size // SMALL_SLAB)
         repeated = self._evaluations > COMPILE_FROM
-        answers = differentiate(problem.machine, population, problem.names, [*self._by], repeated)
+        answers = differentiate(problem.machine, population, problem.names, self._leaves, repeated)
         slopes = {}
         with np.errstate(invalid="ignore"):
-            for name, by_leaf in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
-                parts = [sum(rate * by_leaf[self._by[leaf]] for leaf, rate in rates.items()) for rates in self._rates]
+            for name, rows in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
+                by_leaf = dict(zip(self._leaves, rows, strict=True))
+                parts = [sum(rate * by_leaf[leaf] for leaf, rate in rates.items()) for rates in self._leaf_rates]
                 slopes[name] = np.array(parts)
         reached = answers.status == Status.OK
         return [
@@ -239,7 +242,14 @@ def _aligned_basis(flat: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Ground:
-    """The objective over the variables that are free to move, with relative derivatives."""
+    """The objective over the variables that are free to move, with relative derivatives.
+
+    Attributes:
+        problem: a problem with one objective.
+        survey: computes its derivatives.
+        genes: genes of the best design [variables].
+        free: places of the variables that are at no bound, among the continuous ones.
+    """
 
     problem: Problem
     survey: Surveyor
@@ -251,9 +261,9 @@ class _Ground:
         designs = np.tile(self.genes, (len(points), 1))
         designs[:, self.survey.free[self.free]] = points
         values, slopes = np.full(len(points), np.nan), np.full(points.shape, np.nan)
-        for k, here in enumerate(self.survey.at(designs)):
-            if here.sound:
-                values[k], slope = here.term(self.problem.objectives[0].term, True)
+        for k, local in enumerate(self.survey.at(designs)):
+            if local.sound:
+                values[k], slope = local.term(self.problem.objectives[0].term, True)
                 slopes[k] = slope[self.free] / (abs(values[k]) or 1.0)
         return values, slopes
 
@@ -271,7 +281,7 @@ class _Ground:
 
     def settle_across(self, at: Array) -> Array:
         """Return to the best point across the ridge, by Newton's method in the directions that are not flat."""
-        for _ in range(3):
+        for _ in range(SETTLING_STEPS):
             slope, curvature = self.rates(at)
             values, vectors = np.linalg.eigh(curvature)
             steep = np.abs(values) >= FLAT_CURVATURE
@@ -282,12 +292,12 @@ class _Ground:
     def ridge(self, at: Array, way: Array) -> Ridge | None:
         """Follow a ridge in both directions; None if it is only a point."""
         level = self.value(at)
-        first_end, first = self._follow(at, -way, level)
-        second_end, second = self._follow(at, way, level)
-        moved = np.abs(second_end - first_end)
-        if moved.max() <= RIDGE_STEP / 10.0:
+        first_end, first_change = self._follow(at, -way, level)
+        second_end, second_change = self._follow(at, way, level)
+        travel = np.abs(second_end - first_end)
+        if travel.max() <= LEAST_RIDGE * RIDGE_STEP:
             return None
-        taking_part = np.flatnonzero(moved > LEAST_MOVE_SHARE * moved.max())
+        taking_part = np.flatnonzero(travel > LEAST_MOVE_SHARE * travel.max())
         numbers = self.survey.free[self.free]
         ends = []
         for point in (first_end, second_end):
@@ -295,7 +305,7 @@ class _Ground:
             whole[numbers] = point
             ends.append(self.problem.space.values(whole)[numbers][taking_part])
         names = tuple(self.problem.space.searched_variables[numbers[k]].name for k in taking_part)
-        return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first, second)))
+        return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first_change, second_change)))
 
     def _follow(self, at: Array, way: Array, level: float) -> tuple[Array, float]:
         """Return the last point of the ridge in one direction, and the greatest relative change up to there."""
@@ -306,11 +316,11 @@ class _Ground:
             change = abs(self.value(following) / level - 1.0)
             if not change <= LARGEST_RIDGE_CHANGE:
                 break
-            moved = following - at
+            motion = following - at
             at, greatest = following, max(greatest, change)
-            if step < RIDGE_STEP or np.linalg.norm(moved) < 0.1 * RIDGE_STEP:
+            if step < RIDGE_STEP or np.linalg.norm(motion) < LEAST_RIDGE * RIDGE_STEP:
                 break
-            way = moved / np.linalg.norm(moved)
+            way = motion / np.linalg.norm(motion)
         return at, greatest
 
 
@@ -323,19 +333,16 @@ def _room(at: Array, way: Array) -> float:
 
 def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
     """Describe ridges in sentences."""
-    by_name, display = (
-        {variable.name: variable for variable in problem.space.searched_variables},
-        problem.machine.display,
-    )
-    sentences = []
+    by_name = {variable.name: variable for variable in problem.space.searched_variables}
+    display, sentences = problem.machine.display, []
     for ridge in ridges:
         ways = [
             f"{name} from {by_name[name].in_words(start, display)} to {by_name[name].in_words(end, display)}"
             for name, start, end in zip(ridge.names, ridge.start, ridge.end, strict=True)
         ]
-        how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
+        others = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
         sentences.append(
-            f"Ridge: {ways[0]}{how} changes the objective by no more than {ridge.change:.0e} of its value; choose by "
-            "other reasons."
+            f"Ridge: {ways[0]}{others} changes the objective by no more than {ridge.change:.0e} of its value; choose "
+            "by other reasons."
         )
     return sentences

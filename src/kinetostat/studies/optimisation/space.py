@@ -31,8 +31,9 @@ else:  # they label their answers, by a library that takes long to import; most 
     workspace = LateModule("kinetostat.studies.workspace")
 
 VALUE_DIGITS = 6
-"""Digits of the value of a variable."""
+"""Digits of the value of a variable for people, as in fields of the studio: what a file says comes back as it is."""
 MOST_NODES = 1_000_000
+"""Greatest number of nodes of a grid of poses, of which the workspace is a part."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,13 @@ class Variable:
     """A field of the machine, or several tied together.
 
     Attributes:
-        fields: what it sets; the first one names it.
-        ratios: of each field to the variable's value.
+        fields: the fields that it sets; the first one names it.
+        ratios: ratio of each field to the value of the variable.
         low, high: bounds, SI; of a catalogue, numbers of its first and last choice.
         choices: values of each field [choices x fields], SI; None where bounds say what is allowed.
         labels: names of the choices.
-        fixed: whether it is not searched.
-        tolerance: how far manufacture may miss it, SI.
+        fixed: whether it keeps its value, so that only its tolerance counts.
+        tolerance: greatest deviation by manufacture, SI.
         initial: the machine's own value, SI; of a catalogue, the number of the choice, -1 if it is none of them.
     """
 
@@ -72,7 +73,7 @@ class Variable:
 
     @property
     def unit(self) -> str:
-        """SI; of a catalogue none."""
+        """Its SI unit; a catalogue has none."""
         return "1" if self.choices is not None else KINDS[self.quantity.kind].unit
 
     def columns(self, numbers: Array) -> dict[str, Array]:
@@ -98,7 +99,7 @@ class Space:
 
     @cached_property
     def searched_variables(self) -> tuple[Variable, ...]:
-        """Those that are not fixed."""
+        """The variables that are not fixed."""
         return tuple(variable for variable in self.variables if not variable.fixed)
 
     @property
@@ -113,7 +114,7 @@ class Space:
 
     @cached_property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of everything that the variables set, the fixed ones last."""
+        """Leaf paths of all numbers that the variables set, those of fixed ones last."""
         ordered = [*self.searched_variables, *(variable for variable in self.variables if variable.fixed)]
         return tuple(leaf for variable in ordered for field in variable.fields for leaf in field.leaves)
 
@@ -124,12 +125,12 @@ class Space:
         return lows, spans
 
     def values(self, genes: Array) -> Array:
-        """Values of the searched variables, SI or numbers of choices, from genes; any [... x variables]."""
+        """Values of the searched variables from genes: SI, or numbers of choices [... x variables]."""
         lows, spans = self._bounds
         return lows + spans * genes
 
     def genes(self, numbers: Array) -> Array:
-        """Genes from values."""
+        """Genes from values of the searched variables [... x variables]."""
         lows, spans = self._bounds
         return (numbers - lows) / spans
 
@@ -137,8 +138,8 @@ class Space:
         """Values by leaf path, SI, in the order of `paths` [designs].
 
         Args:
-            genes: [designs x variables].
-            deviations: by name of a variable with bounds, what is added to its value, SI [designs].
+            genes: genes of the designs [designs x variables].
+            deviations: what is added to the value of a variable with bounds, by its name, SI [designs].
         """
         added = deviations or {}
         columns: dict[str, Array] = {}
@@ -160,10 +161,10 @@ class Space:
 
 
 def read_space(machine: Machine, tables: Sequence[VariableTable]) -> Space:
-    """The variables of a study file.
+    """Read the variables of a study file.
 
     Raises:
-        InputError: an unknown field, one twice, a bound that the field does not allow, nothing left to search.
+        InputError: a field is not known or set twice, does not allow a bound, or no variable is left to search.
     """
     variables = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
     taken = [leaf for variable in variables for field in variable.fields for leaf in field.leaves]
@@ -271,8 +272,8 @@ class PoseSet(Immutable):
     Attributes:
         columns: values by leaf path, SI [poses]; empty for the machine's own pose.
         required: share of the poses that a design must reach.
-        box: of a grid over coordinates of the pose alone, its volume and the unit of that.
-        description: of the poses, in words.
+        box: volume of a grid over coordinates of the pose alone, and the unit of that; None of other poses.
+        description: the poses in words.
     """
 
     columns: Mapping[str, Array]
@@ -287,10 +288,11 @@ class PoseSet(Immutable):
 
 
 def read_poses(machine: Machine, table: PosesTable) -> PoseSet:
-    """The poses of a study file.
+    """Read the poses of a study file.
 
     Raises:
-        InputError: an unknown field, a bad range or value, both a list and a grid, nothing in the workspace.
+        InputError: a field is not known, a range or value has a mistake, there are both a list and a grid, or no pose
+            of the grid lies in the workspace.
     """
     if table.listed is not None and table.over is not None:
         raise InputError("[poses] has both list and over; give one of them.")

@@ -25,7 +25,7 @@ import numpy as np
 from pymoo.operators.crossover.sbx import cross_sbx
 from pymoo.operators.mutation.pm import mut_pm
 
-from kinetostat.arrays import Array, Integers
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, join_outcomes
@@ -43,16 +43,17 @@ else:  # a genetic search does not descend, and with one objective sorts nothing
     sorting = LateModule("pymoo.util.nds.non_dominated_sorting")
     optimize = LateModule("scipy.optimize")
 
-CROSSED = 0.9
-"""Share of the couples whose children are not copies of them."""
-GENE_CROSSED = 0.5
+CROSSED_SHARE = 0.9
+"""Share of the couples whose children are not copies of them; the default of pymoo, as the next three are."""
+CROSSED_GENES = 0.5
 """Share of the genes of a couple that are crossed."""
 CROSSOVER_INDEX = 15.0
 """Index of simulated binary crossover: the larger, the nearer children are to their parents."""
 MUTATION_INDEX = 20.0
 """Index of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
-ATTEMPTS = 20
-"""Times that couples are mated to replace children that exist already."""
+MOST_MATINGS = 20
+"""Greatest number of times that couples are mated to replace children that exist already: a space of few choices may
+have no other designs left."""
 
 
 @dataclass(frozen=True)
@@ -79,117 +80,126 @@ class Genetic:
 
     def step(self, number: int, log: Log) -> Step:
         """One generation: the first is random, around the machine as it is; the others are children of the kept."""
-        source = np.random.default_rng([self.problem.study.optimizer.seed, 1, number])
+        rng = np.random.default_rng([self.problem.study.optimizer.seed, 1, number])
         if number == 0:
-            genes, parents = self._random(source), np.empty(0, dtype=np.int64)
+            genes, parents = self._first_designs(rng), np.empty(0, dtype=np.int64)
         else:
             parents = log.survivors
-            genes = self._children(log.genes(parents), self._order(log.outcome(parents))[0], source)
+            genes = self._children(log.genes(parents), self._ranks(log.outcome(parents)), rng)
         outcome = self.assess(genes)
         family = np.concatenate([parents, log.count + np.arange(len(genes))])
-        order, _ = self._order(join_outcomes([log.outcome(parents), outcome]) if number else outcome)
-        best = np.argsort(order, kind="stable")[: self.problem.study.optimizer.population]
+        ranks = self._ranks(join_outcomes([log.outcome(parents), outcome]) if number else outcome)
+        best = np.argsort(ranks, kind="stable")[: self.problem.study.optimizer.population]
         return Step(genes, outcome, family[best])
 
-    def _random(self, source: np.random.Generator) -> Array:
+    def _first_designs(self, rng: np.random.Generator) -> Array:
         """The first generation: the machine as it is, if that is allowed, and random designs."""
         space, count = self.problem.space, self.problem.study.optimizer.population
-        genes = source.random((count, space.size))
-        picked = space.catalogue > 0
-        genes[:, picked] = np.floor(genes[:, picked] * space.catalogue[picked])
+        genes = rng.random((count, space.size))
+        genes[:, self._choices] = np.floor(genes[:, self._choices] * space.catalogue[self._choices])
         if space.holds(space.initial):
             genes[0] = space.initial
         return genes
 
-    def _order(self, outcome: Outcome) -> tuple[Integers, Integers]:
-        """Place of each design among all, the best first, and the front that it is on."""
-        signs = np.array([objective.sign for objective in self.problem.objectives])
-        wanted = signs * outcome.objectives
-        front = np.zeros(len(wanted), dtype=np.int64)
-        if not self.crowded:
-            order = np.lexsort([wanted[:, 0], outcome.violation])
-        else:
-            feasible = np.flatnonzero(outcome.violation == 0.0)
-            front[:], lonely = len(wanted), np.zeros(len(wanted))
-            crowding = metrics.get_crowding_function("cd")
-            for rank, members in enumerate(sorting.NonDominatedSorting().do(wanted[feasible]) if feasible.size else []):
-                front[feasible[members]] = rank
-                lonely[feasible[members]] = crowding.do(wanted[feasible[members]], n_remove=0)
-            order = np.lexsort([-lonely, front, outcome.violation])
-        place = np.empty(len(order), dtype=np.int64)
-        place[order] = np.arange(len(order))
-        return place, front
+    @property
+    def _choices(self) -> Mask:
+        """Flags of the variables that are choices of a catalogue [variables]."""
+        return np.asarray(self.problem.space.catalogue > 0)
 
-    def _children(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
+    def _ranks(self, outcome: Outcome) -> Integers:
+        """The rank of each design among all, 0 for the best [designs].
+
+        Feasible designs come first. Of several objectives, the front decides on which a design is, then its distance
+        from others there.
+        """
+        signed = np.array([objective.sign for objective in self.problem.objectives]) * outcome.objectives
+        if self.crowded:
+            feasible = np.flatnonzero(outcome.violation == 0.0)
+            front, distance = np.full(len(signed), len(signed)), np.zeros(len(signed))
+            crowding = metrics.get_crowding_function("cd")
+            for number, members in enumerate(
+                sorting.NonDominatedSorting().do(signed[feasible]) if feasible.size else []
+            ):
+                front[feasible[members]] = number
+                distance[feasible[members]] = crowding.do(signed[feasible[members]], n_remove=0)
+            order = np.lexsort([-distance, front, outcome.violation])
+        else:
+            order = np.lexsort([signed[:, 0], outcome.violation])
+        ranks = np.empty(len(order), dtype=np.int64)
+        ranks[order] = np.arange(len(order))
+        return ranks
+
+    def _children(self, parents: Array, ranks: Integers, rng: np.random.Generator) -> Array:
         """As many new designs as there are parents, none of them twice or one of the parents, as far as possible."""
         children = np.empty((0, parents.shape[1]))
-        for _ in range(ATTEMPTS):
-            fresh = self._mate(parents, place, source)
-            children = np.concatenate([children, fresh[_new(fresh, np.concatenate([parents, children]))]])
+        for _ in range(MOST_MATINGS):
+            drawn = self._mate(parents, ranks, rng)
+            children = np.concatenate([children, drawn[_new_rows(drawn, np.concatenate([parents, children]))]])
             if len(children) >= len(parents):
                 break
-        return children[: len(parents)] if len(children) else self._mate(parents, place, source)
+        return children[: len(parents)] if len(children) else self._mate(parents, ranks, rng)
 
-    def _mate(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
+    def _mate(self, parents: Array, ranks: Integers, rng: np.random.Generator) -> Array:
+        """Children of the better parents of random pairs, as many as there are parents [parents x variables]."""
         count, size = parents.shape
         couples = (count + 1) // 2
-        rounds = [source.permutation(count) for _ in range(-(-4 * couples // count))]
+        rounds = [rng.permutation(count) for _ in range(-(-4 * couples // count))]
         pairs = np.concatenate(rounds)[: 4 * couples].reshape(-1, 2)
-        winners = np.where(place[pairs[:, 0]] < place[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
+        winners = np.where(ranks[pairs[:, 0]] < ranks[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
         both = parents[winners.reshape(2, couples)]
-        children = self._cross(both, source)
-        copied = source.random(couples) >= CROSSED
+        children = self._cross(both, rng)
+        copied = rng.random(couples) >= CROSSED_SHARE
         children[:, copied] = both[:, copied]
-        return self._mutate(children.reshape(-1, size)[:count], source)
+        return self._mutate(children.reshape(-1, size)[:count], rng)
 
-    def _cross(self, both: Array, source: np.random.Generator) -> Array:
-        """Children of couples [2 x couples x variables]."""
+    def _cross(self, both: Array, rng: np.random.Generator) -> Array:
+        """Children of couples [2 x couples x variables]; of choices, each comes from either parent."""
         couples, size = both.shape[1:]
         index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), 0.5)
-        picked = self.problem.space.catalogue > 0
-        upper = np.where(picked, 0.0, 1.0)  # equal bounds: the operator leaves choices alone
-        children = cross_sbx(both, np.zeros(size), upper, index, GENE_CROSSED, swap, random_state=source)
-        exchanged = (source.random((couples, size)) < 0.5) & picked
-        children[:, :, picked] = both[:, :, picked]
+        upper = np.where(self._choices, 0.0, 1.0)  # equal bounds: the operator leaves choices alone
+        children = cross_sbx(both, np.zeros(size), upper, index, CROSSED_GENES, swap, random_state=rng)
+        exchanged = (rng.random((couples, size)) < 0.5) & self._choices
+        children[:, :, self._choices] = both[:, :, self._choices]
         children[:, exchanged] = both[::-1, exchanged]
         return children
 
-    def _mutate(self, genes: Array, source: np.random.Generator) -> Array:
+    def _mutate(self, genes: Array, rng: np.random.Generator) -> Array:
+        """Change one gene of a design on average, a little; a choice is drawn again [designs x variables]."""
         count, size = genes.shape
         catalogue = self.problem.space.catalogue
-        picked = catalogue > 0
-        upper = np.where(picked, 0.0, 1.0)
+        upper = np.where(self._choices, 0.0, 1.0)
         index, share = np.full(count, MUTATION_INDEX), np.full(count, 1.0 / size)
-        mutated = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=source)
-        drawn = np.floor(source.random((count, size)) * np.maximum(catalogue, 1))
-        redrawn = (source.random((count, size)) < 1.0 / size) & picked
-        mutated[:, picked] = genes[:, picked]
+        mutated = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=rng)
+        drawn = np.floor(rng.random((count, size)) * np.maximum(catalogue, 1))
+        redrawn = (rng.random((count, size)) < 1.0 / size) & self._choices
+        mutated[:, self._choices] = genes[:, self._choices]
         return np.where(redrawn, drawn, mutated)
 
 
-def _new(fresh: Array, known: Array) -> Integers:
-    """Flags of the designs that are neither known nor earlier in the list."""
-    seen = {row.tobytes() for row in known}
+def _new_rows(designs: Array, known: Array) -> Integers:
+    """Numbers of the designs that are neither among the known ones nor earlier in their list."""
+    keys = {row.tobytes() for row in known}
     numbers = []
-    for number, row in enumerate(fresh):
+    for number, row in enumerate(designs):
         key = row.tobytes()
-        if key not in seen:
-            seen.add(key)
+        if key not in keys:
+            keys.add(key)
             numbers.append(number)
     return np.array(numbers, dtype=np.int64)
 
 
-ITERATIONS = 100
-"""Most iterations of one descent."""
-PRECISION, PRECISION_WITH_KINKS = 1e-13, 1e-9
-"""Relative change of the objective at which a descent ends, without and with kinks: along the bottom of a curved one
-it would creep for thousands of steps."""
+MOST_ITERATIONS = 100
+"""Greatest number of iterations of one descent."""
+PRECISION = 1e-13
+"""Relative change of the objective at which a descent ends: near round-off, so that ridges are found from there."""
+PRECISION_WITH_KINKS = 1e-9
+"""The same with kinks: along the bottom of a curved one a descent would creep for thousands of steps."""
 WORST_POSES = 24
 """Conditions that stand for the worst of all poses; more than a design has variables at nearly all kinks."""
-ROUNDS = 5
-"""Descents with newly chosen worst poses, until nothing is gained."""
-GAIN = 1e-7
-"""Relative gain below which a round has gained nothing."""
+MOST_ROUNDS = 5
+"""Greatest number of descents with newly chosen worst poses."""
+LEAST_GAIN = 1e-7
+"""Relative gain of a round from which on another one is tried."""
 BLOCKED = 1e6
 """Value that counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
 there."""
@@ -228,13 +238,13 @@ class Gradient:
         space, settings = self.problem.space, self.problem.study.optimizer
         if number == 0 and space.holds(space.initial):
             return space.initial
-        source = np.random.default_rng([settings.seed, 2])
-        cells = np.stack([source.permutation(settings.starts) for _ in range(space.size)], axis=1)
-        genes = (cells + source.random(cells.shape))[number] / settings.starts
+        rng = np.random.default_rng([settings.seed, 2])
+        cells = np.stack([rng.permutation(settings.starts) for _ in range(space.size)], axis=1)
+        genes = (cells + rng.random(cells.shape))[number] / settings.starts
         return np.where(space.catalogue > 0, np.floor(genes * np.maximum(space.catalogue, 1)), genes)
 
     def descend(self, start: Array, log: Log) -> Step:
-        """Downhill from a design [variables]; everything that was tried is judged and logged."""
+        """Descend from a design [variables]; every design that was tried is judged and logged."""
         descent = _Descent(self.problem, self._survey, start)
         descent.run()
         genes = np.unique(np.array(descent.tried), axis=0)
@@ -243,22 +253,23 @@ class Gradient:
         best = int(np.lexsort([signed, outcome.violation])[0])
         kept = [log.count + best]
         if log.steps:
-            kept = self._better(log, log.survivors[0], kept[0], signed[best], float(outcome.violation[best]))
+            best_before = log.outcome(log.survivors[:1])
+            signed_before = self.problem.objectives[0].sign * best_before.objectives[0, 0]
+            is_better = (outcome.violation[best], signed[best]) < (best_before.violation[0], signed_before)
+            kept.insert(1 if is_better else 0, int(log.survivors[0]))
         return Step(genes, outcome, np.array(kept), {"method": "gradient"})
-
-    def _better(self, log: Log, old: int, new: int, value: float, violation: float) -> list[int]:
-        """The better of the best so far and a new design, then the other."""
-        known = log.outcome([int(old)])
-        before = (
-            float(known.violation[0]),
-            self.problem.objectives[0].sign * float(known.objectives[0, 0]),
-        )
-        return [new, int(old)] if (violation, value) < before else [int(old), new]
 
 
 @dataclasses.dataclass
 class _Descent:
-    """One descent: genes of continuous variables, all else held."""
+    """One descent by the continuous variables, with all choices held.
+
+    Attributes:
+        problem: the problem, of which the first objective counts.
+        survey: computes its derivatives.
+        start: genes from which to descend [variables].
+        tried: genes of all designs that were evaluated.
+    """
 
     problem: Problem
     survey: Surveyor
@@ -272,24 +283,25 @@ class _Descent:
         first = self._at(self.start[self.survey.free])
         if not first.sound:
             return
-        kinked = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0 and first.reached.size > 1
-        kinked = kinked and (self.problem.robust is None or self.problem.robust.share == 1.0)
+        takes_worst = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0
+        takes_worst = takes_worst and (self.problem.robust is None or self.problem.robust.share == 1.0)
+        kinked = takes_worst and first.reached.size > 1
         scale = abs(self._objective(first)[0]) or 1.0
         genes, value = self.start[self.survey.free], np.inf
-        for _ in range(ROUNDS if kinked else 1):
+        for _ in range(MOST_ROUNDS if kinked else 1):
             genes = self._minimise(genes, scale, kinked)
-            here = self._at(genes)
-            reached = self._objective(here)[0] / scale if here.sound else np.inf
-            if not value - reached > GAIN:
+            local = self._at(genes)
+            new_value = self._objective(local)[0] / scale if local.sound else np.inf
+            if not value - new_value > LEAST_GAIN:
                 break
-            value = reached
+            value = new_value
 
     @property
     def _term(self) -> Any:
         return self.problem.objectives[0].term
 
     def _at(self, genes: Array) -> Local:
-        """The surroundings of a design, remembered from one question to the next."""
+        """Values and derivatives at a design; the last are kept, because the solver asks for both apart."""
         clipped = np.clip(genes, 0.0, 1.0)
         key = clipped.tobytes()
         if self._last is None or self._last[0] != key:
@@ -299,9 +311,10 @@ class _Descent:
             self._last = key, self.survey(whole)
         return self._last[1]
 
-    def _objective(self, here: Local) -> tuple[float, Array]:
+    def _objective(self, local: Local) -> tuple[float, Array]:
+        """The objective with its sign, so that less is better, and its derivatives, SI."""
         sign = self.problem.objectives[0].sign
-        value, slope = here.term(self._term, sign > 0)
+        value, slope = local.term(self._term, sign > 0)
         return sign * value, sign * slope
 
     def _minimise(self, genes: Array, scale: float, kinked: bool) -> Array:
@@ -313,13 +326,7 @@ class _Descent:
         # The least t that no value at the worst poses passes: t is one more unknown, and what is minimised.
         worst = self._at(genes).worst(self._term, WORST_POSES)
         unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
-        conditions.append(
-            {
-                "type": "ineq",
-                "fun": lambda x: self._below_bound(x, worst, scale)[0],
-                "jac": lambda x: self._below_bound(x, worst, scale)[1],
-            }
-        )
+        conditions.append(_inequality(lambda x: self._below_bound(x, worst, scale)))
         bounds = [*bounds, (-BLOCKED, BLOCKED)]
         return self._solution(_last_unknown, unknowns, bounds, conditions, PRECISION_WITH_KINKS)
 
@@ -339,26 +346,26 @@ class _Descent:
             bounds=bounds,
             constraints=conditions,
             method="SLSQP",
-            options={"maxiter": ITERATIONS, "ftol": precision},
+            options={"maxiter": MOST_ITERATIONS, "ftol": precision},
         )
         return np.clip(solution.x[: len(self.survey.free)], 0.0, 1.0)
 
     def _scaled_objective(self, genes: Array, scale: float) -> tuple[float, Array]:
         """The objective and its derivatives, in units of its size at the start."""
-        here = self._at(genes)
-        if not here.sound:
+        local = self._at(genes)
+        if not local.sound:
             return BLOCKED, np.zeros(len(genes))
-        value, slope = self._objective(here)
+        value, slope = self._objective(local)
         return value / scale, slope / scale
 
     def _below_bound(self, unknowns: Array, worst: Integers, scale: float) -> tuple[Array, Array]:
         """By how much the values at the worst poses are below the bound t, the last unknown, and the derivatives."""
         count, sign = len(unknowns) - 1, self.problem.objectives[0].sign
-        here, rows = self._at(unknowns[:count]), np.zeros((len(worst), count + 1))
+        local, rows = self._at(unknowns[:count]), np.zeros((len(worst), count + 1))
         rows[:, count] = 1.0
-        if not here.sound:
+        if not local.sound:
             return np.full(len(worst), unknowns[count] - BLOCKED), rows
-        values, slopes = here.pieces(self._term, worst)
+        values, slopes = local.pieces(self._term, worst)
         rows[:, :count] = -sign * slopes / scale
         return unknowns[count] - sign * values / scale, rows
 
@@ -366,16 +373,20 @@ class _Descent:
         """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""
         size = len(self.survey.free)
 
-        def at(x: Array) -> tuple[float, Array]:
-            here = self._at(x[:size])
+        def room(x: Array) -> tuple[float, Array]:
+            local = self._at(x[:size])
             slope = np.zeros(len(x))
-            if not here.sound:
+            if not local.sound:
                 return -1.0, slope
-            value, slope[:size] = here.term(term, sign > 0)
+            value, slope[:size] = local.term(term, sign > 0)
             return sign * (bound - value) / scale, -sign * slope / scale
 
-        fun: Callable[[Array], float] = lambda x: at(x)[0]  # noqa: E731
-        return {"type": "ineq", "fun": fun, "jac": lambda x: at(x)[1]}
+        return _inequality(room)
+
+
+def _inequality(room: Callable[[Array], tuple[Any, Array]]) -> dict[str, Any]:
+    """A condition as the solver takes it: `room`, whose values must not be negative, returns them with derivatives."""
+    return {"type": "ineq", "fun": lambda x: room(x)[0], "jac": lambda x: room(x)[1]}
 
 
 def _last_unknown(x: Array) -> tuple[float, Array]:

@@ -29,12 +29,13 @@ WORST, MEAN = "worst", "mean"
 SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
 """Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""
 ALONG = {
-    "compliance_along": ("compliance", 3, False, "m/N"),
-    "stiffness_along": ("compliance", 3, True, "N/m"),
-    "compliance_about": ("compliance", 0, False, "rad/(N·m)"),
-    "stiffness_about": ("compliance", 0, True, "N·m/rad"),
+    "compliance_along": ("", False, "m/N"),
+    "stiffness_along": ("", True, "N/m"),
+    "compliance_about": ("r", False, "rad/(N·m)"),
+    "stiffness_about": ("r", True, "N·m/rad"),
 }
-"""Along (force) and about (moment) a direction, all else free to follow: matrix, first row, whether its reciprocal."""
+"""Terms along a direction (under a force) and about it (under a moment), with all other motions free: the letter before
+the components of C, whether the reciprocal is meant, and the SI unit."""
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
 AXES = "xyz"
 
@@ -46,8 +47,8 @@ class Aggregate:
     """The way in which many values become one number.
 
     Attributes:
-        text: as written.
-        share: of the values that are at least as good; 1 for the worst, None for the mean.
+        text: the words of the study file.
+        share: share of the values that are at least as good as the number; 1 for the worst, None for the mean.
     """
 
     text: str
@@ -58,23 +59,23 @@ class Aggregate:
         """Whether it has derivatives everywhere."""
         return self.share is None
 
-    def over(self, values: Array, there: Mask, high_is_bad: bool) -> Array:
-        """Aggregates along the last axis.
+    def over(self, values: Array, counted: Mask, high_is_bad: bool) -> Array:
+        """Take one number of the values along the last axis.
 
         Args:
-            values: [... x n].
-            there: which of them count [... x n].
+            values: rows of values [... x n].
+            counted: flags of the values that count [... x n].
             high_is_bad: whether great values are the bad ones.
 
         Returns:
-            [...]; NaN where none counts.
+            One number for each row of values [...]; NaN where none counts.
         """
-        count = there.sum(axis=-1)
+        count = counted.sum(axis=-1)
         if self.share is None:
-            total = np.where(there, values, 0.0).sum(axis=-1)
+            total = np.where(counted, values, 0.0).sum(axis=-1)
             return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
         sign = 1.0 if high_is_bad else -1.0
-        badness = np.where(there, sign * values, -np.inf)
+        badness = np.where(counted, sign * values, -np.inf)
         if self.share == 1.0:
             return np.where(count > 0, sign * badness.max(axis=-1), np.nan)
         ordered = np.sort(badness, axis=-1)
@@ -84,30 +85,39 @@ class Aggregate:
             between = np.where(part > 0.0, lower + part * (upper - lower), lower)
         return np.where(count > 0, sign * between, np.nan)
 
-    def weights(self, values: Array, there: Mask, high_is_bad: bool) -> Array:
-        """The weights of one set of values in its aggregate [n]; of several worst ones, the first has it all."""
-        count = np.array(there.sum())
+    def weights(self, values: Array, counted: Mask, high_is_bad: bool) -> Array:
+        """The weights of values in the number taken of them [n]; of equally bad ones, the first has all weight."""
+        count = np.array(counted.sum())
         if self.share is None:
-            return there / max(int(count), 1)
+            return counted / max(int(count), 1)
         weights = np.zeros(len(values))
-        order = np.argsort(np.where(there, values if high_is_bad else -values, -np.inf), kind="stable")
+        order = np.argsort(np.where(counted, values if high_is_bad else -values, -np.inf), kind="stable")
         low, high, part = self._neighbours(count, len(values))
         weights[order[low]] += 1.0 - float(part)
         weights[order[high]] += float(part)
         return weights
 
     def _neighbours(self, count: AnyArray, size: int) -> tuple[Any, Any, Any]:
-        """Places of the two neighbours in increasing order, those that do not count first, and the way between."""
+        """Places of the values next to the percentile in increasing order, and the share of the way between them.
+
+        Args:
+            count: number of values that count; all others come first in that order.
+            size: number of all values.
+        """
         rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
         low = np.floor(rank).astype(int)
         return low, np.minimum(low + 1, size - 1), rank - low
 
 
 def parse_aggregate(text: str, where: str) -> Aggregate:
-    """An aggregate from "worst", "mean" or "percentile P".
+    """Read an aggregate from "worst", "mean" or "percentile P".
+
+    Args:
+        text: the words of the study file.
+        where: the field, for messages.
 
     Raises:
-        InputError: none of them.
+        InputError: it is none of these.
     """
     words = text.strip().lower()
     if words in (WORST, MEAN):
@@ -129,7 +139,7 @@ class Term(Protocol):
 
     @property
     def unit(self) -> str:
-        """SI."""
+        """Its SI unit."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -137,16 +147,16 @@ class Term(Protocol):
 
     @property
     def differentiable(self) -> bool:
-        """Whether `slopes` shows a search the way: not where a term changes in steps."""
+        """Whether a search can follow `slopes`: not where a term changes in steps."""
 
-    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
-        """The numbers of some designs [designs], from their quantities and which poses count [designs x poses]."""
+    def values(self, quantities: dict[str, Array], reached: Mask) -> Array:
+        """The numbers of some designs [designs], by their quantities at the poses that they reach [designs x poses]."""
 
-    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], reached: Mask) -> dict[str, Array]:
         """Derivatives of the number of one design by each quantity at each pose [poses], by name.
 
         Args:
-            quantities, there: of one design [poses].
+            quantities, reached: the quantities of one design, and flags of the poses that it reaches [poses].
         """
 
 
@@ -155,12 +165,12 @@ class PoseTerm:
     """A weighted sum of quantities of a pose, or its reciprocal, taken over the poses.
 
     Attributes:
-        label: see `Term`.
-        unit: SI.
-        weights: of the quantities by name; without zeros.
+        label: its name for tables, see `Term`.
+        unit: its SI unit.
+        weights: weights of the quantities by name, without zeros.
         inverse: whether the reciprocal of the sum is meant.
-        aggregate: over the poses.
-        high_is_bad: which poses are the bad ones.
+        aggregate: the way in which the values at all poses become one number.
+        high_is_bad: whether poses with great values are the bad ones.
     """
 
     label: str
@@ -186,14 +196,14 @@ class PoseTerm:
             total = sum(weight * quantities[name] for name, weight in self.weights)
             return np.asarray(1.0 / total if self.inverse else total)
 
-    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], reached: Mask) -> Array:
         """See `Term`."""
-        return self.aggregate.over(self.at_poses(quantities), there, self.high_is_bad)
+        return self.aggregate.over(self.at_poses(quantities), reached, self.high_is_bad)
 
-    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], reached: Mask) -> dict[str, Array]:
         """See `Term`."""
         values = self.at_poses(quantities)
-        shares = self.aggregate.weights(values, there, self.high_is_bad)
+        shares = self.aggregate.weights(values, reached, self.high_is_bad)
         outer = np.where(shares != 0.0, -shares * values * values if self.inverse else shares, 0.0)
         return {name: weight * outer for name, weight in self.weights}
 
@@ -207,18 +217,18 @@ class StrokeTerm:
     names: tuple[str, ...] = ("longest_leg", "shortest_leg")
     differentiable: bool = True
 
-    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], reached: Mask) -> Array:
         """See `Term`."""
         longest, shortest = (quantities[name] for name in self.names)
-        reach = np.where(there, longest, -np.inf).max(-1) - np.where(there, shortest, np.inf).min(-1)
-        return np.where(there.any(-1), reach, np.nan)
+        stroke = np.where(reached, longest, -np.inf).max(-1) - np.where(reached, shortest, np.inf).min(-1)
+        return np.where(reached.any(-1), stroke, np.nan)
 
-    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], reached: Mask) -> dict[str, Array]:
         """See `Term`."""
-        at = np.zeros((2, len(there)))
-        at[0, np.argmax(np.where(there, quantities["longest_leg"], -np.inf))] = 1.0
-        at[1, np.argmin(np.where(there, quantities["shortest_leg"], np.inf))] = -1.0
-        return dict(zip(self.names, at, strict=True))
+        rates = np.zeros((2, len(reached)))
+        rates[0, np.argmax(np.where(reached, quantities["longest_leg"], -np.inf))] = 1.0
+        rates[1, np.argmin(np.where(reached, quantities["shortest_leg"], np.inf))] = -1.0
+        return dict(zip(self.names, rates, strict=True))
 
 
 @dataclass(frozen=True)
@@ -227,7 +237,7 @@ class VolumeTerm:
 
     Attributes:
         box: volume of the grid of poses; each node stands for its share.
-        unit: of it.
+        unit: unit of that volume.
     """
 
     box: float
@@ -236,22 +246,22 @@ class VolumeTerm:
     names: tuple[str, ...] = ("aspect",)
     differentiable: bool = False
 
-    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], reached: Mask) -> Array:
         """See `Term`."""
-        aspects = np.where(there, quantities["aspect"], np.nan)
+        aspects = np.where(reached, quantities["aspect"], np.nan)
         most = np.maximum((aspects > 0.0).sum(-1), (aspects < 0.0).sum(-1)) + (aspects == 0.0).sum(-1)
-        return self.box * most / there.shape[-1]
+        return self.box * most / reached.shape[-1]
 
-    def slopes(self, quantities: dict[str, Array], _there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], _reached: Mask) -> dict[str, Array]:
         """0: it changes in steps, and between them not at all."""
         return {name: np.zeros_like(quantities[name]) for name in self.names}
 
 
 def known_terms(machine: Machine) -> list[str]:
-    """Names of all terms that a machine of this kind may be asked for."""
-    there = machine.family.component_names
+    """Names of all terms of a machine of this kind."""
+    components = machine.family.component_names
     of_poses = [
-        name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"
+        name for name, q in QUANTITIES.items() if all(part in components for part in q.components) and name != "aspect"
     ]
     return [*SUMS, *ALONG, STROKE, VOLUME, *of_poses]
 
@@ -260,7 +270,7 @@ def usual_goal(name: str) -> Goal | None:
     """Return which way an objective is better unless a study says otherwise; None where neither way is.
 
     Args:
-        name: of a term of the catalogue.
+        name: name of a term of the catalogue.
     """
     if name == VOLUME or (name in {*SUMS, *ALONG} and name.startswith("stiffness")):
         return "maximize"
@@ -271,17 +281,17 @@ def usual_goal(name: str) -> Goal | None:
 
 
 def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: bool, where: str) -> Term:
-    """The term of an objective or a constraint.
+    """Read the term of an objective or a constraint.
 
     Args:
-        machine: which has the parts that the quantity is about.
-        table: as written.
-        poses: at which designs are judged.
+        machine: the machine, which must have the parts that the quantity is about.
+        table: the table of the study file.
+        poses: the poses at which designs are judged.
         high_is_bad: whether great values are the bad ones.
         where: the table's name, for messages.
 
     Raises:
-        InputError: an unknown quantity, weights or a direction that do not belong to it, no aggregate.
+        InputError: the quantity is not known, weights or a direction do not belong to it, or `over` is no aggregate.
     """
     name = _known_name(machine, table.quantity, f"{where}.quantity")
     if table.weights is not None and name not in SUMS:
@@ -299,15 +309,19 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         weights = _sum_weights(machine, name, table.weights, where)
         return PoseTerm(label, "SI", tuple(weights.items()), False, over, high_is_bad)
     if name in ALONG:
-        matrix, first, inverse, unit = ALONG[name]
-        weights = _direction_weights(machine, matrix, first, table.direction, where)
+        letter, inverse, unit = ALONG[name]
+        weights = _direction_weights(machine, letter, table.direction, where)
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(state_of(machine), [name])
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
 
 def _known_name(machine: Machine, name: str, where: str) -> str:
-    """The name, if it is one of the catalogue; otherwise what was meant, or all but the single entries of C and K."""
+    """Return the name if it is in the catalogue; refuse others with what was meant, or with all but most entries of C.
+
+    Raises:
+        InputError: there is no such term.
+    """
     known, name = known_terms(machine), current_name(name, "quantity")
     entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
     if name in known or difflib.get_close_matches(name, known, 1):
@@ -323,33 +337,32 @@ def _volume(poses: PoseSet, where: str) -> Term:
     return VolumeTerm(*poses.box)
 
 
-def _sum_weights(machine: Machine, name: str, given: Sequence[float] | None, where: str) -> Mapping[str, float]:
-    there = machine.family.component_names
-    names = [entry for entry in GROUPS[SUMS[name]] if QUANTITIES[entry].components[0] in there]
-    weights = [1.0] * len(names) if given is None else given
+def _sum_weights(machine: Machine, name: str, written: Sequence[float] | None, where: str) -> Mapping[str, float]:
+    components = machine.family.component_names
+    names = [entry for entry in GROUPS[SUMS[name]] if QUANTITIES[entry].components[0] in components]
+    weights = [1.0] * len(names) if written is None else written
     if len(weights) != len(names) or not any(weights) or min(weights) < 0.0:
         raise InputError(
-            f"{where}.weights must be {len(names)} numbers of at least 0, not all 0, for {' '.join(there)}."
+            f"{where}.weights must be {len(names)} numbers of at least 0, not all 0, for {' '.join(components)}."
         )
     return {entry: weight for entry, weight in zip(names, weights, strict=True) if weight}
 
 
 def _direction_weights(
-    machine: Machine, matrix: str, first: int, direction: Sequence[float] | None, where: str
+    machine: Machine, letter: str, direction: Sequence[float] | None, where: str
 ) -> Mapping[str, float]:
-    """n^T C n as a sum of entries of C."""
+    """The weights of the entries of C in n^T C n, the compliance along or about a unit vector n."""
     size = math.hypot(*three_numbers(direction)) if direction else 0.0
     if not direction or size == 0.0:
         raise InputError(f"{where} needs a direction, e.g. direction = [0, 0, 1].")
     n = [component / size for component in direction]
-    rotation = "r" if first == 0 else ""
     weights: dict[str, float] = {}
     for i in range(3):
         for j in range(i, 3):
             weight = n[i] * n[j] * (1.0 if i == j else 2.0)
-            parts = [f"{rotation}{AXES[i]}"] if i == j else [f"{rotation}{AXES[i]}", f"{rotation}{AXES[j]}"]
+            parts = [f"{letter}{AXES[i]}"] if i == j else [f"{letter}{AXES[i]}", f"{letter}{AXES[j]}"]
             if weight and not all(part in machine.family.component_names for part in parts):
                 raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {parts[-1]}.")
             if weight:
-                weights["_".join([matrix, *parts])] = weight
+                weights["_".join(["compliance", *parts])] = weight
     return weights
