@@ -246,17 +246,17 @@ def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
     """
     for path, numbers in tables.items():
         for name in ("inertia", "payload_inertia"):
-            given = getattr(numbers, name, None)
-            if given is None:
+            tensor = getattr(numbers, name, None)
+            if tensor is None:
                 continue
-            shown = f'"{origin}": {path}.{name} is {", ".join(f"{entry:g}" for entry in given)} kg·m²'
-            if not is_tensor_of_body(given):
+            subject = f'"{origin}": {path}.{name} is {", ".join(f"{entry:g}" for entry in tensor)} kg·m²'
+            if not is_tensor_of_body(tensor):
                 raise InputError(
-                    f"{shown}, which no body has: about any axis it must not be negative, nor more than about two axes "
-                    "across it together; check the signs and the order xx, yy, zz, xy, xz, yz."
+                    f"{subject}, which no body has: about any axis it must not be negative, nor more than about two "
+                    "axes across it together; check the signs and the order xx, yy, zz, xy, xz, yz."
                 )
-            if path != "tool" and any(given) and not numbers.mass:
-                raise InputError(f"{shown}, but {path}.mass is 0; give the link its mass, or leave its inertia out.")
+            if path != "tool" and any(tensor) and not numbers.mass:
+                raise InputError(f"{subject}, but {path}.mass is 0; give the link its mass, or leave its inertia out.")
 
 
 def is_tensor_of_body(tensor: Sequence[float]) -> bool:
@@ -266,11 +266,11 @@ def is_tensor_of_body(tensor: Sequence[float]) -> bool:
     pivots are tested, after the rounding of files has been added to its diagonal.
     """
     xx, yy, zz, xy, xz, yz = tensor
-    half = 0.5 * (xx + yy + zz) + ROUND_OFF_OF_INERTIA * max(abs(entry) for entry in tensor)
-    if half == 0.0:
+    half_trace = 0.5 * (xx + yy + zz) + ROUND_OFF_OF_INERTIA * max(abs(entry) for entry in tensor)
+    if half_trace == 0.0:
         return True
-    first = half - xx
+    first = half_trace - xx
     if first <= 0.0:
         return False
-    second, beside = half - yy - xy * xy / first, yz + xy * xz / first
-    return second > 0.0 and half - zz - xz * xz / first - beside * beside / second > 0.0
+    second, coupling = half_trace - yy - xy * xy / first, yz + xy * xz / first
+    return second > 0.0 and half_trace - zz - xz * xz / first - coupling * coupling / second > 0.0

@@ -42,11 +42,11 @@ from kinetostat.units import UnitError
 if TYPE_CHECKING:
     from kinetostat.machine.written import checking
     from kinetostat.machine.written import document as legs_of_file
-    from kinetostat.machine.written import family as written
+    from kinetostat.machine.written import family as written_family
 else:
     checking = LateModule("kinetostat.machine.written.checking")
     legs_of_file = LateModule("kinetostat.machine.written.document")
-    written = LateModule("kinetostat.machine.written.family")
+    written_family = LateModule("kinetostat.machine.written.family")
 
 SUFFIX = ".toml"
 STUDY = (
@@ -162,47 +162,45 @@ INDEPENDENT = ("pose", "tool", "load")
 def _build_family(document: Document, origin: str, settings: Sequence[str]) -> Machine:
     """A machine of a family in closed form."""
     family = _family(document.get("family"), origin)
-    named = with_named_parts(document, family, origin)
-    counts = _counts(family_with_parts(family, named))
-    changed = _with_overrides(named, settings, counts, tuple(quantities(family.tables["pose"])), origin)
-    changed = with_named_parts(changed, family, origin)
-    display, loaded = _display(changed, origin), _loaded(changed, origin)
-    resolved = resolve(changed, family, origin)
-    whole = family_with_loads(family_with_parts(family, changed), changed, origin)
-    whole = family_with_own_drives(whole, changed, origin)
-    machine = _validated_machine(whole, resolved, origin, display)
-    placed = machine.configure()
-    parts = unloaded_parts(placed.legs, placed.platform.rotation.z, family.planar)
+    document = with_named_parts(document, family, origin)
+    counts = _list_lengths(family_with_parts(family, document))
+    document = _with_overrides(document, settings, counts, tuple(quantities(family.tables["pose"])), origin)
+    document = with_named_parts(document, family, origin)  # those that overrides have written
+    display, loaded = _take_display(document, origin), _take_state(document, origin)
+    extended = family_with_loads(family_with_parts(family, document), document, origin)
+    extended = family_with_own_drives(extended, document, origin)
+    machine = _validated_machine(extended, resolve(document, family, origin), origin, display)
+    configuration = machine.configure()
+    parts = unloaded_parts(configuration.legs, configuration.platform.rotation.z, family.planar)
     check_limits(machine.tables["limits"], parts, origin)
-    check_own_drives(whole, placed.legs, origin)
+    check_own_drives(extended, configuration.legs, origin)
     return replace(machine, loaded=loaded)
 
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
     """A machine written leg by leg."""
-    named = legs_of_file.by_name(document, origin)
-    legs_of_file.check_paths(named, settings)
-    coordinates = PLANAR_POSE if named.get("space") == "planar" else SPATIAL_POSE
-    changed = legs_of_file.with_parts(_with_overrides(named, settings, {}, coordinates, origin), origin)
-    display, loaded = _display(changed, origin), _loaded(changed, origin)
-    plan, numbers = legs_of_file.separate(changed, origin)
-    family = _written_family(plan, numbers, origin)
-    machine = _validated_machine(family, numbers, origin, display)
+    document = legs_of_file.by_name(document, origin)
+    legs_of_file.check_paths(document, settings)
+    coordinates = PLANAR_POSE if document.get("space") == "planar" else SPATIAL_POSE
+    document = legs_of_file.with_parts(_with_overrides(document, settings, {}, coordinates, origin), origin)
+    display, loaded = _take_display(document, origin), _take_state(document, origin)
+    plan, numbers = legs_of_file.separate(document, origin)
+    machine = _validated_machine(_written_family(plan, numbers, origin), numbers, origin, display)
     checking.check_numbers(plan, machine.tables, origin)
     family = _written_family(checking.complete_plan(plan, machine.family_tables), numbers, origin)
-    whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
-    chains = whole.chains()
+    machine = with_values(replace(machine, family=family), {})  # its tables are then those of this family
+    chains = machine.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
     slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
     parts = unloaded_parts(legs, chains.home.rotation.z, plan.planar, slides)
     check_limits(machine.tables["limits"], parts, origin)
     check_own_drives(family, legs, origin)
-    return replace(whole, loaded=loaded)
+    return replace(machine, loaded=loaded)
 
 
 def _written_family(plan: Plan, numbers: Document, origin: str) -> Family:
     """The family of a plan, with the tables of named loads and of single drives that a file has."""
-    return family_with_own_drives(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin)
+    return family_with_own_drives(family_with_loads(written_family.family_of(plan), numbers, origin), numbers, origin)
 
 
 def _with_overrides(
@@ -210,38 +208,38 @@ def _with_overrides(
 ) -> Document:
     """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
     tables = [key for key in ("pose", *COMMON) if isinstance(document.get(key), dict)]
-    ready = {**document, **{key: copy.deepcopy(document[key]) for key in tables}}
-    remove_replaced_form(ready, settings, coordinates, origin)
+    draft = {**document, **{key: copy.deepcopy(document[key]) for key in tables}}
+    remove_replaced_form(draft, settings, coordinates, origin)
     for setting in settings:
-        _write_out(ready, setting.partition("=")[0].strip())
-    return with_angles(documents.override(ready, settings, counts), coordinates, origin)
+        _write_out(draft, setting.partition("=")[0].strip())
+    return with_angles(documents.override(draft, settings, counts), coordinates, origin)
 
 
 def _write_out(document: Document, path: str) -> None:
     """Write out a list that a common table leaves to its default, if an override names an entry: `load.gravity.2`."""
     field, _, entry = path.rpartition(".")
     name, _, key = field.rpartition(".")
-    known = COMMON.get(name, NamedLoad if name.startswith("load.") else None)
-    quantity = None if known is None else quantities(known).get(key)
+    fields = COMMON.get(name, NamedLoad if name.startswith("load.") else None)
+    quantity = None if fields is None else quantities(fields).get(key)
     if quantity is None or quantity.count is None or not entry.isdecimal():
         return
     table: Any = document
     for part in name.split("."):
         table = table.setdefault(part, {}) if isinstance(table, dict) else None
     if isinstance(table, dict):
-        table.setdefault(key, list(getattr(known, key)))
+        table.setdefault(key, list(getattr(fields, key)))
 
 
 def _validated_machine(family: Family, document: Document, origin: str, display: Display) -> Machine:
-    tables = family.every_table
-    name, instances = validated_tables(document, origin, family.name, tables)
+    """A machine of the numbers of a document, which are checked against their fields and against each other."""
+    name, instances = validated_tables(document, origin, family.name, family.every_table)
     machine = Machine(name, family, instances, display)
     check_contrast(machine, origin)
     check_inertia(machine.tables, origin)
     return machine
 
 
-def _display(document: Document, origin: str) -> Display:
+def _take_display(document: Document, origin: str) -> Display:
     """Take the table [display] out of a document."""
     try:
         return read_display(document.pop("display", {}))
@@ -249,7 +247,7 @@ def _display(document: Document, origin: str) -> Display:
         raise InputError(f'"{origin}": {error}.') from None
 
 
-def _loaded(document: Document, origin: str) -> bool:
+def _take_state(document: Document, origin: str) -> bool:
     """Take `state` out of the table [load] of a document: whether the machine is meant under its loads."""
     load = document.get("load")
     if not isinstance(load, dict) or "state" not in load:
@@ -258,7 +256,8 @@ def _loaded(document: Document, origin: str) -> bool:
     return STATES[choice(load["state"], STATES, f'"{origin}": load.state')]
 
 
-def _counts(family: Family) -> dict[str, int]:
+def _list_lengths(family: Family) -> dict[str, int]:
+    """Number of entries of each field, by path, for which one value may stand."""
     return {
         f"{name}.{field}": quantity.count
         for name, table in family.every_table.items()
@@ -268,6 +267,11 @@ def _counts(family: Family) -> dict[str, int]:
 
 
 def _family(name: object, origin: str) -> Family:
+    """The family of a name.
+
+    Raises:
+        InputError: there is none; with the name that was probably meant, or all of them.
+    """
     family = family_named(name) if isinstance(name, str) else None
     if family is not None:
         return family
@@ -319,14 +323,15 @@ def _left_out(fields: type, table: Any) -> bool:
 
 
 def _quantity_lines(fields: type, table: Any, readable: bool) -> Iterator[str]:
+    """Lines "field = value" of a table; limits that are not set are left out."""
     for field, quantity in quantities(fields).items():
         values = getattr(table, field)
         if quantity.unset is not None and values == quantity.unset:
             continue
         show = quantity.in_file if readable else quantity.show
         texts = [json.dumps(show(value)) for value in (values if quantity.count else (values,))]
-        alone = quantity.count is None or (readable and not quantity.apart and len(set(texts)) == 1)
-        yield f"{field} = {texts[0] if alone else '[' + ', '.join(texts) + ']'}"
+        one_for_all = quantity.count is None or (readable and not quantity.apart and len(set(texts)) == 1)
+        yield f"{field} = {texts[0] if one_for_all else '[' + ', '.join(texts) + ']'}"
 
 
 @checked
@@ -359,8 +364,8 @@ def related(machine: Machine, path: str) -> bool:
         return False
     parameter = find_field(machine.family, path)
     table = parameter.path.split(".")[0]
-    written = machine.family.chains is not None and not parameter.quantity.stiff
-    return table == "limits" or (written and table not in INDEPENDENT)
+    leg_by_leg = machine.family.chains is not None
+    return table == "limits" or (leg_by_leg and not parameter.quantity.stiff and table not in INDEPENDENT)
 
 
 def read_again(machine: Machine) -> Machine:

@@ -22,7 +22,7 @@ KEPT_FAMILIES = 64
 FULL_TURN = 2.0 * math.pi * (1.0 + 1e-9)
 """Greatest plausible angle, rad: a turn with the round-off of degrees."""
 MOST_TIMES = 100.0
-"""Greatest plausible ratio of a length to the longest of all others."""
+"""Greatest plausible ratio of a length to the longest of all others: m in the place of mm make it a thousand."""
 CONTRAST = 1e22
 """Factor by which stiffnesses of one machine may differ, in SI: from 1e24 on round-off hides the stiffer."""
 SOFTEST_PLAUSIBLE = 100.0

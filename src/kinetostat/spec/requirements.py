@@ -14,7 +14,7 @@ from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
 MOST_POSES = 10_000
-"""Poses of a requirement: each is solved for whenever the requirement is judged, which takes seconds for so many."""
+"""Poses of a requirement: each is solved for whenever the requirement is judged."""
 MOST_CONDITIONS = 50
 """Conditions of a requirement: more than there are quantities that anybody bounds."""
 MOST_RANGES = 6
