@@ -18,6 +18,7 @@ from kinetostat.views.figures import COLOURS, STYLE, Drawings, set_title
 from kinetostat.views.layout import fix_layout
 
 THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
+"""Names of the views, each with the axes across and up."""
 VIEW_MARGIN = 0.12
 """Room beside a machine, as a share of its size: its marks and names reach beyond its joints."""
 MOST_TICKS = 4
@@ -25,6 +26,8 @@ MOST_TICKS = 4
 MILLIMETRES = 1e3
 """Millimetres of a metre: views are labelled in mm whatever units the file displays."""
 LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
+CYLINDER_SHARE = 0.55
+"""Share of the first link of an actuated leg that is drawn thick, as the cylinder of a telescope."""
 NEIGHBOUR_SHARE = 0.3
 """Two base joints whose distance is a smaller share of that of the farthest are neighbours: their names would meet."""
 NAME_DISTANCE = 6
@@ -85,14 +88,14 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
 def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: str, up: str) -> None:
     reference = configuration.platform.translation
     actuated = [leg for leg in configuration.legs if leg.actuated]
-    standing = [leg for leg in actuated if len(leg.path) > 1]
-    for plate in (ring_of([leg.path[0] for leg in standing]), ring_of([leg.path[-1] for leg in standing])):
+    spanning = [leg for leg in actuated if len(leg.path) > 1]
+    for plate in (ring_of([leg.path[0] for leg in spanning]), ring_of([leg.path[-1] for leg in spanning])):
         panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
     if up == "y":
-        for leg, name in zip(standing, _short_names(standing), strict=True):
-            _write_name(panel, name, leg, [other for other in standing if other is not leg])
+        for leg, name in zip(spanning, _short_names(spanning), strict=True):
+            _write_name(panel, name, leg, [other for other in spanning if other is not leg])
     marks = {"P": reference} if (tool - reference).norm() == 0.0 else {"P": reference, "T": tool}
     for name, point in marks.items():
         (x,), (y,) = flat([point], across, up)
@@ -106,8 +109,8 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
     panel.plot(x, y, "-", color=colour, linewidth=1.4 if actuated else 2.2, solid_capstyle="round")
     panel.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=4 if actuated else 5, markeredgewidth=1.0)
     if actuated and len(x) > 1:
-        middle = [0.45 * ends[0] + 0.55 * ends[1] for ends in (x, y)]
-        panel.plot([x[0], middle[0]], [y[0], middle[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
+        ends = [first + CYLINDER_SHARE * (second - first) for first, second, *_ in (x, y)]
+        panel.plot([x[0], ends[0]], [y[0], ends[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
 
 
 def _short_names(legs: Sequence[Leg]) -> list[str]:
@@ -148,7 +151,7 @@ def _alignment(component: float, low: str, high: str) -> str:
     """Align a text along one axis so that it does not cover its point, from which it stands in some direction.
 
     Args:
-        component: of this direction (a unit vector) along the axis.
+        component: component of this direction (a unit vector) along the axis.
         low, high: alignments where the text stands on the negative and on the positive side.
     """
     return "center" if abs(component) < CENTRED_COMPONENT else high if component > 0.0 else low

@@ -35,6 +35,14 @@ else:
     xr = LateModule("xarray")
 
 
+MOST_ROWS = 25
+"""Designs of a front that are printed, on one screen; result.json has all."""
+LEAST_PERCENT = 1e-4
+"""Percent per percent below which a 0 is printed: differences leave round-off of this size."""
+LEAST_STIFFNESS_LEFT = 0.01
+"""Share of its initial stiffness below which a direction has been given up for the others, and a sentence says so."""
+
+
 def print_study(console: Console, problem: Problem) -> None:
     """Print the question of a study: poses, objectives, constraints and variables."""
     console.print("The file has no mistake, and its machine can be read.", highlight=False)
@@ -43,7 +51,7 @@ def print_study(console: Console, problem: Problem) -> None:
     for aim in aims(problem):
         console.print(aim, highlight=False)
     console.print(bounds_table(problem))
-    if fixed := not_searched(problem):
+    if fixed := unsearched_variables(problem):
         console.print(f"Not searched, because only a tolerance is given: {fixed}.", highlight=False)
 
 
@@ -67,7 +75,7 @@ def bounds_table(problem: Problem) -> Table:
     return table
 
 
-def not_searched(problem: Problem) -> str:
+def unsearched_variables(problem: Problem) -> str:
     """Return the names of the variables that only have a tolerance."""
     return ", ".join(variable.name for variable in problem.space.variables if variable.fixed)
 
@@ -76,15 +84,7 @@ def _unit(unit: str, display: Display) -> str:
     return "" if unit == "1" else f" ({display.scale(unit).unit})"
 
 
-MOST_ROWS = 25
-"""Designs of a front that are printed, on one screen; result.json has all."""
-LEAST_PERCENT = 1e-4
-"""Percent per percent below which a 0 is printed: differences leave round-off of this size."""
-LEAST_STIFFNESS_LEFT = 0.01
-"""Share of its initial stiffness below which a direction has been given up for the others, and a sentence says so."""
-
-
-def worth_table(result: Result) -> Table:
+def objective_table(result: Result) -> Table:
     """Return the objectives and constraints before and after."""
     display = result.problem.machine.display
     best = "knee of the front" if len(result.problem.objectives) > 1 else "best"
@@ -95,7 +95,7 @@ def worth_table(result: Result) -> Table:
     )
     for k, objective in enumerate(result.problem.objectives):
         before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
-        gain = before / after if objective.sign > 0 else after / before
+        gain = before / after if objective.sign > 0 else after / before  # above 1 where the objective is better
         name, scale = f"{objective.goal} {objective.term.label}", display.scale(objective.term.unit)
         cells = (_exact(value * scale.factor) for value in (before, after))
         table.add_row(name, *cells, _times(gain), scale.head)
@@ -120,7 +120,7 @@ def variable_table(result: Result) -> Table:
     values, display = result.problem.space.values(result.genes), result.problem.machine.display
     for variable, value in zip(result.problem.space.searched_variables, values, strict=True):
         influence = influences.get(variable.name)
-        percents = [percent_text(p) for p in influence.percents] if influence else [""] * len(objectives)
+        percents = [sensitivity_text(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
         shown = (variable.in_words(number, display) for number in (variable.initial, value))
         table.add_row(variable.name, *shown, bound, *percents)
@@ -156,7 +156,7 @@ def scatter_table(robustness: Robustness, display: Display = ENGINEERING) -> Tab
     return table
 
 
-def failing(robustness: Robustness) -> str:
+def failing_sentence(robustness: Robustness) -> str:
     """Return a sentence on the share of the random machines that are not feasible."""
     return f"{100.0 * robustness.failing:.3g} % of the random machines are not feasible."
 
@@ -164,7 +164,8 @@ def failing(robustness: Robustness) -> str:
 def front_table(result: Result) -> Table:
     """Return the designs of the front, the knee among them."""
     problem, outcome = result.problem, result.log.outcome(result.front)
-    shown = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {result.knee}
+    evenly_spaced = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)}
+    shown = evenly_spaced | {result.knee}
     units = [objective.term.unit for objective in problem.objectives]
     display = problem.machine.display
     names = [
@@ -187,18 +188,18 @@ def front_table(result: Result) -> Table:
 
 def remarks(result: Result) -> Iterator[str]:
     """Say what a designer should not overlook: variables at bounds, stiffness given up, ridges."""
-    bounded = [term for term in result.influences if term.bound]
-    if bounded and len(result.problem.objectives) == 1:
-        names = ", ".join(f"{term.name} ({term.bound})" for term in bounded)
+    has_one_objective = len(result.problem.objectives) == 1
+    bounded = [influence for influence in result.influences if influence.bound]
+    if bounded and has_one_objective:
+        names = ", ".join(f"{influence.name} ({influence.bound})" for influence in bounded)
         yield f"At a bound: {names}. Wider bounds would improve the objective, by the percentages above."
-    lost = [term for term in result.compliance_changes if term.gain < LEAST_STIFFNESS_LEFT]
-    for term in lost:
-        name = term.name.removeprefix("compliance_")
-        yield f"The best design gives up {name}: {term.gain:.2g} of its stiffness is left; add a constraint to keep it."
-    if len(result.problem.objectives) == 1:
-        yield from ridge_sentences(result.ridges, result.problem) or (
-            [result.no_ridges] if result.no_ridges else ["There is no ridge: the optimum is a single design."]
-        )
+    for direction in result.compliance_changes:
+        if direction.gain < LEAST_STIFFNESS_LEFT:
+            name, share = direction.name.removeprefix("compliance_"), f"{direction.gain:.2g}"
+            yield f"The best design gives up {name}: {share} of its stiffness is left; add a constraint to keep it."
+    if has_one_objective:
+        no_ridge = result.no_ridges or "There is no ridge: the optimum is a single design."
+        yield from ridge_sentences(result.ridges, result.problem) or [no_ridge]
 
 
 def _exact(value: float) -> str:
@@ -216,7 +217,7 @@ def times_stiffer(gain: float) -> str:
     return f"{_times(gain)} times stiffer" if gain >= 1.0 else f"{_times(1.0 / gain)} times softer"
 
 
-def percent_text(value: float | None) -> str:
+def sensitivity_text(value: float | None) -> str:
     """Return a sensitivity in percent per percent: 0 where it is negligible, a dash where there is none."""
     if value is None or math.isnan(value):
         return DASH
@@ -233,11 +234,11 @@ def _tables(result: Result, _full: bool) -> Iterator[Table | str]:
         return
     if len(result.problem.objectives) > 1:
         yield front_table(result)
-    yield from (worth_table(result), variable_table(result), direction_table(result))
+    yield from (objective_table(result), variable_table(result), direction_table(result))
     if result.robustness:
         yield scatter_table(result.robustness, result.problem.machine.display)
         if result.robustness.failing:
-            yield failing(result.robustness)
+            yield failing_sentence(result.robustness)
     yield from remarks(result)
 
 

@@ -26,6 +26,10 @@ CAPTIONS = {
 }
 CEILING = 99.0
 """Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
+WIDEST_LINEAR_RATIO = 30.0
+"""Ratio of the greatest gain to the least beyond which their axis is logarithmic: the least could not be seen."""
+LEAST_SHOWN, GREATEST_SHOWN = -0.05, 1.05
+"""Ends of the scale of a variable, in units of the distance of its bounds: an initial design beyond is not drawn."""
 
 
 def pictures(result: Result) -> dict[str, Drawing]:
@@ -83,16 +87,16 @@ def _gains(panel: Axes, result: Result) -> None:
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
     panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
     panel.axvline(1.0, color="#444444", linewidth=0.8)
-    wide = gains.size and gains.max() / gains.min() > 30.0
-    panel.set(xscale="log" if wide else "linear", xlabel="times as stiff as before")
+    is_wide = gains.size and gains.max() / gains.min() > WIDEST_LINEAR_RATIO
+    panel.set(xscale="log" if is_wide else "linear", xlabel="times as stiff as before")
     panel.set_yticks(places, [direction.name.removeprefix("compliance_") for direction in compared])
     panel.invert_yaxis()
     panel.grid(visible=False, axis="y")
     for place, gain in zip(places, gains, strict=True):
-        inside = wide and gain < 1.0 / 30.0
+        is_long = is_wide and gain < 1.0 / WIDEST_LINEAR_RATIO  # its bar to the left of 1 has room for the number
         panel.annotate(
-            f"{gain:.3g}", (max(gain, 1.0) if not inside else gain, place), (3, 0), textcoords="offset points",
-            va="center", fontsize=7, color="white" if inside else "black",
+            f"{gain:.3g}", (gain if is_long else max(gain, 1.0), place), (3, 0), textcoords="offset points",
+            va="center", fontsize=7, color="white" if is_long else "black",
         )  # fmt: skip
     panel.margins(x=0.18)
 
@@ -100,11 +104,11 @@ def _gains(panel: Axes, result: Result) -> None:
 def _places(panel: Axes, result: Result) -> None:
     """Draw each variable on a scale from its lower to its upper bound."""
     space, display = result.problem.space, result.problem.machine.display
-    most = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
-    before, after = space.initial / most, result.genes / most
+    last_choices = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
+    before, after = space.initial / last_choices, result.genes / last_choices
     for place, variable in enumerate(space.searched_variables):
         panel.plot([0.0, 1.0], [place, place], color="#cccccc", linewidth=1.2, zorder=1)
-        if -0.05 <= before[place] <= 1.05:
+        if LEAST_SHOWN <= before[place] <= GREATEST_SHOWN:
             panel.plot(before[place], place, "o", color="white", markeredgecolor="#444444", zorder=2)
             panel.annotate(
                 "", (after[place], place), (before[place], place),
@@ -118,7 +122,7 @@ def _places(panel: Axes, result: Result) -> None:
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
             panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
     panel.set_yticks(range(space.size), [variable.name for variable in space.searched_variables])
-    panel.set(xlim=(-0.05, 1.45), xticks=[], xlabel="between its bounds")
+    panel.set(xlim=(LEAST_SHOWN, 1.45), xticks=[], xlabel="between its bounds")  # values stand to the right
     was = Line2D([], [], color="white", marker="o", markeredgecolor="#444444", linestyle="", label="before")
     best = Line2D([], [], color=COLOURS[0], marker="o", linestyle="", label="best")
     panel.legend(handles=[was, best], loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)

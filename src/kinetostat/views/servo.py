@@ -36,27 +36,24 @@ def _share_at_rest(drive: dict[str, Any]) -> float:
     return float(drive["static"] / drive["transmission"])
 
 
-def _unit(component: str) -> str:
-    return "N·m/rad" if len(component) == 2 else "N/m"
-
-
 def _lines(answer: Servo) -> Lines:
     if answer.loops is None:
-        return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
-    lines = [("Pose", f"{pose_of(answer.machine)}."), ("Servo", answer.message)]
+        yield "Pose", f"{pose_of(answer.machine)}. {answer.message}"
+        return
+    yield "Pose", f"{pose_of(answer.machine)}."
+    yield "Servo", answer.message
     softest = min(_drives(answer), key=_share_at_rest)
-    resists, transmission = (_stiffness(answer, softest[key], softest["unit"]) for key in ("static", "transmission"))
-    limit = "is rigid" if math.isinf(softest["static"]) else f"holds {resists}"
+    static, transmission = (_stiffness(answer, softest[key], softest["unit"]) for key in ("static", "transmission"))
+    verb = "is" if static == RIGID else "holds"
     if len(set(answer.loops.loops)) == 1:
-        lines.append(("Drive", f"Each drive {limit} at 0 Hz; its transmission has {transmission}."))
+        yield "Drive", f"Each drive {verb} {static} at 0 Hz; its transmission has {transmission}."
     elif _share_at_rest(softest) > 1.0 - SAME_SHARE:
-        lines.append(("Drives", "At 0 Hz each drive holds what its transmission does, or more."))
+        yield "Drives", "At 0 Hz each drive holds what its transmission does, or more."
     else:
-        text = f"{softest['name']} loses most by its loop: it {limit} at 0 Hz; its transmission has {transmission}."
-        lines.append(("Drives", text))
+        loss = f"{softest['name']} loses most by its loop: it {verb} {static} at 0 Hz"
+        yield "Drives", f"{loss}; its transmission has {transmission}."
     if answer.assumed:
-        lines.append(("Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."))
-    return lines
+        yield "Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."
 
 
 def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
@@ -64,11 +61,11 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
         return
     columns = ["motors still", "loops closed, 0 Hz", "least over frequency", "at Hz"]
     table = numeric_table("Free stiffness of the tool", "", columns)
-    show = answer.machine.display.show
     rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=True)
-    for name, standing, static, (least, frequency) in rows:
-        shown = [RIGID if math.isinf(value) else show(value, _unit(name)) for value in (standing, static, least)]
-        table.add_row(name, *shown, DASH if math.isinf(least) else number(frequency, digits=3))
+    for name, motors_still, static, (least, frequency) in rows:
+        unit = "N·m/rad" if name in COMPONENTS[:3] else "N/m"
+        stiffnesses = (_stiffness(answer, value, unit) for value in (motors_still, static, least))
+        table.add_row(name, *stiffnesses, DASH if math.isinf(least) else number(frequency, digits=3))
     yield table
     yield _table_of_drives(answer)
 
@@ -89,7 +86,7 @@ def _table_of_drives(answer: Servo) -> FittedTable:
 
 
 def _drives(answer: Servo) -> list[dict[str, Any]]:
-    """The numbers of each drive by name: its unit, those of its loop at its coordinate, and its stiffness at rest."""
+    """Return the numbers of each drive by name: its unit, those of its loop, and its stiffness at rest."""
     if answer.loops is None:
         return []
     return [
@@ -116,12 +113,12 @@ def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
     return [
         {
             "component": name,
-            "motors_still": None if math.isinf(standing) else standing,
+            "motors_still": None if math.isinf(motors_still) else motors_still,
             "static": None if math.isinf(static) else static,
             "least": None if math.isinf(least) else least,
             "least_at": None if math.isinf(least) else frequency,
         }
-        for name, standing, static, (least, frequency) in rows
+        for name, motors_still, static, (least, frequency) in rows
     ]
 
 
@@ -151,13 +148,13 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
     compliant = [name for name, stiffness in stiffnesses if not math.isinf(stiffness)]
     directions = drawn_directions(answer.direction, compliant)
     closed = answer.receptance(answer.frequencies.tolist())
-    standing = receptance(answer.loops.modes, answer.loops.damping, answer.frequencies)
+    motors_still = receptance(answer.loops.modes, answer.loops.damping, answer.frequencies)
     with figures.new_figure(
         (5.6, 3.8), title.format(answer.machine.name), setting_of(answer.machine), "thin: motors that stand still"
     ) as figure:
         panel = figure.add_subplot()
         for colour, dashes, (name, axis) in zip(figures.COLOURS, figures.DASHES, directions.items(), strict=False):
-            thick, thin = (1.0 / np.abs(along(part, np.array(axis))) * scale.factor for part in (closed, standing))
+            thick, thin = (1.0 / np.abs(along(part, np.array(axis))) * scale.factor for part in (closed, motors_still))
             panel.loglog(answer.frequencies, thick, color=colour, linestyle=dashes, label=f"along {name}")
             panel.loglog(answer.frequencies, thin, color=colour, linewidth=0.7, alpha=0.6)
         panel.margins(x=0.0)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _DECIMAL = re.compile(r"([-+−]?[\d,]+)((?:\.\d+)?)")
 COLUMN_GAP = 3
-"""Characters between two columns, and 1 where room is short."""
+"""Characters between two columns; where room is short, there is one."""
 EDGE_SPACE = 2
 """Characters left and right of a table."""
 
@@ -79,7 +79,16 @@ class FittedTable(Table):
 
 
 class _ColumnWidths:
-    """A column with the widths that it may have."""
+    """A column with the widths that it may have, in characters.
+
+    Attributes:
+        texts: its head and its cells.
+        numeric: whether it holds numbers.
+        aligned: width at which decimal points stand below each other and no text is broken.
+        unbroken: width of its longest line.
+        least: width of its longest word; of numbers, which are not broken, of the longest one.
+        decimals: greatest number of characters from the decimal point on.
+    """
 
     def __init__(self, column: Column) -> None:
         cells = [*column.cells]
@@ -88,13 +97,13 @@ class _ColumnWidths:
             text.plain = shown
         self.numeric = column.justify == "right"
         lines = [line for text in self.texts for line in text.plain.split("\n")]
-        parts = lines if column.no_wrap else [word for line in lines for word in line.split(" ")]
-        self.most = max(map(cell_len, lines), default=0)
-        self.least = max(map(cell_len, parts), default=0)
+        words = lines if column.no_wrap else [word for line in lines for word in line.split(" ")]
+        self.unbroken = max(map(cell_len, lines), default=0)
+        self.least = max(map(cell_len, words), default=0)
         matches = [_DECIMAL.fullmatch(cell.plain) for cell in self.texts[1:]]
         whole = max((len(match[1]) for match in matches if match), default=0)
         self.decimals = max((len(match[2]) for match in matches if match), default=0)
-        self.aligned = max(self.most, whole + self.decimals if self.numeric else 0)
+        self.aligned = max(self.unbroken, whole + self.decimals if self.numeric else 0)
 
     def cells(self, width: int) -> Iterator[Text]:
         """Return the cells, numbers padded so that their decimal points stand below each other where there is room."""
@@ -127,7 +136,7 @@ def _widths(columns: Sequence[_ColumnWidths], gap: int, width: int) -> list[int]
     room = width - EDGE_SPACE - gap * (len(columns) - 1)
     widths = [column.aligned for column in columns]
     if sum(widths) > room:
-        widths = [column.most for column in columns]
+        widths = [column.unbroken for column in columns]
     while sum(widths) > room:
         loose = [i for i, column in enumerate(columns) if widths[i] > column.least]
         if not loose:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.display import Scale
 from kinetostat.frozen import dataclass
@@ -28,11 +28,16 @@ MOST_COLUMNS = 3
 AXES_IN_DIAGONAL = 10.0
 """Axes of the base that would fit into the diagonal of the machine, about: their length is rounded to one digit."""
 ROOM = 0.1
-"""Room around each machine, as a share of its diagonal: its motion is drawn nearly so large."""
+"""Room on one side of a machine, as a share of its diagonal: its motion is drawn nearly so large."""
 LEAST_GAP = 0.025
 """Least distance between the numbers of two modes, as a share of the width of a panel: two digits and a gap."""
+ROOM_BESIDE, ROOM_ABOVE, HEADING_HEIGHT = 2.0 * ROOM, 3.5 * ROOM, 1.5 * ROOM
+"""Room between machines side by side and below each other, and height of a heading above its machine, in diagonals: a
+mode moves the machine to all sides, and a line of text stands above it."""
+MACHINE_WIDTH = 2.4
+"""Width of a machine with the room beside it, inches: a heading is as wide."""
 ANY_SIZE = "a mode has a shape, and no size: the motion is as large as can be seen"
-ORIGIN = Vector(0.0, 0.0, 0.0)
+"""Sentence below the shapes."""
 
 
 def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
@@ -144,8 +149,8 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
     shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN_MODES], 1) if mode.shape is not None]
     columns = min(MOST_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    across = 0.4 + 2.4 * columns
-    size = (across, 0.9 + across * rows * view.height / (columns * view.width))
+    across = 0.4 + MACHINE_WIDTH * columns
+    size = (across, 0.9 + across * rows * view.height / (columns * view.width))  # with title and legend, inches
     axis = float(f"{view.diagonal / AXES_IN_DIAGONAL:.0e}")
     with new_figure(size, title.format(machine.name)) as figure:
         panel = figure.add_subplot(aspect="equal")
@@ -156,7 +161,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
             heading = f"{number}: {machine.display.show(mode.frequency, 'Hz')} (tool: {mode.direction})"
             panel.annotate(heading, view.heading(place), ha="center", va="bottom", size=STYLE["axes.titlesize"])
         _draw_axes(panel, view, axis, "xy" if planar else "xyz")
-        left, top = view.low[0] - ROOM * view.diagonal, view.high[1] + 2.5 * ROOM * view.diagonal
+        left, top = view.low[0] - ROOM * view.diagonal, view.high[1] + (ROOM_ABOVE - ROOM) * view.diagonal
         panel.set(xlim=(left, left + columns * view.width), ylim=(top - rows * view.height, top))
         panel.set_axis_off()
         setting = f"{setting_of(machine, [])}; axes as long as {machine.display.show(axis, 'm')}\n{ANY_SIZE}"
@@ -184,22 +189,20 @@ class ShapeView:
         across, up = picture_coordinates(points, self.directions)
         return (across + place[0]).tolist(), (up + place[1]).tolist()
 
-    # A mode moves the machine to all sides, and a line of text stands above it.
-
     @property
     def width(self) -> float:
         """Distance of a machine from the next one beside it, m."""
-        return float(self.high[0] - self.low[0] + 2.0 * ROOM * self.diagonal)
+        return float(self.high[0] - self.low[0] + ROOM_BESIDE * self.diagonal)
 
     @property
     def height(self) -> float:
         """Distance of a machine from the next one below it, m."""
-        return float(self.high[1] - self.low[1] + 3.5 * ROOM * self.diagonal)
+        return float(self.high[1] - self.low[1] + ROOM_ABOVE * self.diagonal)
 
     def heading(self, place: tuple[float, float]) -> tuple[float, float]:
         """Return the point above the machine at a place over which its heading stands."""
         middle = 0.5 * (self.low[0] + self.high[0])
-        return middle + place[0], self.high[1] + place[1] + 1.5 * ROOM * self.diagonal
+        return middle + place[0], self.high[1] + place[1] + HEADING_HEIGHT * self.diagonal
 
 
 def _view_of(machine: Machine, configuration: Configuration) -> ShapeView:
@@ -223,6 +226,6 @@ def _draw_axes(panel: Axes, view: ShapeView, length: float, names: str) -> None:
     corner = tuple(view.low - np.array([0.5, 0.4]) * ROOM * view.diagonal)
     for name in names:
         axis = Vector(*AXES[name]) * length
-        panel.plot(*view.project([ORIGIN, axis], corner), color="#444444", linewidth=0.8)
+        panel.plot(*view.project([ZERO, axis], corner), color="#444444", linewidth=0.8)
         (end,) = zip(*view.project([axis * 1.3], corner), strict=True)
         panel.annotate(name, end, ha="center", va="center", size=7)

@@ -28,7 +28,7 @@ from kinetostat.views.comparison import (
     softest_texts,
     verdict_text,
 )
-from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, percent_text
+from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, sensitivity_text
 
 
 def result_text(progress: Progress) -> str:
@@ -81,7 +81,7 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
         before = DASH if variable is None else variable.in_words(variable.initial, display)
         after = variable.in_words(value, display) if variable and variable.choices is None else f"{value:.6g}"
         percents = slopes.get(path, {}).get("percent_per_percent", [])
-        rows.append([path, before, after, bounds.get(path, ""), ", ".join(map(percent_text, percents))])
+        rows.append([path, before, after, bounds.get(path, ""), ", ".join(map(sensitivity_text, percents))])
     note = paragraph(
         "% per %: by how many percent the objective changes if the variable grows by 1 % (an angle by 0.01 rad).",
         "note",

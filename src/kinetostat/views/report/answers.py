@@ -37,13 +37,13 @@ from kinetostat.views.optimisation import (
     aims,
     bounds_table,
     direction_table,
-    failing,
+    failing_sentence,
     front_table,
-    not_searched,
+    objective_table,
     remarks,
     scatter_table,
+    unsearched_variables,
     variable_table,
-    worth_table,
 )
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.question import Description
@@ -208,7 +208,7 @@ def gains(result: Result) -> Iterator[str]:
 
 
 def _study_question(problem: Problem) -> tuple[Block, ...]:
-    fixed = not_searched(problem)
+    fixed = unsearched_variables(problem)
     return (
         Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.description}.")),
         Bullets(tuple((typeset(text), "") for text in aims(problem))),
@@ -229,7 +229,7 @@ def _study_answer(result: Result) -> tuple[Block, ...]:
     figures, several = pictures(result), len(result.problem.objectives) > 1
     best = "the knee of the front" if several else "the best design"
     blocks: list[Block] = [
-        as_table(worth_table(result), f"Objectives: the original machine, and {best}."),
+        as_table(objective_table(result), f"Objectives: the original machine, and {best}."),
         as_table(
             variable_table(result),
             f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
@@ -244,6 +244,6 @@ def _study_answer(result: Result) -> tuple[Block, ...]:
         blocks.append(as_table(scatter, "Objectives under the tolerances."))
         blocks.append(as_figure(figures["tolerances"](), figures["tolerances"].caption))
         if result.robustness.failing:
-            blocks.append(Paragraph(failing(result.robustness)))
+            blocks.append(Paragraph(failing_sentence(result.robustness)))
     items = tuple((typeset(line), "") for line in remarks(result))
     return (*blocks, Bullets(items)) if items else tuple(blocks)
