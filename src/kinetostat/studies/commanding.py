@@ -171,7 +171,9 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     commanded = commanded_state(mechanism)
     equations = commanded.solution.balance
     stable = commanded.solution.settled & stabilities(equations).stable
-    before, left = (np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (commanded.first_error, commanded.error))
+    before, left = (
+        np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (commanded.first_error, commanded.error)
+    )
     left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
     turned = np.linalg.norm(commanded.error[:, :3], axis=1)
     rates = commanded.rates[:, 3:] * (length[:, None] / units)[:, None]

@@ -189,7 +189,7 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
         stream: number of the stream of random numbers; streams are independent.
     """
     rng = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
-    tolerated = _tolerated(problem)
+    tolerated = _tolerated_variables(problem)
     if problem.study.robustness.distribution == "normal":
         drawn = np.clip(rng.standard_normal((samples, len(tolerated))) / SIGMAS_IN_TOLERANCE, -1.0, 1.0)
     else:
@@ -198,13 +198,13 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
     return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, drawn.T, strict=True)}
 
 
-def _tolerated(problem: Problem) -> list[Variable]:
+def _tolerated_variables(problem: Problem) -> list[Variable]:
     return [variable for variable in problem.space.variables if variable.tolerance]
 
 
 def corners(problem: Problem) -> dict[str, Array]:
     """Return all combinations of the ends of the tolerances, SI, by variable; empty if there are too many."""
-    tolerated = _tolerated(problem)
+    tolerated = _tolerated_variables(problem)
     if not 0 < len(tolerated) <= MOST_CORNERS:
         return {}
     ends = np.array(list(product((-1.0, 1.0), repeat=len(tolerated))))
@@ -254,7 +254,7 @@ class Robustness:
 def robustness_of(assess: Assessor, genes: Array) -> Robustness | None:
     """Return the objectives of a design [variables] under the tolerances of its study; None where there are none."""
     problem = assess.problem
-    if not _tolerated(problem):
+    if not _tolerated_variables(problem):
         return None
     made = assess.judge_machines(genes, deviations(problem, problem.study.robustness.samples, ROBUSTNESS_STREAM))
     ends = corners(problem)

@@ -291,7 +291,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         where: the table's name, for messages.
 
     Raises:
-        InputError: the quantity is not known, weights or a direction do not belong to it, or `over` is no aggregate.
+        InputError: the quantity is not known, weights or a direction do not belong to it, or `over` cannot be read.
     """
     name = _known_name(machine, table.quantity, f"{where}.quantity")
     if table.weights is not None and name not in SUMS:
