@@ -25,7 +25,7 @@ MOST_JOINTS = 2000
 AXISLESS = ("fixed", "spherical")
 """Kinds of joints whose axis, often written as 0 0 0, has no meaning."""
 LARGEST_NUMBER = 1e100
-"""Bound of the size of every number in a file: products of three are still finite."""
+"""Bound of the size of every number in a file: products of three, such as a mass times a squared length, are finite."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class FileJoint:
     """A joint of the file, placed at zero joint coordinates.
 
     Attributes:
-        name, kind: the name and kind as written.
+        name, kind: its name and kind as written.
         parent, child: names of its links.
-        frame: the frame of itself and of its child, in the root link's frame, m [4 x 4].
+        frame: its frame, which is that of its child as well, in the root link's frame, m [4 x 4].
         axis: unit vector in the root link's frame; without meaning for a fixed joint.
         actuated: whether it is driven, by a <transmission>, `independent`, or as its extension says.
         mimics: name and multiplier of the joint that it follows, None if it follows none.
@@ -90,7 +90,7 @@ class UrdfFile:
 
 
 class _NoDocumentType(TreeBuilder):
-    """Builds elements, and refuses a document type, in which entities could be defined."""
+    """Build elements, and refuse a document type, in which entities could be defined."""
 
     def doctype(self, name: str, *_identifiers: str | None) -> None:
         """Refuse it."""
@@ -137,22 +137,28 @@ class _Reader:
     def __init__(self, robot: Element, origin: str) -> None:
         self._robot, self._origin = robot, origin
         self._links = [self._text(link, "name", "a link") for link in robot.findall("link")]
-        often, count = next(iter(Counter(self._links).most_common(1)), ("", 0))
+        name, count = next(iter(Counter(self._links).most_common(1)), ("", 0))
         if count > 1:
-            raise InputError(f'"{origin}" defines the link {shorten(often)} twice; give each link a name of its own.')
+            raise InputError(f'"{origin}" defines the link {shorten(name)} twice; give each link a name of its own.')
         self._elements = robot.findall("joint")
-        transmitted = robot.findall("transmission/joint")
-        self._driven = {joint.get("name") for joint in transmitted}
+        self._joints_with_transmission = {joint.get("name") for joint in robot.findall("transmission/joint")}
         if not 1 <= len(self._elements) <= MOST_JOINTS:
             raise InputError(f'"{origin}" has {len(self._elements)} joints; it needs 1 to {MOST_JOINTS:,}.')
 
     def read(self) -> UrdfFile:
         """Return everything, placed from the root outwards."""
         root, children = self._tree()
-        joints, frames = self._placed_joints(root, children)
-        name, loops = self._robot.get("name", "machine"), tuple(self._loops(frames))
-        masses = dict(self._masses(frames))
-        return UrdfFile(self._origin, name, _extension(self._robot), root, joints, frames, loops, masses)
+        joints, frames = self._place_joints(root, children)
+        return UrdfFile(
+            origin=self._origin,
+            name=self._robot.get("name", "machine"),
+            extension=_extension(self._robot),
+            root=root,
+            joints=joints,
+            frames=frames,
+            loops=tuple(self._loops(frames)),
+            masses=dict(self._masses(frames)),
+        )
 
     def _tree(self) -> tuple[str, dict[str, list[Element]]]:
         """Return the link that hangs on no joint, and the joints that hang on each link.
@@ -161,24 +167,24 @@ class _Reader:
             InputError: a link hangs on two joints, or several on none.
         """
         children: dict[str, list[Element]] = {}
-        hanging: set[str] = set()
+        all_children: set[str] = set()
         for element in self._elements:
             where = self._where(element)
             parent, child = (self._link(element, end, where) for end in ("parent", "child"))
-            if child in hanging:
+            if child in all_children:
                 raise InputError(
                     f"{where}: link {shorten(child)} is the child of two joints; close the loop with <loop>."
                 )
-            hanging.add(child)
+            all_children.add(child)
             children.setdefault(parent, []).append(element)
-        roots = [link for link in self._links if link not in hanging]
+        roots = [link for link in self._links if link not in all_children]
         if len(roots) != 1:
             raise InputError(
                 f'"{self._origin}" has {len(roots)} links that are not the child of a joint; it needs one, the base.'
             )
         return roots[0], children
 
-    def _placed_joints(
+    def _place_joints(
         self, root: str, children: dict[str, list[Element]]
     ) -> tuple[dict[str, FileJoint], dict[str, Array]]:
         """Place joints and links from the root outwards; return the joints by their children, and all frames.
@@ -196,10 +202,10 @@ class _Reader:
                 joints[joint.child], frames[joint.child] = joint, joint.frame
                 pending.append(joint.child)
         if len(frames) < len(self._links):
-            lost = next(link for link in self._links if link not in frames)
+            unreached = next(link for link in self._links if link not in frames)
             raise InputError(
-                f'"{self._origin}": link {shorten(lost)} is on a closed chain of joints; joints must form a tree, and '
-                "a loop is closed with <loop>."
+                f'"{self._origin}": link {shorten(unreached)} is on a closed chain of joints; joints must form a tree, '
+                "and a loop is closed with <loop>."
             )
         return joints, frames
 
@@ -210,9 +216,10 @@ class _Reader:
             inertial = link.find("inertial")
             if inertial is None:
                 continue
-            placed = frames[name] @ self._placement(inertial.find("origin"), where)
-            weight, inertia = inertial.find("mass"), inertial.find("inertia")
-            (mass,) = numbers("0" if weight is None else weight.get("value", "0"), 1, f"{where}: mass")
+            frame = frames[name] @ self._placement(inertial.find("origin"), where)
+            mass_element, inertia = inertial.find("mass"), inertial.find("inertia")
+            mass_text = "0" if mass_element is None else mass_element.get("value", "0")
+            (mass,) = numbers(mass_text, 1, f"{where}: mass")
             entries = " ".join("0" if inertia is None else inertia.get(f"i{entry}", "0") for entry in TENSOR)
             tensor = numbers(entries, 6, f"{where}: inertia")
             if mass < 0.0 or not is_tensor_of_body(tensor):
@@ -221,25 +228,25 @@ class _Reader:
                     "body has; correct them, or remove <inertial>."
                 )
             if mass > 0.0:
-                rotation = placed[:3, :3]
-                yield name, Heavy(mass, placed[:3, 3], rotation @ matrix_of(tensor) @ rotation.T)
+                rotation = frame[:3, :3]
+                yield name, Heavy(mass, frame[:3, 3], rotation @ matrix_of(tensor) @ rotation.T)
 
-    def _joint(self, element: Element, parent: str, frame: Array) -> FileJoint:
+    def _joint(self, element: Element, parent: str, parent_frame: Array) -> FileJoint:
         where = self._where(element)
-        placed = frame @ self._placement(element.find("origin"), where)
+        frame = parent_frame @ self._placement(element.find("origin"), where)
         extension = _extension(element)
         name = self._text(element, "name", "a joint")
-        driven = name in self._driven or "true" in (element.get("independent"), extension.get("actuated"))
+        is_marked = "true" in (element.get("independent"), extension.get("actuated"))
         return FileJoint(
-            name,
-            self._text(element, "type", where),
-            parent,
-            self._link(element, "child", where),
-            placed,
-            placed[:3, :3] @ self._axis(element, where),
-            driven,
-            self._mimics(element, where),
-            extension,
+            name=name,
+            kind=self._text(element, "type", where),
+            parent=parent,
+            child=self._link(element, "child", where),
+            frame=frame,
+            axis=frame[:3, :3] @ self._axis(element, where),
+            actuated=name in self._joints_with_transmission or is_marked,
+            mimics=self._mimics(element, where),
+            extension=extension,
         )
 
     def _mimics(self, element: Element, where: str) -> tuple[str, float] | None:
@@ -251,17 +258,20 @@ class _Reader:
     def _loops(self, frames: dict[str, Array]) -> Iterator[FileLoop]:
         for element in self._robot.findall("loop"):
             where = f'"{self._origin}": loop {shorten(element.get("name", ""))}'
-            ends = [element.find(end) for end in ("predecessor", "successor")]
-            links, places = [], []
-            for end in ends:
+            links, loop_frames = [], []
+            for end in map(element.find, ("predecessor", "successor")):
                 link = None if end is None else end.get("link", end.get("name"))
                 if end is None or link not in frames:
                     raise InputError(f"{where} must name two links of the file, as <predecessor> and <successor>.")
                 links.append(link)
-                places.append(frames[link] @ self._placement(end.find("origin"), where))
-            axis = places[0][:3, :3] @ self._axis(element, where)
-            name, kind = self._text(element, "name", "a loop"), element.get("type", "fixed")
-            yield FileLoop(name, kind, (links[0], links[1]), (places[0], places[1]), axis)
+                loop_frames.append(frames[link] @ self._placement(end.find("origin"), where))
+            yield FileLoop(
+                name=self._text(element, "name", "a loop"),
+                kind=element.get("type", "fixed"),
+                links=(links[0], links[1]),
+                frames=(loop_frames[0], loop_frames[1]),
+                axis=loop_frames[0][:3, :3] @ self._axis(element, where),
+            )
 
     def _where(self, element: Element) -> str:
         return f'"{self._origin}": joint {shorten(element.get("name", ""))}'
@@ -281,8 +291,8 @@ class _Reader:
         return link
 
     def _axis(self, element: Element, where: str) -> Array:
-        written = element.find("axis")
-        axis = np.array(numbers("1 0 0" if written is None else written.get("xyz", "1 0 0"), 3, f"{where}: axis"))
+        child = element.find("axis")
+        axis = np.array(numbers("1 0 0" if child is None else child.get("xyz", "1 0 0"), 3, f"{where}: axis"))
         size = float(np.linalg.norm(axis))
         if size == 0.0 and element.get("type") not in AXISLESS:
             raise InputError(f'{where}: its axis has no length; give a direction, e.g. <axis xyz="0 0 1"/>.')
@@ -320,9 +330,9 @@ def numbers(text: str, count: int, where: str) -> list[float]:
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Rz(yaw) Ry(pitch) Rx(roll) [3 x 3]."""
-    (ca, sa), (cb, sb), (cc, sc) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
-    about_x = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
-    about_y = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
-    about_z = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
+    """Return Rz(yaw) Ry(pitch) Rx(roll) [3 x 3]."""
+    (cos_x, sin_x), (cos_y, sin_y), (cos_z, sin_z) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    about_x = np.array([[1, 0, 0], [0, cos_x, -sin_x], [0, sin_x, cos_x]])
+    about_y = np.array([[cos_y, 0, sin_y], [0, 1, 0], [-sin_y, 0, cos_y]])
+    about_z = np.array([[cos_z, -sin_z, 0], [sin_z, cos_z, 0], [0, 0, 1]])
     return np.asarray(about_z @ about_y @ about_x)

@@ -24,7 +24,7 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import LONGEST_MACHINE_NAME, SCHEMA_VERSION
 from kinetostat.tolerances import COINCIDENT_HINGES, INDEPENDENT_AXES, OPEN_LOOP
 from kinetostat.units import RIGID
-from kinetostat.validation.pieces import one_body
+from kinetostat.validation.pieces import one_body, tensor_of
 
 CLOSING = ("fixed", "revolute", "continuous", "prismatic", "spherical")
 """Kinds of joints that may close a loop."""
@@ -69,7 +69,7 @@ class Bodies:
     """The heavy bodies of a file: links that fixed joints hold together are one body.
 
     Attributes:
-        left: names of the links with a mass that nobody has asked for yet; those of the base do not count.
+        left: names of the links with a mass that no table has yet; those of the base do not count.
     """
 
     def __init__(self, file: UrdfFile) -> None:
@@ -92,15 +92,15 @@ class Bodies:
     def table(self, links: Iterable[str]) -> Document:
         """Join some links into one mass with its centre and inertia, in the root link's frame; empty without a mass.
 
-        What is joined here is taken, so that no mass counts twice.
+        These links are no longer in `left`, so that no mass counts twice.
         """
         names = {name for link in links for name in self.links(link)} & self.left
         self.left -= names
         if not names:
             return {}
         whole = one_body([self._masses[name] for name in sorted(names)])
-        entries = [float(whole.inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-        return {"mass": whole.mass, "centre_of_mass": whole.centre.tolist(), "inertia": entries}
+        inertia = list(tensor_of(whole.inertia))
+        return {"mass": whole.mass, "centre_of_mass": whole.centre.tolist(), "inertia": inertia}
 
 
 def document_of(file: UrdfFile, bodies: Bodies | None = None) -> Document:
@@ -172,13 +172,13 @@ def _path(file: UrdfFile, link: str) -> list[FileJoint]:
 
 def _rigid_with(file: UrdfFile, platform: str) -> set[str]:
     """Return the links that are fixed to the platform, itself among them."""
-    links = {platform}
-    growing = True
-    while growing:
-        fixed = [joint for joint in file.joints.values() if joint.kind == "fixed" and not joint.extension]
-        pairs = [{joint.parent, joint.child} for joint in fixed]
-        larger = links.union(*(pair for pair in pairs if pair & links))
-        growing, links = larger != links, larger
+    fixed = [joint for joint in file.joints.values() if joint.kind == "fixed" and not joint.extension]
+    pairs = [{joint.parent, joint.child} for joint in fixed]
+    links: set[str] = set()
+    neighbours = {platform}
+    while neighbours != links:
+        links = neighbours
+        neighbours = links.union(*(pair for pair in pairs if pair & links))
     return links
 
 
@@ -210,15 +210,15 @@ def _tip(file: UrdfFile, loop: FileLoop, rigid: set[str]) -> str:
 
 def _check_apart(file: UrdfFile, paths: Sequence[Sequence[FileJoint]]) -> None:
     """Refuse joints that move and that two legs share."""
-    seen: set[str] = set()
+    of_other_legs: set[str] = set()
     for path in paths:
         names = {joint.name for joint in path if joint.kind != "fixed" or joint.extension}
-        if names & seen:
+        if shared := names & of_other_legs:
             raise InputError(
-                f'"{file.origin}": joint {shorten(min(names & seen))} belongs to two legs; legs may share the base and '
-                "the platform only."
+                f'"{file.origin}": joint {shorten(min(shared))} belongs to two legs; legs may share the base and the '
+                "platform only."
             )
-        seen |= names
+        of_other_legs |= names
 
 
 def _leg_name(path: Sequence[FileJoint], number: int) -> str:
@@ -245,14 +245,13 @@ def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bod
         row.append(_as_joint(loop))
     tables: list[Document] = []
     links: Document = {}
-    at = 0
-    while at < len(row):
-        where = f'"{origin}": joint {shorten(row[at].name)}'
-        count, table = _first_joint(row[at:], bodies, where)
-        tables.append({"name": _name(row[at].name, leg), "point": row[at].frame[:3, 3].tolist(), **table})
-        at += count
-        weight = bodies.table([row[at - 1].child]) if at < len(row) else {}
-        links |= {f"body {len(tables)}": {"model": "rigid", **weight}} if weight else {}
+    while row:
+        where = f'"{origin}": joint {shorten(row[0].name)}'
+        count, table = _first_joint(row, bodies, where)
+        tables.append({"name": _name(row[0].name, leg), "point": row[0].frame[:3, 3].tolist(), **table})
+        body, row = row[count - 1].child, row[count:]
+        mass = bodies.table([body]) if row else {}
+        links |= {f"body {len(tables)}": {"model": "rigid", **mass}} if mass else {}
     if not tables:
         tables = [{"name": "foot", "point": path[-1].frame[:3, 3].tolist(), "type": "fixed"}]
     names = [BASE, *(f"body {i}" for i in range(1, len(tables))), PLATFORM]
@@ -263,7 +262,18 @@ def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bod
 
 def _as_joint(loop: FileLoop) -> FileJoint:
     """Return the joint that closes a loop, as the last one of its leg."""
-    return FileJoint(loop.name, loop.kind, *loop.links, loop.frames[0], loop.axis, False, None, {})
+    parent, child = loop.links
+    return FileJoint(
+        name=loop.name,
+        kind=loop.kind,
+        parent=parent,
+        child=child,
+        frame=loop.frames[0],
+        axis=loop.axis,
+        actuated=False,
+        mimics=None,
+        extension={},
+    )
 
 
 def _name(text: str, leg: str) -> str:
@@ -328,8 +338,8 @@ def _single(joint: FileJoint) -> Document:
 
 def _parallelogram(near: FileJoint, far: FileJoint, where: str) -> Document:
     """Return two revolutes of which the second turns back what the first turned."""
-    together = far.mimics == (near.name, MIMIC_RATIO)
-    if not together or float(np.linalg.norm(np.cross(near.axis, far.axis))) > INDEPENDENT_AXES:
+    turns_back = far.mimics == (near.name, MIMIC_RATIO)
+    if not turns_back or float(np.linalg.norm(np.cross(near.axis, far.axis))) > INDEPENDENT_AXES:
         raise InputError(
             f"{where} is followed by {shorten(far.name)}; a joint may only mimic the one before it, with the same axis "
             "and multiplier -1: a parallelogram."
@@ -351,8 +361,8 @@ def _compliance(joint: FileJoint, where: str) -> list[list[float]]:
     """Return the 6x6 of a fixed joint, turned from the axes of the joint to those of the base."""
     entries = np.array(numbers(joint.extension["compliance"], 36, f"{where}: compliance")).reshape(6, 6)
     turn = np.kron(np.eye(2), joint.frame[:3, :3])
-    turned: Array = turn @ entries @ turn.T
-    return [list(row) for row in ((turned + turned.T) / 2.0).tolist()]
+    compliance: Array = turn @ entries @ turn.T
+    return [list(row) for row in ((compliance + compliance.T) / 2.0).tolist()]
 
 
 def _stiffness(joint: FileJoint, key: str) -> float | str:
