@@ -24,7 +24,6 @@ from kinetostat.exchange.c_source import (
     in_comment,
     library_texts,
     listing,
-    note,
     prefix_of,
     with_names,
 )
@@ -35,11 +34,12 @@ from kinetostat.machine.parameters import POSE, values
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_bytes, write_text
 
-MILLIMETRES, DEGREES = 1e3, math.degrees(1.0)
-"""Units of LinuxCNC in SI ones, for lengths and for angles."""
+UNITS_OF_LINUXCNC = {"length": 1e3, "angle": math.degrees(1.0)}
+"""Units of LinuxCNC, mm and deg, in a SI unit."""
 AXES = {"x": "tran.x", "y": "tran.y", "z": "tran.z", "roll": "a", "pitch": "b", "yaw": "c", "angle": "c"}
 """Axes of LinuxCNC for coordinates of poses; others take the first free one of `FREE_AXES`."""
 FREE_AXES = {"length": ("tran.z", "tran.y", "tran.x"), "angle": ("a", "b", "c")}
+"""Axes of LinuxCNC by the kind of a coordinate, those first that most machines move along."""
 EARLIEST = (1980, 1, 1, 0, 0, 0)
 """Date of the files in an archive, so that the same machine gives the same bytes."""
 DESCRIPTIONS = {
@@ -57,6 +57,7 @@ DESCRIPTIONS = {
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 """Words of FMI for systems, and the suffixes of their libraries."""
 PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+"""Words of FMI for processors, by the names that systems give them."""
 
 
 def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
@@ -70,15 +71,14 @@ def write_linuxcnc(analysis: Analysis, path: Path) -> list[Path]:
         InputError: legs of the machine have no closed form, or the name cannot be a name in C.
     """
     functions = functions_of(analysis.machine, (), ())
-    texts = list(library_texts(functions, path).values())
-    header, source = texts[1], texts[0].replace(f'#include "{path.stem}.h"\n', "").replace("#include <math.h>\n", "")
+    source, header = library_texts(functions, path).values()
+    # Both become one file, which has its own #include of the mathematics.
+    source = source.replace(f'#include "{path.stem}.h"\n', "").replace("#include <math.h>\n", "")
     axes = _axes(functions)
-    units = [MILLIMETRES if kind == "length" else DEGREES for kind in functions.kinds]
-    rows = list(enumerate(zip(axes, units, strict=True)))
+    rows = list(enumerate(zip(axes, (UNITS_OF_LINUXCNC[kind] for kind in functions.kinds), strict=True)))
     letters = {axis: axis.removeprefix("tran.").upper() for axis in axes}
-    joints = [MILLIMETRES if actuator.slides else DEGREES for actuator in functions.actuators]
+    joints = [UNITS_OF_LINUXCNC["length" if actuator.slides else "angle"] for actuator in functions.actuators]
     words = {
-        "note": note(functions, "Made by"),
         "name": in_comment(functions.machine.name).replace('"', "'"),
         "axes": listing([f"{letters[a]}: {path}" for a, (path, _) in zip(axes, functions.arguments, strict=True)]),
         "joints": listing([f"{k}: {in_comment(a.name)}, {a.meaning}" for k, a in enumerate(functions.actuators)]),
@@ -115,7 +115,6 @@ def write_mex(
     functions = functions_of(analysis.machine, inputs or (), outputs or ())
     arguments = [f"[{k}]: {in_comment(path)}" for k, path in enumerate(functions.inputs, 1)]
     words = {
-        "note": note(functions, "Made by"),
         "given": listing(arguments),
         "inputs": len(functions.inputs),
         "actuators": len(functions.actuators),
@@ -134,19 +133,19 @@ class ModelVariable:
 
     Attributes:
         name: the name of the variable.
-        unit: SI, or "" where it has none.
+        unit: its SI unit, or "" where it has none.
         start: its values at the start; zeros for a variable that is computed.
-        given: whether it is an input.
-        shape: rows and columns of a matrix; empty for a single number.
         group: the group to which it belongs: the word under which the source code knows where the group begins.
+        is_input: whether it is an input.
+        shape: rows and columns of a matrix, or the size of a vector; empty for a single number.
     """
 
     name: str
     unit: str
     start: tuple[float, ...]
-    given: bool
-    shape: tuple[int, ...]
     group: str
+    is_input: bool = False
+    shape: tuple[int, ...] = ()
 
 
 def write_fmu(
@@ -179,21 +178,24 @@ def write_fmu(
 
 def _variables(functions: MachineFunctions) -> list[ModelVariable]:
     """Return the variables of the model, in the order in which they lie in memory."""
-    known, driven = values(functions.machine), stand(functions.machine)
-    si = {"length": "m", "angle": "rad"}
+    numbers, actuators = values(functions.machine), stand(functions.machine)
+    units = {"length": "m", "angle": "rad"}
 
     def output(name: str, unit: str, group: str, *shape: int) -> ModelVariable:
-        return ModelVariable(name, unit, (0.0,) * math.prod(shape), False, shape, group)
+        return ModelVariable(name, unit, (0.0,) * math.prod(shape), group, shape=shape)
 
-    rows = [ModelVariable("time", "s", (0.0,), False, (), "time")]
+    rows = [ModelVariable("time", "s", (0.0,), "time")]
     rows += [
-        ModelVariable(path, si.get(kind, ""), (float(known[path]),), True, (), "first_input")
+        ModelVariable(path, units.get(kind, ""), (float(numbers[path]),), "first_input", is_input=True)
         for path, kind in functions.arguments
     ]
     if functions.square:
-        rows += [ModelVariable(f"driven.{a.name}", a.unit, (float(a.coordinate),), True, (), "driven") for a in driven]
         rows += [
-            ModelVariable(f"reached.{path.removeprefix(POSE)}", si[kind], (float(known[path]),), False, (), "reached")
+            ModelVariable(f"driven.{a.name}", a.unit, (float(a.coordinate),), "driven", is_input=True)
+            for a in actuators
+        ]
+        rows += [
+            ModelVariable(f"reached.{path.removeprefix(POSE)}", units[kind], (float(numbers[path]),), "reached")
             for path, kind in functions.arguments[: functions.coordinates]
         ]
     rows += [output("K", "", "stiffness", 6, 6), output("C", "", "compliance", 6, 6)]
@@ -207,23 +209,21 @@ def _variables(functions: MachineFunctions) -> list[ModelVariable]:
 
 def _fmi_source(functions: MachineFunctions, variables: Sequence[ModelVariable], statuses: int, token: str) -> str:
     """Return the adapter between the functions of the machine and those of FMI."""
-    places: dict[str, int] = {}
-    first, table = 0, []
+    first_of_group: dict[str, int] = {}
+    table: list[str] = []
     start: list[float] = []
     for variable in variables:
-        places.setdefault(variable.group, first)
-        row = f"{first}, {len(variable.start)}, {int(variable.given)}"
+        first_of_group.setdefault(variable.group, len(start))
+        row = f"{len(start)}, {len(variable.start)}, {int(variable.is_input)}"
         table.append(f"    {{{row}}}, /* {in_comment(variable.name)} */\n")
         start += variable.start
-        first += len(variable.start)
     words = {
-        "note": note(functions, "Made by"),
         "token": token,
         "statuses": statuses,
-        "numbers": first,
+        "numbers": len(start),
         "variables": "".join(table),
         "start": ", ".join(map(repr, start)),
-        **places,
+        **first_of_group,
     }
     return filled_template(functions, "fmi3.c", words)
 
@@ -231,7 +231,7 @@ def _fmi_source(functions: MachineFunctions, variables: Sequence[ModelVariable],
 def _model_description(
     functions: MachineFunctions, stem: str, variables: Sequence[ModelVariable], statuses: Sequence[str], token: str
 ) -> str:
-    """modelDescription.xml: names, units and value references of the variables."""
+    """Return modelDescription.xml: names, units and value references of the variables."""
     units = sorted({variable.unit for variable in variables} - {""})
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -244,17 +244,16 @@ def _model_description(
         "  </UnitDefinitions>",
         "  <ModelVariables>",
     ]
-    for reference, variable in enumerate(variables):
-        lines.append(_variable_line(reference, variable))
+    lines += [_variable_line(reference, variable) for reference, variable in enumerate(variables)]
     references = range(len(variables), len(variables) + len(statuses))
     lines += [
         f'    <Int32 name="{name}" valueReference="{reference}" causality="output" variability="discrete"/>'
         for reference, name in zip(references, statuses, strict=True)
     ]
-    computed = [k for k, variable in enumerate(variables) if not variable.given and k > 0]
+    outputs = [k for k, variable in enumerate(variables) if not variable.is_input and variable.group != "time"]
     lines += ["  </ModelVariables>", "  <ModelStructure>"]
-    lines += [f'    <Output valueReference="{reference}"/>' for reference in [*computed, *references]]
-    lines += [f'    <InitialUnknown valueReference="{reference}"/>' for reference in [*computed, *references]]
+    for element in ("Output", "InitialUnknown"):
+        lines += [f'    <{element} valueReference="{reference}"/>' for reference in [*outputs, *references]]
     return "\n".join([*lines, "  </ModelStructure>", "</fmiModelDescription>", ""])
 
 
@@ -265,7 +264,7 @@ def _variable_line(reference: int, variable: ModelVariable) -> str:
     head = f'    <Float64 name={quoteattr(ascii_units(variable.name))} valueReference="{reference}"{unit}{described}'
     if variable.group == "time":
         return f'{head} causality="independent" variability="continuous"/>'
-    if variable.given:
+    if variable.is_input:
         return f'{head} causality="input" variability="continuous" start="{variable.start[0]!r}"/>'
     sizes = "".join(f'<Dimension start="{size}"/>' for size in variable.shape)
     tail = ' causality="output" variability="continuous"'
@@ -273,7 +272,7 @@ def _variable_line(reference: int, variable: ModelVariable) -> str:
 
 
 def _build_description(stem: str) -> str:
-    """buildDescription.xml: which files an importer compiles where there is no library for its system."""
+    """Return buildDescription.xml: the files that an importer compiles where there is no library for its system."""
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
         f'  <BuildConfiguration modelIdentifier="{prefix_of(stem)}">\n    <SourceFileSet language="C99">\n'

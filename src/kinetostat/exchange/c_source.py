@@ -55,15 +55,23 @@ from kinetostat.units import KINDS
 from kinetostat.vibration.springwise import ModeCounts, SpringSizes
 
 FILE_NAME = re.compile(r"[\w.-]+$", re.ASCII)
+"""Names of files that can become names in C and stand in a make file."""
 TEMPLATES = Path(__file__).with_name("c")
 PLACE = 12
 """Numbers that place the tool: three of T and nine of the columns of Q."""
 STEPS_OF_COMMAND = 30
 """Poses that are tried until the loaded tool is where it should be; a handful are enough where it comes there at
 all."""
-NEARLY_COMMANDED, ASIDE = 1e-6, 1e-4
-"""Correction, rad or in units of the machine's length, below which the rates of the loaded tool are computed if it only
-comes near its pose, and the displacement of the coordinates whose differences they are."""
+NEARLY_COMMANDED = 1e-6
+"""Correction, rad or in units of the machine's length, below which the rates of the loaded tool are computed, as
+differences, if it only comes near its pose."""
+ASIDE = 1e-4
+"""Displacement of the coordinates for these differences, rad or in units of the machine's length: its square is the
+error of central differences."""
+COMMENT_WIDTH = 117
+"""Characters in a line of a comment, as in our own files."""
+LINE_SEARCH = 0.25
+"""Factor by which source.c shortens a step of forward kinematics that does not come nearer, see `forward` there."""
 SWEEPS = 30
 """Sweeps of Jacobi's rotations at most: they converge quadratically, and ten are enough for hundreds of springs."""
 AGREED = 1e-10
@@ -175,7 +183,7 @@ def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
 
 
 def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgram:
-    """Print a body as a function that returns its code; columns after the inputs are the coordinates of a state."""
+    """Print a body as a function that returns its status; columns after the inputs are the coordinates of a state."""
     count = len(functions.inputs)
     names = [f"in[{k}]" if k < count else f"state[{k - count}]" for k in range(len(body.columns))]
     printed = print_graph(body.columns, names, body.results, body.code)
@@ -209,16 +217,16 @@ def filled_template(functions: MachineFunctions, template: str, words: Mapping[s
     }
     _, *pieces = re.split(r"/\* section: (\w+) \*/\n", (TEMPLATES / template).read_text("utf-8"))
     text = "".join(part for name, part in zip(pieces[::2], pieces[1::2], strict=True) if needed[name])
-    return Template(text).substitute(words)
+    return Template(text).substitute({"note": _note(functions, "Made by"), **words})
 
 
-def note(functions: MachineFunctions, made: str) -> str:
+def _note(functions: MachineFunctions, made: str) -> str:
     """Return the comment with which a file begins."""
     return f"/* {in_comment(functions.machine.name)}. {made} kinetostat {version('kinetostat')}; do not edit. */"
 
 
 def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
-    """NAME.c: constants, printed formulas, and the loops around them."""
+    """Return NAME.c: constants, printed formulas, and the loops around them."""
     turning = ", ".join(str(int(kind == "angle")) for kind in functions.kinds)
     sliding = ", ".join(str(int(actuator.slides)) for actuator in functions.actuators)
     constants = [f"static const int IS_ANGLE[MACHINE_INPUTS] = {{{turning}}};"]
@@ -237,7 +245,6 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         numbers |= {"WAYS": sizes.ways, "SPRINGS": sizes.springs, "CONDITIONS": sizes.conditions, "SWEEPS": SWEEPS}
     constants += [f"#define {name} {number!r}" for name, number in numbers.items()]
     words = {
-        "note": note(functions, "Made by"),
         "constants": "\n".join(constants) + "\n",
         "programs": "\n".join(program.text for program in programs),
         "rest_first": "\n    ".join(_state_lines(functions)),
@@ -247,7 +254,7 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
 
 
 def _state_lines(functions: MachineFunctions) -> list[str]:
-    """Lines of C that find the state of which quantities are: of rest, then modes in the order of their columns."""
+    """Return lines of C that find the state of which quantities are: of rest, then modes in the order of columns."""
     counts = functions.mode_counts or ModeCounts()
     modes = counts.loaded + counts.factor + counts.free
     if not (functions.needs_state or modes):
@@ -270,9 +277,9 @@ def _state_lines(functions: MachineFunctions) -> list[str]:
 
 
 def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
-    """NAME.h: what the functions take and give, with units, and the work that they do at most."""
+    """Return NAME.h: arguments and results of the functions, with units, and the work that they do at most."""
     work = {program.name: program.operations for program in programs}
-    trials = 1 + math.ceil(math.log(SHORTEST_SHARE) / math.log(0.25))
+    trials = 1 + math.ceil(math.log(SHORTEST_SHARE) / math.log(LINE_SEARCH))
     work["forward"] = STEPS_FORWARD * (work["actuator_slopes_at"] + trials * work["actuators_at"])
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]
@@ -287,7 +294,6 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
     sizes = (len(functions.inputs), functions.coordinates, len(functions.actuators), len(functions.quantities))
     names = ("INPUTS", "COORDINATES", "ACTUATORS", "QUANTITIES")
     words: dict[str, object] = {
-        "note": note(functions, "Made by"),
         "sizes": ", ".join(f"MACHINE_{name} = {size}" for name, size in zip(names, sizes, strict=True)),
         "statuses": ",\n    ".join(f"MACHINE_{status.name} = {int(status)}" for status in Status),
         "sentences": "\n".join(_wrap(f"{status.name}: {status.sentence}") for status in Status),
@@ -300,7 +306,7 @@ def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
 
 
 def _operations_before(functions: MachineFunctions, work: Mapping[str, int]) -> int:
-    """Operations at most that find the state of rest and the modes of which quantities are: see `_state_lines`."""
+    """Return the most operations that find the state of rest and the modes of which quantities are: `_state_lines`."""
     counts = functions.mode_counts or ModeCounts()
     result = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] if functions.needs_state else 0
     solved = {"springs_at": (counts.free,), "springs_at_rest_at": (counts.loaded, counts.factor)}
@@ -329,7 +335,7 @@ def listing(rows: Sequence[str]) -> str:
 
 
 def _wrap(text: str) -> str:
-    return fill(text, 117, initial_indent="   ", subsequent_indent="     ")
+    return fill(text, COMMENT_WIDTH, initial_indent="   ", subsequent_indent="     ")
 
 
 def ascii_units(text: str) -> str:
@@ -340,10 +346,10 @@ def ascii_units(text: str) -> str:
 
 
 def _test(functions: MachineFunctions) -> str:
-    """NAME_test.c: poses, and what Python computes there one by one, without the printed formulas."""
+    """Return NAME_test.c: poses, and what Python computes there one by one, without the printed formulas."""
     columns = sample_points(functions)
-    count, scale = len(next(iter(columns.values()))), 1.0
     rows = np.array(list(columns.values())).T
+    count, command_scale = len(rows), 1.0
     machines = [with_values(functions.machine, dict(zip(functions.inputs, row.tolist(), strict=True))) for row in rows]
     responses = [respond(machine) for machine in machines]
     matrices = [[*np.ravel(r.stiffness.rows()), *np.ravel(r.compliance.rows())] for r in responses]
@@ -351,30 +357,30 @@ def _test(functions: MachineFunctions) -> str:
     blocks["COORDINATES"] = np.array([[a.coordinate for a in stand(machine)] for machine in machines], dtype=float)
     if functions.rests:
         blocks["DISPLACEMENT"] = quantities_at(functions, columns, DISPLACEMENTS)
-        targets = _targets(functions, columns, count)
-        blocks["COMMAND"] = targets[0]
-        scale = max(1.0, targets[1] / AGREED)
+        blocks["COMMAND"], command_difference = _targets(functions, columns, count)
+        command_scale = max(1.0, command_difference / AGREED)
     if functions.quantities:
         blocks["QUANTITIES"] = quantities_at(functions, columns, functions.quantities)
         points = PointTable(columns)
-        sloped = evaluate_gradient(functions.machine, points, functions.quantities, functions.inputs).gradients
-        blocks["SLOPES"] = np.moveaxis(sloped, 2, 0).reshape(count, -1)
+        gradients = evaluate_gradient(functions.machine, points, functions.quantities, functions.inputs).gradients
+        blocks["SLOPES"] = np.moveaxis(gradients, 2, 0).reshape(count, -1)
     arrays = [_array("POSES", rows), *(_array(f"REFERENCE_{name}", block) for name, block in blocks.items())]
     words = {
-        "note": note(functions, "Test of the functions, made by"),
+        "note": _note(functions, "Test of the functions, made by"),
         "arrays": "\n".join(arrays),
         "agreed": AGREED,
-        "command_scale": scale,
+        "command_scale": command_scale,
         "rows": count,
     }
     return filled_template(functions, "test.c", words)
 
 
 def _targets(functions: MachineFunctions, columns: dict[str, Array], count: int) -> tuple[Array, float]:
-    """Coordinates of the actuators of the loaded machine [n x actuators], and by how much commands may differ.
+    """Return coordinates of the actuators of the loaded machine [n x actuators], and the difference that is allowed.
 
-    NaN where it comes to no rest. The stiffness of a parallelogram depends on the pose, which C takes where the loaded
-    machine is commanded to, and Python where it shall be: they differ by the square of the correction.
+    NaN where it comes to no rest. The stiffness of a parallelogram depends on the pose: C takes it at the pose to which
+    the loaded machine is commanded, Python at the pose where it shall be. Commands of both differ by the square of the
+    correction.
     """
     try:
         targets = actuator_targets(functions.machine, columns, count)
