@@ -36,9 +36,15 @@ LONGEST_STRIDE = 1.5
 """Change of an unknown in one step, rad or in units of the machine's length, up to which it is tried."""
 CAREFUL_STRIDE = 0.1
 """Such a change where a way has led to another assembly mode."""
-GROWTH, SHRINKAGE = (0.5, 4.0), (0.1, 0.5)
-"""Factors between which the next step may lie, after a step that was accepted and after one that was not. It is a
-little shorter than the last one's errors allow, 0.9 and 0.7 of that, because the next one's will differ."""
+GROWTH = (0.5, 4.0)
+"""Least and greatest factor from a step that was accepted to the next one."""
+SHRINKAGE = (0.1, 0.5)
+"""Least and greatest factor from a step that was not accepted to the next one."""
+CAUTION_AFTER_SUCCESS, CAUTION_AFTER_FAILURE = 0.9, 0.7
+"""Shares of the length that the last step's errors allow: a little less, because the next one's will differ, and less
+again where the estimate has just been wrong."""
+LEAST_STEADY_FACTOR = 0.25
+"""Least factor of a step that the contraction of its correction may ask for: beyond it, its error is a poor measure."""
 MOST_TANGENT_ERROR = 0.1
 """Error of the tangent, in the same units, up to which a step is accepted: less than branches usually lie apart."""
 STEP_CONTRACTION = 0.55
@@ -49,11 +55,14 @@ MOST_STEPS_AT_GOAL = 60
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
 STIFFENING = 1e-2
-"""Added to the curvature at first, for unknowns that change nothing there."""
+"""Curvature that is added at first, for unknowns that change nothing there: a hundredth of that of a joint that turns
+the end of its leg."""
 LONGEST_DESCENT = 0.3
 """Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
-ASIDE = 1e-2
-"""Displacement of the unknowns from which these steps start, rad or in units of the machine's length."""
+START_SHIFT = 1e-2
+"""Displacement of the unknowns from which these steps start, in the same units: enough to leave a greatest gap."""
+SHORTER_DESCENT = 0.25
+"""Factor by which such a step becomes shorter that has not lessened the gap."""
 
 BALL_AXES = 3
 """Revolutes of a ball joint."""
@@ -101,9 +110,9 @@ def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, M
     return unknowns, solved
 
 
-def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -> tuple[Array, Mask, Mask]:
+def _strides(problems: Problems, way: Way, goal: Coordinates, longest: float) -> tuple[Array, Mask, Mask]:
     """Follow solutions along a way; return where they end, whether at the goal in the same mode, or in another one."""
-    unknowns, arrived = _along(problems, way, furthest)
+    unknowns, arrived = _along(problems, way, longest)
     solved, crossed = np.zeros((2, len(unknowns)), dtype=bool)
     ended = np.flatnonzero(arrived)
     if ended.size:
@@ -118,8 +127,12 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
     return unknowns, solved, crossed
 
 
-def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
-    """Go along a way as far as it is open: with how far one comes at the goal, or short of it."""
+def _along(problems: Problems, way: Way, longest: float) -> tuple[Array, Mask]:
+    """Go along a way as far as it is open, in steps that change no unknown by more than `longest`.
+
+    Returns:
+        The unknowns at the end [problems x unknowns], and whether that is the goal [problems].
+    """
     count = len(problems.poses)
     unknowns, done, stride = np.zeros((count, problems.size)), np.zeros(count), np.ones(count)
     for _ in range(MOST_TRIALS):
@@ -131,36 +144,39 @@ def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
         shares = np.ones(count)
         shares[items] = next_share
         part, target = problems.subset(items), coordinates_at(way(shares), items)
-        moved, could_grow, accepted = _step(part, unknowns[items], target, furthest)
-        unknowns[items[accepted]], done[items[accepted]] = moved[accepted], next_share[accepted]
-        stride[items] *= np.where(accepted, np.clip(0.9 * could_grow, *GROWTH), np.clip(0.7 * could_grow, *SHRINKAGE))
+        end, allowed_factor, accepted = _step(part, unknowns[items], target, longest)
+        unknowns[items[accepted]], done[items[accepted]] = end[accepted], next_share[accepted]
+        longer = np.clip(CAUTION_AFTER_SUCCESS * allowed_factor, *GROWTH)
+        shorter = np.clip(CAUTION_AFTER_FAILURE * allowed_factor, *SHRINKAGE)
+        stride[items] *= np.where(accepted, longer, shorter)
     return unknowns, done == 1.0
 
 
-def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: float) -> tuple[Array, Array, Mask]:
+def _step(problems: Problems, unknowns: Array, target: Coordinates, longest: float) -> tuple[Array, Array, Mask]:
     """Step to a target: along the tangent, and once more by Newton's method.
 
     Returns:
-        Where that leads, by which factor the step could be longer, and whether it is accepted.
+        The unknowns after the step, the factor by which it could be longer, and whether it is accepted.
     """
-    left, rates = problems.gaps(unknowns, target)
-    tangent = least_norm(rates, left)
-    first = largest(tangent)
-    moved, longer = unknowns.copy(), furthest / np.maximum(first, LEAST_DIVISOR)
-    accepted = longer >= 1.0
+    gaps, rates = problems.gaps(unknowns, target)
+    tangent = least_norm(rates, gaps)
+    tangent_size = largest(tangent)
+    end, factor = unknowns.copy(), longest / np.maximum(tangent_size, LEAST_DIVISOR)
+    accepted = factor >= 1.0
     tried = np.flatnonzero(accepted)
     if tried.size:
         part, start = problems.subset(tried), unknowns[tried] + tangent[tried]
         correction = least_norm(*part.gaps(start, coordinates_at(target, tried))[::-1])
-        size = largest(correction)
-        close = (size <= STEP_CONTRACTION * first[tried]) | (size <= NO_CONTRACTION)
-        accepted[tried] = close & (size <= MOST_TANGENT_ERROR)
-        moved[tried] = start + correction
+        error = largest(correction)
+        contracts = (error <= STEP_CONTRACTION * tangent_size[tried]) | (error <= NO_CONTRACTION)
+        accepted[tried] = contracts & (error <= MOST_TANGENT_ERROR)
+        end[tried] = start + correction
         # The error of the tangent grows as the square of the step, the contraction as the step itself.
-        allowed = np.sqrt(MOST_TANGENT_ERROR / np.maximum(size, LEAST_DIVISOR))
-        steady = np.maximum(STEP_CONTRACTION * first[tried] / np.maximum(size, NO_CONTRACTION), 0.25)
-        longer[tried] = np.minimum(np.minimum(allowed, longer[tried]), steady)
-    return moved, np.where(np.isfinite(longer), longer, 0.0), accepted
+        by_error = np.sqrt(MOST_TANGENT_ERROR / np.maximum(error, LEAST_DIVISOR))
+        by_contraction = STEP_CONTRACTION * tangent_size[tried] / np.maximum(error, NO_CONTRACTION)
+        by_contraction = np.maximum(by_contraction, LEAST_STEADY_FACTOR)
+        factor[tried] = np.minimum(np.minimum(by_error, factor[tried]), by_contraction)
+    return end, np.where(np.isfinite(factor), factor, 0.0), accepted
 
 
 def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Mask]:
@@ -172,32 +188,29 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         The unknowns there, and whether that is shown to be a least distance which is not zero.
     """
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
-    best, shown = unknowns + ASIDE * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
+    best, shown = unknowns + START_SHIFT * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
-    left, rates, distance = problems.gaps_and_distance(best, goal)
-    slope = np.einsum("nrc,nr->nc", rates, left)
+    gaps, rates, distance = problems.gaps_and_distance(best, goal)
+    slope = np.einsum("nrc,nr->nc", rates, gaps)
     inverse = np.linalg.inv(np.einsum("nrc,nrd->ncd", rates, rates) + STIFFENING * np.eye(problems.size))
     for _ in range(MOST_DESCENTS):
-        still = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
-        apart = (distance > CLOSED * CLOSED) & np.isfinite(distance)
-        shown[items[still & apart]] = True
-        go = ~still & apart
-        items, share, slope, distance, inverse = items[go], share[go], slope[go], distance[go], inverse[go]
+        settled = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
+        is_open = (distance > CLOSED * CLOSED) & np.isfinite(distance)
+        shown[items[settled & is_open]] = True
+        rest = ~settled & is_open
+        items, share, slope, distance, inverse = items[rest], share[rest], slope[rest], distance[rest], inverse[rest]
         if not items.size:
             break
         step = np.einsum("ncd,nd->nc", inverse, slope)
         step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), LEAST_DIVISOR)))[:, None]
-        moved = best[items] + step
-        left, rates, distance_there = problems.subset(items).gaps_and_distance(moved, coordinates_at(goal, items))
-        slope_there = np.einsum("nrc,nr->nc", rates, left)
-        better = distance_there < distance
-        inverse[better] = _updated_inverse(inverse[better], step[better], slope[better] - slope_there[better])
-        best[items[better]], slope[better], distance[better] = (
-            moved[better],
-            slope_there[better],
-            distance_there[better],
-        )
-        share = np.where(better, 1.0, 0.25 * share)
+        end = best[items] + step
+        gaps, rates, end_distance = problems.subset(items).gaps_and_distance(end, coordinates_at(goal, items))
+        end_slope = np.einsum("nrc,nr->nc", rates, gaps)
+        better = end_distance < distance
+        inverse[better] = _updated_inverse(inverse[better], step[better], slope[better] - end_slope[better])
+        best[items[better]] = end[better]
+        slope[better], distance[better] = end_slope[better], end_distance[better]
+        share = np.where(better, 1.0, SHORTER_DESCENT * share)
     return best, shown
 
 

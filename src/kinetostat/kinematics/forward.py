@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Mask
 from kinetostat.frozen import dataclass
@@ -37,9 +38,11 @@ MOST_DAMPED_STEPS = 60
 """Number of steps of damped least squares: a start that has not arrived by then is in no solution's reach."""
 CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
-STRIDE, MOST_STRIDES = 0.05, 400
-"""Motion of the actuators at a time on the way from the pose of the machine, rad or in units of its length, and the
-number of steps at most."""
+STRIDE = 0.05
+"""Motion of the actuators in one step on the way from the pose of the machine, rad or in units of its length: from one
+step to the next, Newton's method stays with the solution."""
+MOST_STRIDES = 400
+"""Most steps of a way, which are some three turns; a longer way is gone in longer steps."""
 LEAP = 0.5
 """Change of an unknown in one of these steps that shows a jump to another solution."""
 
@@ -72,7 +75,7 @@ class System(Protocol):
     """Equations whose solutions are assembly modes; unknowns are in rad and in units of the machine's length."""
 
     length: float
-    here: Array
+    start: Array
     actuators: Sequence[Actuator]
 
     def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
@@ -104,7 +107,7 @@ class ByPose:
 
     Attributes:
         length: length of the machine, m.
-        here: the unknowns at its pose.
+        start: the unknowns at its pose.
         actuators: coordinates of the actuators there.
     """
 
@@ -116,25 +119,24 @@ class ByPose:
         self.actuators: Sequence[Actuator] = actuators_of(configuration)
         self.slides = np.array([actuator.slides for actuator in self.actuators], dtype=bool)
         given = values(machine)
-        self.here = np.array([float(given[path]) for path in self.kinds]) / self.units
+        self.start = np.array([float(given[path]) for path in self.kinds]) / self.units
 
     def _with_unknowns(self, unknowns: Array) -> Machine:
         return with_values(self.machine, dict(zip(self.kinds, (unknowns * self.units).T, strict=True)))
 
-    def _off(self, unknowns: Array, goal: Array) -> Array:
+    def _missing(self, unknowns: Array, goal: Array) -> Array:
         """Coordinates that the actuators lack [n x actuators]; NaN where a leg does not reach."""
-        measured = actuators_of(self._with_unknowns(unknowns).configure())
-        off = goal - stacked_columns([actuator.coordinate for actuator in measured], len(unknowns))
-        return np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
+        actuators = actuators_of(self._with_unknowns(unknowns).configure())
+        return _differences(self, goal, [actuator.coordinate for actuator in actuators], len(unknowns))
 
     def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
         count, size = unknowns.shape
         ways = CENTRAL_DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
         goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(ways), axis=0)
-        off = self._off((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
-        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * CENTRAL_DIFFERENCE)
-        return off[:, 0], np.swapaxes(rates, 1, 2)
+        missing = self._missing((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
+        rates = (missing[:, size + 1 :] - missing[:, 1 : size + 1]) / (2.0 * CENTRAL_DIFFERENCE)
+        return missing[:, 0], np.swapaxes(rates, 1, 2)
 
     def placements(self, unknowns: Array, _goal: Array) -> list[Displacement]:
         """See `System` [n x unknowns]."""
@@ -148,15 +150,15 @@ class ByPose:
         for path in (path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"):
             result[path] = np.arctan2(np.sin(result[path]), np.cos(result[path]))
         if set(ANGLES) <= result.keys():
-            turned = pose_of(self._with_unknowns(unknowns).configure().platform)
-            result |= {name: np.broadcast_to(turned[name], (len(unknowns),)) for name in ANGLES}
+            pose = pose_of(self._with_unknowns(unknowns).configure().platform)
+            result |= {name: np.broadcast_to(pose[name], (len(unknowns),)) for name in ANGLES}
         return result
 
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
         """See `System` [unknowns]."""
         (placement,) = self.placements(unknowns[None], goal)
         pose = {name: float(entry[0]) for name, entry in self.poses(unknowns[None], goal).items()}
-        return AssemblyMode(pose, placement, float(np.abs(self._off(unknowns[None], goal)).max(initial=0.0)))
+        return AssemblyMode(pose, placement, float(np.abs(self._missing(unknowns[None], goal)).max(initial=0.0)))
 
     def by_pose(self, poses: Sequence[Mapping[str, float]], _goal: Array) -> list[bool]:
         """See `System`, [actuators]: there is one assembly mode of the legs for each pose."""
@@ -164,7 +166,7 @@ class ByPose:
 
     def drift(self) -> Array:
         """See `System` [6 x unknowns]: no coordinate of a pose leaves the platform where it is."""
-        return np.eye(self.here.size)
+        return np.eye(self.start.size)
 
 
 class LegByLeg:
@@ -172,7 +174,7 @@ class LegByLeg:
 
     Attributes:
         length: length of the machine, m.
-        here: the unknowns at its pose, or at its home pose where the legs cannot close.
+        start: the unknowns at its pose, or at its home pose where the legs cannot close.
         actuators: coordinates of the actuators there.
     """
 
@@ -188,7 +190,7 @@ class LegByLeg:
         closes = int(joints.status) in (Status.OK, Status.SINGULAR)
         self.joints = np.array(joints.coordinates if closes else [0.0] * self.chains.size, dtype=float)
         self.actuators: Sequence[Actuator] = [actuator.at(self.joints.tolist()) for actuator in self.driven]
-        self.here = self.joints[self.free] / self.units
+        self.start = self.joints[self.free] / self.units
 
     def _whole(self, unknowns: Array, goal: Array) -> Array:
         """All joint coordinates, m and rad [n x coordinates]."""
@@ -227,15 +229,20 @@ class LegByLeg:
         columns = {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in self.chains.pose}
         solved = closure.solve_joints(with_values(self.machine, columns))
         amounts = [actuator.at(solved.coordinates).coordinate for actuator in self.driven]
-        off = goal - stacked_columns(amounts, len(poses))
-        off = np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
-        close = np.abs(off).max(axis=1, initial=0.0) < ONE_PLACEMENT
+        missing = _differences(self, goal, amounts, len(poses))
+        close = np.abs(missing).max(axis=1, initial=0.0) < ONE_PLACEMENT
         return [bool(same) for same in close & (np.asarray(solved.status) == Status.OK)]
 
     def drift(self) -> Array:
         """See `System` [6 x unknowns]."""
         gaps = gaps_at(self.chains, self.joints[None])
         return np.asarray(gaps.platform_rates[0][:, self.free])
+
+
+def _differences(system: ByPose | LegByLeg, goal: Array, coordinates: Sequence[Scalar], count: int) -> Array:
+    """Differences of actuators from their goals, in units of the length or within half a turn, rad [n x actuators]."""
+    missing = goal - stacked_columns(coordinates, count)
+    return np.where(system.slides, missing / system.length, np.arctan2(np.sin(missing), np.cos(missing)))
 
 
 def leg_names(machine: Machine) -> list[str]:
@@ -264,7 +271,7 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
 def undriven(system: System) -> bool:
     """Whether the platform can move at the pose of the machine while all actuators stand still."""
     goal = np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
-    rates = system.residuals(system.here[None], goal)[1][0]
+    rates = system.residuals(system.start[None], goal)[1][0]
     size, full = rates.shape[1], np.isfinite(rates).all()
     if not full or size == 0:
         return False
@@ -280,26 +287,26 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
     Args:
         system: the equations of the machine.
         goal: coordinates of its actuators [actuators], m and rad.
-        starts: how many there are beside the pose itself.
-        spread: how far from it they lie at most, rad and in units of the machine's length.
+        starts: number of random starts beside the pose itself.
+        spread: their greatest distance from it, rad and in units of the machine's length.
 
     Returns:
         Each mode once, the present one first, then in the order of their distance from the pose of the machine.
     """
-    around = np.random.default_rng(0).uniform(-spread, spread, (starts, system.here.size))
+    shifts = np.random.default_rng(0).uniform(-spread, spread, (starts, system.start.size))
     with np.errstate(all="ignore"):
         ends, arrived = _ends_of_ways(system, goal[None])
-        first = [*ends[arrived], system.here]
-        unknowns, largest = _solutions(system, np.concatenate([first, system.here + around]), goal)
-    sound = unknowns[largest < CLOSED]
-    places = system.placements(sound, goal)
-    (here,) = system.placements(system.here[None], _coordinates(system))
-    order = np.argsort([squared_distance(place, here, system.length) for place in places], kind="stable")
+        first = [*ends[arrived], system.start]
+        unknowns, largest = _solutions(system, np.concatenate([first, system.start + shifts]), goal)
+    solutions = unknowns[largest < CLOSED]
+    places = system.placements(solutions, goal)
+    (present,) = system.placements(system.start[None], _coordinates(system))
+    order = np.argsort([squared_distance(place, present, system.length) for place in places], kind="stable")
     kept = [0] if arrived[0] else []
     for i in order.tolist():
         if all(squared_distance(places[i], places[k], system.length) > ONE_PLACEMENT**2 for k in kept):
             kept.append(i)
-    modes = [system.mode(sound[i], goal) for i in kept]
+    modes = [system.mode(solutions[i], goal) for i in kept]
     kinds = zip(modes, system.by_pose([mode.pose for mode in modes], goal) if modes else [], strict=True)
     return [replace(mode, present=bool(arrived[0]) and i == 0, by_pose=by) for i, (mode, by) in enumerate(kinds)]
 
@@ -325,7 +332,7 @@ def poses_at(system: System, goals: Array) -> tuple[dict[str, Array], Mask]:
         unknowns, arrived = _ends_of_ways(system, goals)
         lost = np.flatnonzero(~arrived)
         if lost.size:
-            unknowns[lost], largest = _solutions(system, np.tile(system.here, (len(lost), 1)), goals[lost])
+            unknowns[lost], largest = _solutions(system, np.tile(system.start, (len(lost), 1)), goals[lost])
             arrived[lost] = largest < CLOSED
         return system.poses(unknowns, goals), arrived
 
@@ -336,24 +343,25 @@ def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
     Returns:
         The unknowns it comes to [n x unknowns], and whether it does without passing a singularity [n].
     """
-    start, at = _coordinates(system), np.tile(system.here, (len(goals), 1))
+    start, unknowns = _coordinates(system), np.tile(system.start, (len(goals), 1))
     scale = np.array([system.length if actuator.slides else 1.0 for actuator in system.actuators])
     sound = np.asarray(np.isfinite(goals - start).all(axis=1))
     way = np.where(sound[:, None], goals - start, 0.0)
     steps = int(np.clip(np.ceil(np.abs(way / scale).max(initial=0.0) / STRIDE), 1, MOST_STRIDES))
-    hand = np.zeros(len(goals))
+    last_signs = np.zeros(len(goals))
     for step in range(steps + 1):
         rows = np.flatnonzero(sound)
         if not rows.size:
             break
         target = start + way[rows] * (step / steps)
-        unknowns, largest = _solutions(system, at[rows], target, NEWTON_SETTLED if step == steps else CLOSED)
-        rates = system.residuals(unknowns, target)[1]
-        turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
-        leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
-        sound[rows] = (largest <= CLOSED) & (leap <= LEAP) & ~(turn * hand[rows] < 0.0)
-        at[rows], hand[rows] = unknowns, turn
-    return at, sound
+        solution, largest = _solutions(system, unknowns[rows], target, NEWTON_SETTLED if step == steps else CLOSED)
+        rates = system.residuals(solution, target)[1]
+        # The determinant changes its sign at a singularity.
+        signs = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
+        change = np.abs(solution - unknowns[rows]).max(axis=1, initial=0.0)
+        sound[rows] = (largest <= CLOSED) & (change <= LEAP) & ~(signs * last_signs[rows] < 0.0)
+        unknowns[rows], last_signs[rows] = solution, signs
+    return unknowns, sound
 
 
 def _solutions(

@@ -22,7 +22,7 @@ from kinetostat.machine.machine import Configuration
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, ROUND_OFF_OF_ELEMENT
 
 SOFTEST = 1e12
-"""Factor on compliances beyond which an element counts as not there."""
+"""Factor on compliances beyond which an element counts as not there: its share of any stiffness is then round-off."""
 LINKS_TOGETHER = "links together"
 """Name of all elements but the actuators, as one."""
 SECANTS = 12
@@ -129,7 +129,7 @@ def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[
 
 
 def rigid_from(response: Response, element: Element, excess: float) -> Array:
-    """By which factor the compliances of an element may be multiplied so that it only just counts as rigid.
+    """Factor by which the compliances of an element may be multiplied so that it only just counts as rigid.
 
     That is where an entry of the diagonal of C exceeds the one with the element rigid by the share `excess` of it. C is
     affine in compliances where the machine is isostatic; otherwise it is solved for. 0 where nothing else deflects,
@@ -190,22 +190,22 @@ def _factor_for(response: Response, element: Element, rest: Array, excess: Array
     Secants of 1/excess over 1/factor: a line where one internal load is undecided, concave where there are several.
     """
 
-    def more(factor: Array) -> Array:
-        grown = enumerate(diagonal_with(response, element, factor))
-        return np.stack([np.broadcast_to(entry, rest.shape)[i] for i, entry in grown]) - rest
+    def excess_with(factor: Array) -> Array:
+        entries = diagonal_with(response, element, factor)
+        return np.stack([np.broadcast_to(entry, rest.shape)[i] for i, entry in enumerate(entries)]) - rest
 
-    aim = 1.0 / excess
-    present = more(np.ones_like(rest))
-    before = present / excess
-    then = 1.0 / more(1.0 / before)
-    here = before * aim / then
+    # The unknown x is 1/factor, and y(x) = 1/excess shall be `wanted`; at x = 1 is the present machine.
+    wanted = 1.0 / excess
+    x_before = excess_with(np.ones_like(rest)) / excess
+    y_before = 1.0 / excess_with(1.0 / x_before)
+    x = x_before * wanted / y_before
     for _ in range(SECANTS):
-        now = 1.0 / more(1.0 / here)
-        steep = (now - then) / (here - before)
-        step = np.where(np.isfinite(steep) & (steep > 0.0), (aim - now) / steep, 0.0)
-        last = not (np.abs(step) > SETTLED * here).any()
-        before, then, here = here, now, np.where(here + step > 0.0, here + step, 0.5 * here)
-        if last:
+        y = 1.0 / excess_with(1.0 / x)
+        slope = (y - y_before) / (x - x_before)
+        step = np.where(np.isfinite(slope) & (slope > 0.0), (wanted - y) / slope, 0.0)
+        settled = not (np.abs(step) > SETTLED * x).any()
+        x_before, y_before, x = x, y, np.where(x + step > 0.0, x + step, 0.5 * x)
+        if settled:
             break
-    never = more(np.full_like(rest, SOFTEST)) <= excess
-    return np.where(rest > 0.0, np.where(never, math.inf, 1.0 / here), 0.0)
+    never = excess_with(np.full_like(rest, SOFTEST)) <= excess
+    return np.where(rest > 0.0, np.where(never, math.inf, 1.0 / x), 0.0)

@@ -62,31 +62,31 @@ def greatest_stiffness(response: Response, block: Sequence[int]) -> Scalar:
 
 def _greatest(matrix: Symmetric6, response: Response, block: Sequence[int]) -> Scalar:
     """Greatest eigenvalue of a block; infinite where an entry is."""
-    there = [i for i in components(response) if i in block]
-    greatest = greatest_eigenvalue([[matrix.entry(i, j) for j in there] for i in there])
-    return where(total([matrix.entry(i, i) for i in there]) < math.inf, greatest, math.inf)
+    rows = [i for i in components(response) if i in block]
+    greatest = greatest_eigenvalue([[matrix.entry(i, j) for j in rows] for i in rows])
+    return where(total([matrix.entry(i, i) for i in rows]) < math.inf, greatest, math.inf)
 
 
 def frobenius_condition(response: Response) -> Scalar:
     """Condition of K in the Frobenius norm: |D K D| |D^-1 C D^-1| / n, D = diag(1/L for rotations, 1 for translations).
 
     It is 1 where K is the same in all directions, else greater, and unlike the ratio of eigenvalues it is smooth. L is
-    the machine's characteristic length. Infinite where something is rigid or free
-    while other parts deflect, NaN where everything is rigid, or everything free.
+    the machine's characteristic length. Infinite where something is rigid or free while other parts deflect, NaN where
+    everything is rigid, or everything free.
 
     Source: Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8 (there of a Jacobian).
     """
-    length, there = response.configuration.length, components(response)
-    stiff = _squares(response.stiffness, reciprocal(length), there)
-    soft = _squares(response.compliance, length, there)
+    length, rows = response.configuration.length, components(response)
+    stiff = _squares(response.stiffness, reciprocal(length), rows)
+    soft = _squares(response.compliance, length, rows)
     if is_zero(stiff) or is_zero(soft):  # all is rigid, or all free: infinity times zero
         return math.nan
-    return sqrt(stiff) * sqrt(soft) * (1.0 / len(there))
+    return sqrt(stiff) * sqrt(soft) * (1.0 / len(rows))
 
 
-def _squares(matrix: Symmetric6, arm: Scalar, there: Sequence[int]) -> Scalar:
+def _squares(matrix: Symmetric6, arm: Scalar, rows: Sequence[int]) -> Scalar:
     """Sum of the squares of a matrix whose rotational rows and columns are multiplied by a length or its reciprocal."""
-    scaled = [[_times_power(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
+    scaled = [[_times_power(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in rows] for i in rows]
     return total([entry * entry for row in scaled for entry in row])
 
 
@@ -135,8 +135,8 @@ def reversal_error(response: Response, row: int) -> Scalar:
         return math.nan
     pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
     twists = [twist for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
-    moved = zip(twists, response.drives, strict=True)
-    lost = [abs(twist.components()[row]) * drive.lost_motion for twist, drive in moved]
+    by_drive = zip(twists, response.drives, strict=True)
+    lost = [abs(twist.components()[row]) * drive.lost_motion for twist, drive in by_drive]
     return total([*lost, response.lost_motion_of_joints[row]])
 
 

@@ -147,8 +147,8 @@ class Face:
     """A pair of parallel faces of a set of wrenches: lower <= normal . w <= upper.
 
     Attributes:
-        normal: a twist, base axes, at the tool point; of no certain size.
-        lower, upper: W, infinite where nothing bounds the set.
+        normal: a twist of any size, base axes, at the tool point.
+        lower, upper: bounds of its power with a wrench of the set, W; infinite where nothing bounds the set.
         drives: numbers of the drives that are at their bounds there.
     """
 
@@ -164,7 +164,7 @@ class Face:
 
 
 def wrench_faces(
-    given: Transmission, bounds: Sequence[tuple[Scalar, Scalar]], carried: Sequence[Scalar] = ()
+    drives: Transmission, bounds: Sequence[tuple[Scalar, Scalar]], carried: Sequence[Scalar] = ()
 ) -> list[Face]:
     """Return all faces of the set of wrenches that the drives hold; degenerate ones have a normal of zero.
 
@@ -173,7 +173,7 @@ def wrench_faces(
     than its bounds allow (Farkas' lemma), and mixes of the fewest drives, r + 1 of them, say it all.
 
     Args:
-        given: how drives and platform act on each other.
+        drives: the way in which drives and platform act on each other.
         bounds: least and greatest load of each drive, N or N·m.
         carried: what each drive carries already, e.g. by the weight; nothing if empty.
 
@@ -181,14 +181,14 @@ def wrench_faces(
     """
     carried = list(carried) or [0.0] * len(bounds)
     faces = []
-    for mix in _circuits(given):
+    for mix in _circuits(drives):
         lower, upper, normal = 0.0, 0.0, Twist(ZERO, ZERO)
         for drive, amount in mix:
             low, high = bounds[drive]
             ends = _times(amount, low), _times(amount, high)
             before = amount * carried[drive]
             lower, upper = lower + smaller(*ends) - before, upper + larger(*ends) - before
-            normal = normal + given.shares[drive] * amount
+            normal = normal + drives.shares[drive] * amount
         faces.append(Face(normal, lower, upper, tuple(drive for drive, _ in mix)))
     return faces
 
@@ -200,27 +200,20 @@ def _times(amount: Scalar, bound: Scalar) -> Scalar:
     return where(amount > 0.0, bound, where(amount < 0.0, -bound, 0.0))
 
 
-def _circuits(given: Transmission) -> list[list[tuple[int, Scalar]]]:
+def _circuits(drives: Transmission) -> list[list[tuple[int, Scalar]]]:
     """The mixes of fewest drives which no internal load enters: drives with their amounts.
 
-    Internal loads that load no drive, to round-off, are put beside the drives as unknowns of their own: mixes then
-    leave them out, and every other choice of drives is counted as degenerate.
+    The amounts of a mix are minors of the matrix of internal loads, with a row for each drive: the determinants that
+    remain when one of the mix's rows is left out, with alternating signs (Cramer's rule).
     """
-    drives, degree = len(given.shares), len(given.internal[0]) if given.internal else 0
+    count, degree = len(drives.shares), len(drives.internal[0]) if drives.internal else 0
     if degree == 0:
-        return [[(drive, 1.0)] for drive in range(drives)]
-    rows = [list(row) for row in given.internal]
-    if given.doubtful:
-        columns = [list(column) for column in zip(*rows, strict=True)]
-        modes = conjugate(columns, [1.0] * drives, [1.0] * drives)
-        sizes = [sqrt(inverse) for inverse in modes.inverses]
-        rows = [[column[i] * size for column, size in zip(modes.columns, sizes, strict=True)] for i in range(drives)]
-        for k, inverse in enumerate(modes.inverses):
-            rows.append([where(inverse > 0.0, 0.0, 1.0) if j == k else 0.0 for j in range(degree)])
+        return [[(drive, 1.0)] for drive in range(count)]
+    rows = _rows_of_internal_loads(drives)
 
     @cache
     def minor(chosen: tuple[int, ...]) -> Scalar:
-        """That of some rows in as many first columns, along the last of these."""
+        """The determinant of some rows in as many first columns, expanded along the last of these."""
         last = len(chosen) - 1
         entries = [(k, rows[row][last]) for k, row in enumerate(chosen)]
         if last == 0:
@@ -232,10 +225,28 @@ def _circuits(given: Transmission) -> list[list[tuple[int, Scalar]]]:
     for chosen in combinations(range(len(rows)), degree + 1):
         amounts = [minor(chosen[:k] + chosen[k + 1 :]) * (-1.0) ** k for k in range(degree + 1)]
         square = total([amount * amount for amount in amounts])
-        alive = square > DEPENDENT_GENERATORS * DEPENDENT_GENERATORS
-        mix = [(drive, amount) for drive, amount in zip(chosen, amounts, strict=True) if drive < drives]
-        result.append([(drive, where(alive, amount, 0.0)) for drive, amount in mix if not is_zero(amount)])
+        independent = square > DEPENDENT_GENERATORS * DEPENDENT_GENERATORS
+        mix = [(drive, amount) for drive, amount in zip(chosen, amounts, strict=True) if drive < count]
+        result.append([(drive, where(independent, amount, 0.0)) for drive, amount in mix if not is_zero(amount)])
     return [mix for mix in result if mix]
+
+
+def _rows_of_internal_loads(drives: Transmission) -> list[list[Scalar]]:
+    """The load of each drive by each internal load, in rows.
+
+    Internal loads that load no drive, to round-off, get a row of their own below the drives: mixes then leave them out,
+    and every other choice of drives is counted as degenerate.
+    """
+    rows = [list(row) for row in drives.internal]
+    if not drives.doubtful:
+        return rows
+    count, degree = len(rows), len(rows[0])
+    modes = conjugate([list(column) for column in zip(*rows, strict=True)], [1.0] * count, [1.0] * count)
+    sizes = [sqrt(inverse) for inverse in modes.inverses]
+    rows = [[column[i] * size for column, size in zip(modes.columns, sizes, strict=True)] for i in range(count)]
+    for k, inverse in enumerate(modes.inverses):
+        rows.append([where(inverse > 0.0, 0.0, 1.0) if j == k else 0.0 for j in range(degree)])
+    return rows
 
 
 def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar:
@@ -279,34 +290,34 @@ def _size_of_part(components: Sequence[Scalar], part: slice, length: Scalar) -> 
     return sqrt(square), felt
 
 
-def greatest_speed(given: Transmission, speeds: Sequence[Scalar], block: slice) -> Scalar:
+def greatest_speed(drives: Transmission, speeds: Sequence[Scalar], block: slice) -> Scalar:
     """The greatest speed (m/s) of the tool point that the drives allow in whichever direction the machine can move.
 
     It moves without turning, or for the other block turns (rad/s) about the tool point without moving it: directions
     that the structure does not allow then do not count. NaN where it allows none.
 
     Args:
-        given: how drives and platform act on each other.
+        drives: the way in which drives and platform act on each other.
         speeds: greatest speed of each drive, m/s or rad/s.
         block: one of `BLOCKS`.
 
     Source: theory (84).
     """
-    if given.wrenches is None:
+    if drives.wrenches is None:
         return math.nan
-    shrink, turning, structure = reciprocal(given.length), block.start == 0, _structure(given, block)
+    shrink, turning, structure = reciprocal(drives.length), block.start == 0, _structure(drives, block)
     radius: Scalar = math.inf
-    for wrench, speed in zip(given.wrenches, speeds, strict=True):
+    for wrench, speed in zip(drives.wrenches, speeds, strict=True):
         size, felt = _allowed_size(_components_in_newtons(wrench, shrink), block, structure)
-        needed = size * given.length if turning else size
+        needed = size * drives.length if turning else size
         radius = smaller(where(felt, speed * reciprocal(where(felt, needed, 1.0)), math.inf), radius)
     return where(radius < math.inf, radius, math.nan)
 
 
-def _structure(given: Transmission, block: slice) -> Conjugated | None:
+def _structure(drives: Transmission, block: slice) -> Conjugated | None:
     """An orthonormal basis of the motions in a block that the structure does not allow; None where it allows all."""
-    shrink = reciprocal(given.length)
-    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in given.constraints]
+    shrink = reciprocal(drives.length)
+    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in drives.constraints]
     stopped = [column for column in stopped if not all(is_zero(c) for c in column)]
     return conjugate(stopped, [1.0] * 3, [1.0] * 3) if stopped else None
 
@@ -322,7 +333,7 @@ def _allowed_size(whole: Sequence[Scalar], block: slice, structure: Conjugated |
 
 
 def acceleration_faces(
-    given: Transmission,
+    drives: Transmission,
     rows: Sequence[Twist],
     bounds: Sequence[tuple[Scalar, Scalar]],
     carried: Sequence[Scalar],
@@ -330,17 +341,17 @@ def acceleration_faces(
     """Return all faces of the set of accelerations from rest that the drives allow, as `wrench_faces` does of wrenches.
 
     Args:
-        given: how drives and platform act on each other.
+        drives: the way in which drives and platform act on each other.
         rows: for each drive, its load per unit of acceleration at the tool point.
         bounds: least and greatest load of each drive, N or N·m.
         carried: what each drive carries at rest.
 
     Source: theory (82) with what a drive carries by an acceleration in the place of what it carries by a wrench.
     """
-    return wrench_faces(replace(given, shares=tuple(rows)), bounds, carried)
+    return wrench_faces(replace(drives, shares=tuple(rows)), bounds, carried)
 
 
-def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: slice) -> Scalar:
+def greatest_acceleration(faces: Sequence[Face], drives: Transmission, block: slice) -> Scalar:
     """The greatest acceleration from rest that the drives allow in whichever direction the machine can move.
 
     Without turning (m/s²), or for the other block about the tool point without moving it (rad/s²). Negative where the
@@ -348,10 +359,10 @@ def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: sli
 
     Args:
         faces: faces of the set of accelerations.
-        given: how drives and platform act on each other.
+        drives: the way in which drives and platform act on each other.
         block: one of `BLOCKS`.
     """
-    grow, turning, structure = given.length, block.start == 0, _structure(given, block)
+    grow, turning, structure = drives.length, block.start == 0, _structure(drives, block)
     radius: Scalar = math.inf
     for face in faces:
         rotational, translational = face.normal.rotational, face.normal.translational * grow
@@ -359,41 +370,41 @@ def greatest_acceleration(faces: Sequence[Face], given: Transmission, block: sli
         needed = size if turning else size * reciprocal(grow)
         radius = smaller(where(felt, face.room * reciprocal(where(felt, needed, 1.0)), _reach_if_unfelt(face)), radius)
     stopped = total([where(inverse > 0.0, 1.0, 0.0) for inverse in structure.inverses]) if structure else 0.0
-    return where(stopped < SIZE // 2 - 0.5, radius, math.nan)  # of three motions in a block, one is left
+    return where(stopped < SIZE // 2 - 0.5, radius, math.nan)  # at least one of a block's three motions is left
 
 
-def greatest_acceleration_along(faces: Sequence[Face], given: Transmission, row: int) -> Scalar:
+def greatest_acceleration_along(faces: Sequence[Face], drives: Transmission, row: int) -> Scalar:
     """The greatest acceleration from rest of one component alone, either way; 0 where the structure forbids it.
 
     Args:
-        faces, given: see `greatest_acceleration`.
+        faces, drives: see `greatest_acceleration`.
         row: number of the component, of rx ry rz x y z = 0 ... 5.
     """
-    return _where_structure_allows(given, row, greatest_along(faces, row, given.length))
+    return _where_structure_allows(drives, row, greatest_along(faces, row, drives.length))
 
 
-def greatest_speed_along(given: Transmission, speeds: Sequence[Scalar], row: int) -> Scalar:
+def greatest_speed_along(drives: Transmission, speeds: Sequence[Scalar], row: int) -> Scalar:
     """The greatest rate of one component alone that the drives allow, m/s or rad/s; 0 where the structure forbids it.
 
     Args:
-        given, speeds: see `greatest_speed`.
+        drives, speeds: see `greatest_speed`.
         row: number of the component, of rx ry rz x y z = 0 ... 5.
     """
-    if given.wrenches is None:
+    if drives.wrenches is None:
         return math.nan
-    shrink = reciprocal(given.length)
+    shrink = reciprocal(drives.length)
     rate: Scalar = math.inf
-    for wrench, speed in zip(given.wrenches, speeds, strict=True):
+    for wrench, speed in zip(drives.wrenches, speeds, strict=True):
         part = abs(wrench.components()[row])
         components = _components_in_newtons(wrench, shrink)
         felt = components[row] * components[row] > UNREACHED_COMPONENT * total([c * c for c in components])
         rate = smaller(where(felt, speed * reciprocal(where(felt, part, 1.0)), math.inf), rate)
-    return _where_structure_allows(given, row, rate)
+    return _where_structure_allows(drives, row, rate)
 
 
-def _where_structure_allows(given: Transmission, row: int, amount: Scalar) -> Scalar:
+def _where_structure_allows(drives: Transmission, row: int, amount: Scalar) -> Scalar:
     """An amount of one component alone, or 0 where the structure forbids this motion."""
-    for wrench in given.constraints:
-        entry = _components_in_newtons(wrench, reciprocal(given.length))[row]
+    for wrench in drives.constraints:
+        entry = _components_in_newtons(wrench, reciprocal(drives.length))[row]
         amount = where(entry * entry > UNREACHED_COMPONENT, 0.0, amount)
     return amount

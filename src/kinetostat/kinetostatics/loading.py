@@ -153,12 +153,12 @@ class DeflectedLink:
         Cubic between its ends, as a beam without load between them bends.
         """
         span, s = self.end - self.start, share
-        turned = [motion.rotational.cross(span) for motion in (self.start_motion, self.end_motion)]
+        slopes = [motion.rotational.cross(span) for motion in (self.start_motion, self.end_motion)]
         shift = (
             self.start_motion.translational * (2 * s**3 - 3 * s**2 + 1)
-            + turned[0] * (s**3 - 2 * s**2 + s)
+            + slopes[0] * (s**3 - 2 * s**2 + s)
             + self.end_motion.translational * (3 * s**2 - 2 * s**3)
-            + turned[1] * (s**3 - s**2)
+            + slopes[1] * (s**3 - s**2)
         )
         return self.start + span * s + shift * factor
 
@@ -192,51 +192,57 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
         elastic = [None if isinf(soft) else twist * (load * soft) for twist, soft, load in pairs]
         free = [twist for twist, soft, _ in pairs if isinf(soft)]
         passive = [joint.twist(response.reference) for joint in leg.passive]
-        left = platform - _sum([twist for twist in elastic if twist is not None])
-        turned = _following([*passive, *free], left, float(response.configuration.length))
-        freed = iter(turned[len(passive) :])
-        given = [next(freed) if twist is None else twist for twist in elastic]
-        bodies = _bodies(leg, iter(turned[: len(passive)]), iter(given))
+        remaining = platform - _sum([twist for twist in elastic if twist is not None])
+        motions = _following([*passive, *free], remaining, float(response.configuration.length))
+        motions_of_free = iter(motions[len(passive) :])
+        motions_of_springs = [next(motions_of_free) if twist is None else twist for twist in elastic]
+        bodies = _bodies(leg, iter(motions[: len(passive)]), iter(motions_of_springs))
         links += leg_links(leg, partial(_twist_at, bodies, response.reference))
     return links
 
 
-def leg_links(leg: Leg, moved: Callable[[int, Vector], Twist]) -> Iterator[DeflectedLink]:
+def leg_links(leg: Leg, motion_of: Callable[[int, Vector], Twist]) -> Iterator[DeflectedLink]:
     """The links between the points of a chain.
 
     Args:
         leg: the leg at the pose.
-        moved: the motion, in base axes (rad, m), of a point of the body after so many elements.
+        motion_of: function from a number of elements and a point of the body after them to the motion of this point,
+            in base axes, rad and m.
     """
-    at: Vector | None = None
-    leaving = 0
+    start: Vector | None = None
+    start_body = 0
     for number, element in enumerate(leg.chain):
         points = _points(element)
-        for n, point in enumerate(points):
-            body = number + (n > 0)
-            if at is not None and (point - at).norm() > 0.0:
-                yield DeflectedLink(leg.name, at, point, moved(leaving, at), moved(body, point))
-            at, leaving = point, body
+        for k, point in enumerate(points):
+            body = number + (k > 0)  # the first point of an element belongs to the body before it
+            if start is not None and (point - start).norm() > 0.0:
+                yield DeflectedLink(leg.name, start, point, motion_of(start_body, start), motion_of(body, point))
+            start, start_body = point, body
         if len(points) == 1:
-            leaving = number + 1
+            start_body = number + 1
 
 
-def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twist]:
-    """Motions of the passive joints that add up to `left`, by least squares; `length` (m) makes rows comparable."""
+def _following(passive: Sequence[Twist], motion: Twist, length: float) -> list[Twist]:
+    """Motions of the passive joints that add up to a motion, by least squares; `length` (m) makes rows comparable."""
     if not passive:
         return []
     scale = np.repeat([length, 1.0], 3)
     columns = np.array([twist.components() for twist in passive], dtype=float).T * scale[:, None]
-    amounts = np.linalg.lstsq(columns, np.array(left.components(), dtype=float) * scale, rcond=DEPENDENT_WRENCHES)[0]
+    amounts = np.linalg.lstsq(columns, np.array(motion.components(), dtype=float) * scale, rcond=DEPENDENT_WRENCHES)[0]
     return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
 
 
-def _bodies(leg: Leg, turned: Iterator[Twist], given: Iterator[Twist]) -> list[Twist]:
-    """Motions of the bodies before, between and after the elements of a chain, added up from the base."""
+def _bodies(leg: Leg, of_joints: Iterator[Twist], of_springs: Iterator[Twist]) -> list[Twist]:
+    """Motions of the bodies before, between and after the elements of a chain, added up from the base.
+
+    Args:
+        leg: the leg.
+        of_joints, of_springs: motions of its passive joints and of its springs, in order.
+    """
     motions = [Twist(ZERO, ZERO)]
     for element in leg.chain:
-        moves = [next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs]
-        motions.append(motions[-1] + _sum(moves))
+        parts = [next(of_joints) for _ in element.freedoms] + [next(of_springs) for _ in element.springs]
+        motions.append(motions[-1] + _sum(parts))
     return motions
 
 
