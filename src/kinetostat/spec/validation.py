@@ -20,7 +20,6 @@ LONGEST_MACHINE_NAME = 80
 """Characters of a machine's name: titles of figures and pages have room for it."""
 HEAD = ("schema", "name", "family")
 """Keys at the top of a file that are not tables."""
-NO_TABLE = "Input should be a valid dictionary or instance of {}"
 
 DISPLAY_SCHEMA: dict[str, Any] = {
     "type": "object",
@@ -94,49 +93,49 @@ class _Reader:
     """Reads a document into instances of tables.
 
     Attributes:
-        tables: their classes, by dotted name.
-        within: names of the tables that each table holds, by its dotted name, in their order.
+        tables: classes of the tables, by dotted name.
+        subtables: names of the tables that each table holds, by its dotted name, in their order.
         instances: the tables that have been read.
     """
 
     def __init__(self, tables: Mapping[str, type]) -> None:
         self.tables = tables
-        self.within: dict[str, dict[str, None]] = {}
+        self.subtables: dict[str, dict[str, None]] = {}
         self.instances: dict[str, Any] = {}
         for path in tables:
             names = path.split(".")
             for depth, name in enumerate(names):
-                self.within.setdefault(".".join(names[:depth]), {})[name] = None
+                self.subtables.setdefault(".".join(names[:depth]), {})[name] = None
 
-    def read(self, given: object, place: tuple[str, ...] = ()) -> Iterator[Mistake]:
-        """Read what was written of a table and of the tables in it; mistakes come in the order of fields.
+    def read(self, content: object, place: tuple[str, ...] = ()) -> Iterator[Mistake]:
+        """Read the content of a table and of the tables in it; mistakes come in the order of fields.
 
         A table in which all may be left out may be left out itself, unless it holds others.
         """
         path = ".".join(place)
-        table, within = self.tables.get(path), self.within.get(path, {})
-        if not isinstance(given, dict):
-            yield Mistake("no table" if table and not within else "wrong", place, NO_TABLE.format(place[-1]))
+        table, subtables = self.tables.get(path), self.subtables.get(path, {})
+        if not isinstance(content, dict):
+            yield Mistake("no table", place)
             return
         fields = quantities(table) if table else {}
         if table:
-            yield from self._read_fields(given, place, table)
-        for name in within:
-            if name in given:
-                yield from self.read(given[name], (*place, name))
+            yield from self._read_fields(content, place, table)
+        for name in subtables:
+            if name in content:
+                yield from self.read(content[name], (*place, name))
             elif not self._may_miss(".".join([*place, name])):
                 yield Mistake("missing", (*place, name))
-        for key in given:
-            if key not in fields and key not in within and (place or key not in HEAD):
+        for key in content:
+            if key not in fields and key not in subtables and (place or key not in HEAD):
                 yield Mistake("unknown", (*place, key))
 
-    def _read_fields(self, given: Document, place: tuple[str, ...], table: type) -> Iterator[Mistake]:
+    def _read_fields(self, content: Document, place: tuple[str, ...], table: type) -> Iterator[Mistake]:
         """Read the fields of a table; it is made if all of them can be read."""
         values = {}
         for name, quantity in quantities(table).items():
-            if name in given:
+            if name in content:
                 try:
-                    values[name] = quantity.read(given[name])
+                    values[name] = quantity.read(content[name])
                 except UnitError as error:
                     yield Mistake("wrong", (*place, name), str(error))
             elif name not in optional(table):
@@ -147,21 +146,22 @@ class _Reader:
     def _may_miss(self, path: str) -> bool:
         """Return whether a table may be left out; it is then as if it were empty."""
         table = self.tables.get(path)
-        may_miss = table is not None and path not in self.within and optional(table) == set(quantities(table))
+        may_miss = table is not None and path not in self.subtables and optional(table) == set(quantities(table))
         if table and may_miss:
             self.instances[path] = table()
         return may_miss
 
 
 def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
+    """The sentence about a mistake: what is wrong, and what to write."""
     path = [str(part) for part in mistake.place]
     name, last = ".".join(cut(part) for part in path), cut(path[-1])
-    within = ".".join(path[:-1])
-    fields = quantities(reader.tables[within]) if within in reader.tables else {}
+    parent = ".".join(path[:-1])
+    fields = quantities(reader.tables[parent]) if parent in reader.tables else {}
     if mistake.kind == "missing":
-        return _missing(within, name, last, fields, document.get("family"))
+        return _missing(parent, name, last, fields, document.get("family"))
     if mistake.kind == "unknown":
-        allowed = list(fields) or [*([] if within else HEAD), *reader.within.get(within, ())]
+        allowed = list(fields) or [*([] if parent else HEAD), *reader.subtables.get(parent, ())]
         close = difflib.get_close_matches(last, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
         return f"{name} is not known; {hint}"
@@ -176,14 +176,15 @@ def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
     return f"{name} is {value}: {mistake.reason}."
 
 
-def _missing(within: str, name: str, last: str, known: Mapping[str, Quantity], family: object) -> str:
-    if last in known:
-        quantity = known[last]
+def _missing(parent: str, name: str, last: str, fields: Mapping[str, Quantity], family: object) -> str:
+    """The sentence about a field or a table that is missing in its parent table."""
+    if last in fields:
+        quantity = fields[last]
         start = f"{name} is missing ({quantity.meaning}); add {last}"
         if quantity.apart:
             complete = f"`kinetostat new {family}` prints a complete file"
-            return f"{start} to [{within}], {quantity.entries}; {complete}."
-        return f'{start} = "{KINDS[quantity.kind].example}" to [{within}].'
+            return f"{start} to [{parent}], {quantity.entries}; {complete}."
+        return f'{start} = "{KINDS[quantity.kind].example}" to [{parent}].'
     if name not in ("name", "family"):
         return f"the table [{name}] is missing; `kinetostat new` prints a complete file."
     return f'{name} is missing; add {last} = "..." at the top of the file.'
