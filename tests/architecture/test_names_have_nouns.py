@@ -49,7 +49,6 @@ CLASSES_LEFT: frozenset[str] = frozenset(
         "Report",
         "Softest",
         "Step",
-        "Table",
         "_Chain",
         "_Reader",
     }

@@ -32,13 +32,13 @@ Method: TypeAlias = Literal["genetic", "gradient", "hybrid", "nsga2"]
 OVER = "worst, mean or percentile P"
 
 
-class Table(BaseModel):
+class StudyTable(BaseModel):
     """A table of a study file: refuses keys that it does not have."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False, defer_build=True)
 
 
-class VariableTable(Table):
+class VariableTable(StudyTable):
     """A table [[variables]]: a field of the machine, or several tied together, and what it may be."""
 
     path: Path | None = Field(default=None, description="a field of the machine file, e.g. geometry.base_radius")
@@ -66,7 +66,7 @@ class VariableTable(Table):
         return self.paths or ([self.path] if self.path else [])
 
 
-class TermTable(Table):
+class TermTable(StudyTable):
     """A quantity, and whether its worst value, mean or a percentile over all poses is taken."""
 
     quantity: Path = Field(
@@ -95,7 +95,7 @@ class ConstraintTable(TermTable):
     at_most: Written | None = Field(default=None, description="upper bound")
 
 
-class PosesTable(Table):
+class PosesTable(StudyTable):
     """Table [poses]: where the machine is judged; its own pose unless more is said."""
 
     listed: list[dict[str, Written]] | None = Field(
@@ -115,7 +115,7 @@ class PosesTable(Table):
     required: float = Field(default=1.0, description="share of the poses that a design must reach", ge=0.0, le=1.0)
 
 
-class OptimizerTable(Table):
+class OptimizerTable(StudyTable):
     """Table [optimizer]: how the best design is looked for."""
 
     method: Method | None = Field(
@@ -129,7 +129,7 @@ class OptimizerTable(Table):
     seed: int = Field(default=1, description="of the random numbers", ge=0, lt=2**32)
 
 
-class RobustnessTable(Table):
+class RobustnessTable(StudyTable):
     """Table [robustness]: how manufacture within the tolerances is taken into account."""
 
     samples: int = Field(default=1000, description="random machines around the best design", ge=1, le=MOST_SAMPLES)
@@ -142,7 +142,7 @@ class RobustnessTable(Table):
     search_samples: int = Field(default=16, description="machines around each design during the search", ge=1, le=1000)
 
 
-class StudyFile(Table):
+class StudyFile(StudyTable):
     """A study file."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema", description="version of the file format")

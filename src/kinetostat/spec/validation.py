@@ -68,7 +68,7 @@ def validated_tables(
     Raises:
         InputError: one sentence for each mistake, at most five.
     """
-    reader = _Reader(tables)
+    reader = _TableReader(tables)
     mistakes = [*_mistakes_in_head(document, family), *reader.read(document)]
     if mistakes:
         sentences = first_mistakes(mistakes, lambda mistake: _sentence(mistake, document, reader))
@@ -89,7 +89,7 @@ def _mistakes_in_head(document: Document, family: str) -> Iterator[Mistake]:
         yield Mistake("wrong", ("family",), f'an override cannot change it from "{family}"; start from another machine')
 
 
-class _Reader:
+class _TableReader:
     """Reads a document into instances of tables.
 
     Attributes:
@@ -152,7 +152,7 @@ class _Reader:
         return may_miss
 
 
-def _sentence(mistake: Mistake, document: Document, reader: _Reader) -> str:
+def _sentence(mistake: Mistake, document: Document, reader: _TableReader) -> str:
     """The sentence about a mistake: what is wrong, and what to write."""
     path = [str(part) for part in mistake.place]
     name, last = ".".join(cut(part) for part in path), cut(path[-1])
