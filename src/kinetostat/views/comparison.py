@@ -37,6 +37,10 @@ MOST_SHARES = 3
 """Parts that are named for a direction: a cell of a table has room for them."""
 LEAST_SHARE = 0.005
 """Share below which a part is not named: it would read 0 %."""
+CHANGE_WIDTH = 8
+"""Characters of a change beside a value, such as "+123.4 %": changes of a column stand below each other."""
+LEAST_FACTOR = 1000.0
+"""Change, in percent, from which it is written as a factor: people do not read "+1200.0 %" as thirteen times."""
 SAME_PERCENT = 0.05
 """Percent of difference up to which two values are shown as equal: with one decimal the change reads 0.0 %."""
 WIDEST_LINEAR_RATIO = 30.0
@@ -172,10 +176,12 @@ def _cell(row: DesignRow, i: int, scale: Scale, digits: int) -> Text:
     endless = "rigid" if row.better is Better.MORE else "free"
     value, percent = row.values[i], row.percents[i]
     shown = Text(number(value and value * scale.factor, endless, digits), "bold" if i in row.best else "")
-    if i == 0 or percent is None:
-        return Text.assemble(shown, "" if i == 0 else " " * 9)
+    if i == 0:
+        return shown
+    if percent is None:
+        return Text.assemble(shown, " " * (CHANGE_WIDTH + 1))
     colour = {"better": "green", "worse": "red", "": "default"}[change_kind(row, percent)]
-    return Text.assemble(shown, (f" {change_text(percent):>8}", colour))
+    return Text.assemble(shown, (f" {change_text(percent):>{CHANGE_WIDTH}}", colour))
 
 
 def change_kind(row: DesignRow, percent: float) -> str:
@@ -189,7 +195,7 @@ def change_text(percent: float) -> str:
     """Return a change in percent, such as "+3.2 %"; a large one as a factor, and "=" if there is none to speak of."""
     if abs(percent) < SAME_PERCENT:
         return "="
-    return f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
+    return f"{percent:+.1f} %" if abs(percent) < LEAST_FACTOR else f"× {1.0 + percent / 100.0:.3g}"
 
 
 def _softest_table(comparison: Comparison) -> FittedTable:
@@ -245,25 +251,28 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
 
 
 def _panels(comparison: Comparison) -> list[tuple[str, Bars]]:
-    """Panels by title: those of the quantities that were named, or else the usual ones; the mass closes them."""
-    mass: list[tuple[str, Bars]] = [
-        ("moving mass", [("", row, None) for row in comparison.rows if row.name == "moving mass"])
-    ]
-    if comparison.where:
-        groups: dict[str, dict[str, DesignRow]] = {}
-        for row in comparison.over:
-            groups.setdefault(row.group, {})[row.name] = row
-        pairs: Bars = [
-            (name, group["mean"], group.get("worst") or group["greatest in size"]) for name, group in groups.items()
-        ]
-        return [*_by_title(pairs), *mass]
+    """Return the panels with their titles; the mass is the last."""
+    mass: Bars = [("", row, None) for row in comparison.rows if row.name == "moving mass"]
+    return [*_by_title(_bars_over_poses(comparison) or _bars_at_pose(comparison)), ("moving mass", mass)]
+
+
+def _bars_over_poses(comparison: Comparison) -> Bars:
+    """Return the mean of each quantity over the poses with its worst value; nothing if there are no poses."""
+    groups: dict[str, dict[str, DesignRow]] = {}
+    for row in comparison.over if comparison.where else ():
+        groups.setdefault(row.group, {})[row.name] = row
+    return [(name, group["mean"], group.get("worst") or group["greatest in size"]) for name, group in groups.items()]
+
+
+def _bars_at_pose(comparison: Comparison) -> Bars:
+    """Return the numbers at the pose: the quantities that were named, or else the usual ones."""
     named: Bars = [(row.name, row, None) for row in comparison.rows if row.group == "quantities"]
     usual: Bars = [
         (row.name, row, None)
         for row in comparison.rows
         if row.group in ("compliance", "loads and vibration") or row.name == "singularity margin"
     ]
-    return [*_by_title(named or usual), *mass]
+    return named or usual
 
 
 def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:

@@ -51,10 +51,10 @@ def _lines(answer: DriveLoads) -> Lines:
     if names := ", ".join(answer.motion.loads):
         yield "Loads", f"The motion says {names}, in the place of what the file has there."
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
-    net, back = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
-    given = max(net + back, 0.0)
-    net = net if abs(net) > ROUND_OFF_OF_ENTRY * given else 0.0
-    text = f"All motors together give {number(given)} J, and take back {number(back)} J while they brake"
+    net, braking = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
+    gross = max(net + braking, 0.0)
+    net = net if abs(net) > ROUND_OFF_OF_ENTRY * gross else 0.0
+    text = f"All motors together give {number(gross)} J, and take back {number(braking)} J while they brake"
     yield "Energy", f"{text}: {number(net)} J net."
     if answer.greatest_deflection is not None:
         size, place = answer.greatest_deflection

@@ -49,15 +49,15 @@ ROOM_ABOVE_CURVE = 1.15
 
 def _lines(answer: Elevation) -> Lines:
     display = answer.machine.display
-    show, small = display.show, display.show_deflection
+    show = display.show
     ends = [show(float(answer.elevations[i]), "rad") for i in (0, -1)]
     yield "Pose", f"{pose_of(answer.machine)}, at {len(answer.elevations)} elevations from {ends[0]} to {ends[1]}."
     if answer.message:
         yield "Elevation", answer.message
     if not np.isfinite(answer.sag).any():
         return
-    sag, turn = (_at_most(answer, values, unit) for values, unit in ((answer.sag, "m"), (answer.rotation, "rad")))
-    yield "Sag", f"The loads move the tool point by at most {sag} and turn the platform by at most {turn}."
+    sag, rotation = _greatest_text(answer, answer.sag, "m"), _greatest_text(answer, answer.rotation, "rad")
+    yield "Sag", f"The loads move the tool point by at most {sag} and turn the platform by at most {rotation}."
     if np.isfinite(answer.frequency).any():
         place = int(np.nanargmin(answer.frequency))
         least = f"{show(float(answer.frequency[place]), 'Hz')} {_elevation_text(answer, place)}"
@@ -66,7 +66,7 @@ def _lines(answer: Elevation) -> Lines:
     yield "Reversals", _reversals_sentence(answer)
     if answer.budget is not None:
         place = int(np.nanargmax(answer.error))
-        size = f"{small(float(answer.error[place]), 'm')} {_elevation_text(answer, place)}"
+        size = f"{display.show_deflection(float(answer.error[place]), 'm')} {_elevation_text(answer, place)}"
         yield "As built", f"95 % of all machines are off by at most {size}; kinetostat budget says by what."
     yield from correction_lines(answer.corrections)
     if answer.corrections.before:
@@ -77,7 +77,8 @@ def _elevation_text(answer: Elevation, place: int) -> str:
     return f"at {answer.machine.display.show(float(answer.elevations[place]), 'rad')}"
 
 
-def _at_most(answer: Elevation, sizes: Array, unit: str) -> str:
+def _greatest_text(answer: Elevation, sizes: Array, unit: str) -> str:
+    """Return the greatest of some deflections over the elevation, and where it is."""
     place = int(np.nanargmax(sizes))
     return f"{answer.machine.display.show_deflection(float(sizes[place]), unit)} ({_elevation_text(answer, place)})"
 
@@ -105,12 +106,13 @@ def _forces_sentence(answer: Elevation) -> str:
 def _reversals_sentence(answer: Elevation) -> str:
     if not answer.reversals:
         return "No load of a drive or a joint reverses, so that no clearance is crossed."
-    show, small = answer.machine.display.show, answer.machine.display.show_deflection
-    legs = ", ".join(f"{reversal.leg} at {show(reversal.elevation, 'rad', digits=3)}" for reversal in answer.reversals)
+    display = answer.machine.display
+    legs = (f"{reversal.leg} at {display.show(reversal.elevation, 'rad', digits=3)}" for reversal in answer.reversals)
     jumps = [reversal.jump for reversal in answer.reversals if reversal.jump is not None]
-    text = f"Loads reverse in {legs}."
+    text = f"Loads reverse in {', '.join(legs)}."
     if jumps:
-        return f"{text} The tool point jumps by up to {small(max(jumps), 'm')} as clearances are crossed."
+        jump = display.show_deflection(max(jumps), "m")
+        return f"{text} The tool point jumps by up to {jump} as clearances are crossed."
     return f"{text} Clearances in [tolerances], or backlash in [drives], say how far the tool point jumps there."
 
 
@@ -223,16 +225,16 @@ class PanelContent:
     """The content of a panel over the elevation.
 
     Attributes:
-        meaning: of the values.
-        unit: of the values, SI.
+        meaning: meaning of the values.
+        unit: unit of the values, SI.
         curves: values over the elevation by name; the name is empty where there is one curve alone.
-        small: whether they are deflections, which are shown in small units.
+        fitting: whether the unit that is shown follows the values, as for deflections, which are small.
     """
 
     meaning: str
     unit: str
     curves: dict[str, Array]
-    small: bool = False
+    fitting: bool = False
 
 
 def _panels(answer: Elevation) -> list[PanelContent]:
@@ -247,13 +249,13 @@ def _panels(answer: Elevation) -> list[PanelContent]:
         return {name: values for name, unit_of_values, values in rows if unit_of_values == unit}
 
     panels = [
-        PanelContent("displacement", "m", of_unit("m", moved), small=True),
-        PanelContent("rotation", "rad", of_unit("rad", moved), small=True),
+        PanelContent("displacement", "m", of_unit("m", moved), fitting=True),
+        PanelContent("rotation", "rad", of_unit("rad", moved), fitting=True),
         PanelContent("first frequency", "Hz", {"": answer.frequency}),
         PanelContent("force, pulling", "N", of_unit("N", carried)),
         PanelContent("moment", "N·m", of_unit("N·m", carried)),
-        PanelContent("error, 95 %", "m", {} if answer.budget is None else {"": answer.error}, small=True),
-        *(PanelContent("correction", unit, of_unit(unit, corrected), small=True) for unit in ("m", "rad")),
+        PanelContent("error, 95 %", "m", {} if answer.budget is None else {"": answer.error}, fitting=True),
+        *(PanelContent("correction", unit, of_unit(unit, corrected), fitting=True) for unit in ("m", "rad")),
     ]
     return [panel for panel in panels if any(np.isfinite(values).any() for values in panel.curves.values())]
 
@@ -262,7 +264,7 @@ def _draw_panel(panel: "Axes", answer: Elevation, content: PanelContent, angle_f
     """Draw the curves of a panel; elevations are multiplied by a factor that brings them from rad to what is shown."""
     display, curves = answer.machine.display, content.curves
     scale = display.scale(content.unit)
-    if content.small:
+    if content.fitting:
         scale = display.fitting(content.unit, np.concatenate(list(curves.values())))
     for place, (name, values) in enumerate(curves.items()):
         panel.plot(answer.elevations * angle_factor, values * scale.factor, label=name, **figures.look_of(place))

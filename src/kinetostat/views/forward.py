@@ -63,15 +63,15 @@ def coordinates_by_name(texts: Sequence[str]) -> Mapping[str, str]:
     Raises:
         InputError: an entry is not of that form, or a name is given twice.
     """
-    given: dict[str, str] = {}
+    coordinates: dict[str, str] = {}
     for entry in (entry for text in texts for entry in text.split(",")):
         name, equals, value = (part.strip() for part in entry.partition("="))
         if not equals or not name:
             raise InputError(f'--actuators {shorten(entry)} must be name=value, e.g. --actuators "leg 1=31 cm".')
-        if name in given:
+        if name in coordinates:
             raise InputError(f'--actuators gives "{name}" twice; leave one of its coordinates out.')
-        given[name] = value
-    return given
+        coordinates[name] = value
+    return coordinates
 
 
 def _ask(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:

@@ -49,8 +49,9 @@ VERDICT_MARKS = {
     Finding.PARTLY: "note",
     Finding.FAILS: "bad",
 }
-
+"""Classes of the style by verdict."""
 COUNTS = ("no", "one", "two", "three", "four", "five", "six")
+"""Words for the numbers of misprints; greater ones are written in digits."""
 PAPER_STYLE = """
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
 .tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }

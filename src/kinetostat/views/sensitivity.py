@@ -135,8 +135,8 @@ def coloured_table(
     shown = list(rows)[:MOST_ROWS]
     cells = np.array([rows[path] for path in shown], dtype=float)
     (width, height), (beside, above) = CELL_SIZE, ROOM_BESIDE_CELLS
-    names = max(LEAST_NAME_WIDTH, layout.width_of(shown))
-    with figures.new_figure((names + beside + width * len(heads), above + height * len(shown)), *titles) as figure:
+    name_width = max(LEAST_NAME_WIDTH, layout.width_of(shown))
+    with figures.new_figure((name_width + beside + width * len(heads), above + height * len(shown)), *titles) as figure:
         panel = figure.subplots()
         room = int(LETTERS_PER_INCH * BAR_SHARE * figure.get_figheight())
         _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))
@@ -147,8 +147,8 @@ def coloured_table(
 
 def _draw_cells(panel: "Axes", cells: Array, colours: str, label: str) -> None:
     sizes = np.abs(cells[np.isfinite(cells)])
-    most = max(map_scales.usual_range(sizes)[1] if sizes.size else 0.0, LEAST_SCALE)
-    scale = colors.Normalize(-most, most)
+    end = max(map_scales.usual_range(sizes)[1] if sizes.size else 0.0, LEAST_SCALE)
+    scale = colors.Normalize(-end, end)
     image = panel.imshow(np.ma.masked_invalid(cells), cmap=colours, norm=scale, aspect="auto")
     panel.set_facecolor("#eeeeee")
     panel.grid(visible=False)
@@ -160,7 +160,7 @@ def _draw_cells(panel: "Axes", cells: Array, colours: str, label: str) -> None:
             colour = "white" if dark else "black"
             cell = panel.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
             cell.set_in_layout(False)  # it lies inside of the panel, so that the layout need not measure it
-    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=map_scales.exceeded_ends(cells, -most, most))
+    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=map_scales.exceeded_ends(cells, -end, end))
     figures.slim_bar(bar)
     bar.set_label(label)
 

@@ -177,7 +177,7 @@ def hits_of(body: Triangles, camera: Camera, samples_per_side: int) -> Hits:
 
 
 def _points(camera: Camera, nearness: Float32s, pixel: Integers) -> tuple[Array, Array]:
-    """End points of the rays through pixels, base frame (m), and the rays."""
+    """Return the ends of the rays through pixels, base frame (m), and the rays."""
     x, y = np.asarray(pixel % camera.width + 0.5), np.asarray(pixel // camera.width + 0.5)
     rays = camera.rays(x, y)
     return camera.eye + rays / nearness[pixel, None], rays
@@ -196,9 +196,9 @@ def normals_at(body: Triangles, triangle: Integers, points: Array) -> Array:
     return mixed / np.where(size > 0.0, size, 1.0)
 
 
-def _owners(pixel: Integers, solid: Integers, normals: Float32s, width: int, finer: int) -> Integers:
-    """For each covered pixel, the one whose sample it shows: the first of its block if that is alike, else itself."""
-    corner = pixel - pixel // width % finer * width - pixel % width % finer
+def _owners(pixel: Integers, solid: Integers, normals: Float32s, width: int, block_side: int) -> Integers:
+    """Return for each covered pixel the one whose sample it shows: the first of its block if alike, else itself."""
+    corner = pixel - pixel // width % block_side * width - pixel % width % block_side
     first = np.minimum(np.searchsorted(pixel, corner), len(pixel) - 1)
     alike = (pixel[first] == corner) & (solid[first] == solid)
     alike &= np.einsum("ij,ij->i", normals[first], normals) > LIKE_NORMALS
