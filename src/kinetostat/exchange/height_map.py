@@ -25,7 +25,7 @@ from kinetostat.studies.datasets import usual_ranges
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.storage import write_text
 
-ACROSS, UPWARDS, HEIGHT = "pose.x", "pose.y", "pose.z"
+X, Y, HEIGHT = "pose.x", "pose.y", "pose.z"
 ROUNDS = 3
 """Times that the sag is computed, each at the height to which the one before has raised the tool: it changes little."""
 POINTS = 9
@@ -34,6 +34,8 @@ FEWEST_POINTS = 3
 """Points along each axis at least: both controllers refuse a mesh of fewer."""
 MILLIMETRES = 1e3
 """Millimetres of a metre: both controllers take these."""
+NAME_WIDTH = 100
+"""Characters of the machine's name in a line of comment, which people read in an editor."""
 FEWEST_BICUBIC = 4
 """Points along an axis from which Klipper interpolates by cubic splines; it takes Lagrange's polynomials below."""
 KLIPPER = Template("""\
@@ -86,13 +88,13 @@ def write_klipper(analysis: Analysis, path: Path, over: Sequence[str] | None = N
     if not np.isfinite(chart.heights).all():
         raise InputError(
             f"at {int((~np.isfinite(chart.heights)).sum())} of {chart.heights.size} points the machine is not at rest, "
-            f"and Klipper takes no mesh with holes; choose narrower ranges with --over{_narrower(chart)}."
+            f"and Klipper takes no mesh with holes; choose narrower ranges with --over{_narrower_ranges(chart)}."
         )
     lines = [", ".join(f"{MILLIMETRES * height:.6f}" for height in row) for row in chart.heights]
     ends = {f"{side}_{name}": f"{MILLIMETRES * value:.6g}" for name, axis in (("x", chart.x), ("y", chart.y))
             for side, value in (("min", axis[0]), ("max", axis[-1]))}  # fmt: skip
     words = {
-        "name": "\n# ".join(wrap(ascii_line(analysis.machine.name), 100)),
+        "name": "\n# ".join(wrap(ascii_line(analysis.machine.name), NAME_WIDTH)),
         "height": f"{MILLIMETRES * float(values(analysis.machine)[HEIGHT]):.6g}",
         "profile": "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem),
         "points": "\n".join(f"  {line}" for line in lines),
@@ -127,7 +129,7 @@ def write_reprapfirmware(analysis: Analysis, path: Path, over: Sequence[str] | N
     return [path]
 
 
-def _narrower(chart: HeightMap) -> str:
+def _narrower_ranges(chart: HeightMap) -> str:
     """Write as options the widest ranges in which a map has no hole, narrower by as many points on all sides."""
     for margin in range(1, (min(chart.heights.shape) - 1) // 2):
         inside = slice(margin, -margin)
@@ -167,7 +169,7 @@ def _map_axes(machine: Machine, over: Sequence[str]) -> tuple[Array, Array]:
     Raises:
         InputError: as `height_map` about axes.
     """
-    missing = [path.removeprefix(POSE) for path in (ACROSS, UPWARDS, HEIGHT) if path not in values(machine)]
+    missing = [path.removeprefix(POSE) for path in (X, Y, HEIGHT) if path not in values(machine)]
     if missing:
         raise InputError(
             f"The pose of {machine.name} has no {' and no '.join(missing)}, and a map of heights corrects z over x and "
@@ -175,22 +177,21 @@ def _map_axes(machine: Machine, over: Sequence[str]) -> tuple[Array, Array]:
         )
     grid = grid_of(chosen_axes(machine, over or usual_ranges(machine, POINTS)))
     axes = {path: axis.values for axis in grid.axes for path in axis.paths}
-    if set(axes) != {ACROSS, UPWARDS} or min(map(len, axes.values())) < FEWEST_POINTS:
+    if set(axes) != {X, Y} or min(map(len, axes.values())) < FEWEST_POINTS:
         raise InputError(
             "A map of heights needs ranges of x and of y with at least three points each: "
             '--over "x=-100 mm:100 mm:9" --over "y=-100 mm:100 mm:9".'
         )
-    return np.sort(axes[ACROSS]), np.sort(axes[UPWARDS])
+    return np.sort(axes[X]), np.sort(axes[Y])
 
 
 def _raised_heights(machine: Machine, x: Array, y: Array) -> Array:
     """Compute by how much the tool must be raised at each point, m [rows x columns]; NaN without a state of rest."""
-    across, upwards = (part.ravel() for part in np.meshgrid(x, y))
-    home = float(values(machine)[HEIGHT])
-    raised = np.zeros(across.size)
+    x_of_points, y_of_points = (part.ravel() for part in np.meshgrid(x, y))
+    height = float(values(machine)[HEIGHT])
+    rises = np.zeros(x_of_points.size)
     for _ in range(ROUNDS):
-        columns = {ACROSS: across, UPWARDS: upwards, HEIGHT: home + np.nan_to_num(raised)}
+        columns = {X: x_of_points, Y: y_of_points, HEIGHT: height + np.nan_to_num(rises)}
         answers = evaluate(machine, PointTable(columns), ["displacement_z"])
-        sag = answers.values["displacement_z"]
-        raised = np.where(answers.status == Status.OK, -sag, np.nan)
-    return raised.reshape(len(y), len(x))
+        rises = np.where(answers.status == Status.OK, -answers.values["displacement_z"], np.nan)
+    return rises.reshape(len(y), len(x))

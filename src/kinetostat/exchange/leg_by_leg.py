@@ -7,7 +7,7 @@ link, which is exact. Points, axes and matrices are in the base frame at the pos
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby, pairwise
+from itertools import count, groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,9 @@ from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.studies.analysis_parts import clean_screw
 from kinetostat.studies.identification.fitted_values import identified_machine
 from kinetostat.studies.identification.identification import Identification
+
+LONGEST_PART_NAME = 30
+"""Characters of the name of a joint or link that is made here: a number may follow it within what a file allows."""
 
 
 def legs_of(name: str) -> str:
@@ -140,7 +143,7 @@ def _limits(machine: Machine, turn: Rotation, built: Configuration | None) -> di
 
 
 def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configuration) -> dict[str, float]:
-    """Limits of a machine whose axes of joints no longer meet: a length of such a leg becomes a travel of its ram.
+    """Return limits of a machine whose axes of joints no longer meet: lengths of such legs become travels of rams.
 
     Args:
         limits: the limits of the machine as drawn, SI.
@@ -163,7 +166,7 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
 
 
 def _is_parted(leg: Leg) -> bool:
-    """Return whether the axes of a joint of several axes do not meet in a point."""
+    """Return whether the axes of a joint with several of them do not meet in a point."""
     points: dict[str, set[Vector]] = {}
     for element in leg.chain:
         for joint in element.freedoms:
@@ -175,13 +178,13 @@ def _is_parted(leg: Leg) -> bool:
 def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
     """Return the table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
     table = machine.tables["tool"]
-    given: dict[str, Any] = {name: getattr(table, name) for name in quantities(Tool)}
-    for name, value in given.items():
+    entries: dict[str, Any] = {name: getattr(table, name) for name in quantities(Tool)}
+    for name, value in entries.items():
         if name.endswith("inertia"):
-            given[name] = [float(entry) for entry in turned_tensor(turn.apply, value)]
+            entries[name] = [float(entry) for entry in turned_tensor(turn.apply, value)]
         elif isinstance(value, tuple):
-            given[name] = _numbers(turn.apply(Vector(*value)))
-    return {name: value for name, value in given.items() if np.any(value)}
+            entries[name] = _numbers(turn.apply(Vector(*value)))
+    return {name: value for name, value in entries.items() if np.any(value)}
 
 
 def _load(machine: Machine, turn: Rotation) -> dict[str, Any]:
@@ -205,7 +208,14 @@ def _pose(configuration: Configuration, point: Vector) -> dict[str, float]:
 
 @dataclass
 class _Chain:
-    """The joints and links of one leg while they are written."""
+    """The joints and links of one leg while they are written.
+
+    Attributes:
+        leg: the leg.
+        tip: the point of the platform.
+        joints, links: entries of the file so far.
+        pending: springs that deflect since the last joint and are not written yet.
+    """
 
     leg: Leg
     tip: Vector
@@ -216,9 +226,9 @@ class _Chain:
     def document(self) -> dict[str, Any]:
         """Return the leg as its entry in the file."""
         elements = list(_free_where_zero(self.leg.chain))
-        for (passive, _), run in groupby(elements, key=_run):
+        for (is_joint, _), run in groupby(elements, key=_place_of_joint):
             row = list(run)
-            if passive:
+            if is_joint:
                 self._add_joints([element for element in row if isinstance(element, Joint)])
             else:
                 self._add_elements(row)
@@ -290,16 +300,16 @@ class _Chain:
     def _name(self, title: str) -> str:
         """Return the name of a part without that of its leg and without dots."""
         title = title.kind if isinstance(title, PartName) else title.removeprefix(f"{self.leg.name} ")
-        return title.replace(".", " ").strip()[:30]
+        return title.replace(".", " ").strip()[:LONGEST_PART_NAME]
 
     def _free_name(self, name: str) -> str:
         used = {joint["name"] for joint in self.joints} | self.links.keys()
-        numbered = (f"{name} {i}" for i in range(2, 99))
+        numbered = (f"{name} {number}" for number in count(2))
         return name if name not in used else next(other for other in numbered if other not in used)
 
 
-def _run(element: Element) -> tuple[bool, Vector | None]:
-    """Neighbours in a chain that are written together: axes through one point, so that a Hooke joint stays one."""
+def _place_of_joint(element: Element) -> tuple[bool, Vector | None]:
+    """Return whether an element is a joint, and its point: joints about one point are written as one, a Hooke joint."""
     return (True, element.point) if isinstance(element, Joint) else (False, None)
 
 
@@ -336,8 +346,8 @@ def compliance_at(springs: Sequence[Spring], point: Vector) -> Array:
     """
     twists = [clean_screw(spring.joint.twist(point), 1.0).components() for spring in springs]
     whole = sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
-    kept = np.diag(whole) >= 1.0 / LARGEST_OTHER
-    return np.asarray(np.where(np.outer(kept, kept), whole, 0.0))
+    deflects = np.diag(whole) >= 1.0 / LARGEST_OTHER
+    return np.asarray(np.where(np.outer(deflects, deflects), whole, 0.0))
 
 
 def _stiffness(spring: Spring) -> str:

@@ -27,11 +27,15 @@ from kinetostat.views.scene.mesh import mesh_of
 from kinetostat.views.scene.solids import LOOKS, Look, Scene, Shape, Solid, columns_of, linear
 
 FLOAT, SHORT, INTEGER = 5126, 5123, 5125
-"""Component types of glTF: float32, uint16, uint32."""
+"""Component types of glTF: float32, uint16, uint32 (section 3.6.2)."""
 POINTS, INDICES = 34962, 34963
-"""Targets of buffer views."""
+"""Targets of buffer views in glTF: attributes of points, and their indices (section 3.6.1)."""
 ALIGNED = 4
 """Bytes at whose multiples parts of the file begin, as the format demands."""
+GLB_VERSION = 2
+"""Version of the container, which is that of glTF."""
+HEADER_BYTES = 12
+"""Bytes of the head of a GLB file: its mark, its version and its length, four each."""
 Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 """Quaternion that turns the base frame's z, which is up, to glTF's y."""
 
@@ -79,16 +83,14 @@ class _Buffer:
         """Return the triangles of a shape, without a material."""
         mesh = mesh_of(shape)
         points, indices = mesh.points.astype("<f4"), mesh.triangles.ravel()
-        small = len(points) <= np.iinfo(np.uint16).max
+        dtype, component = ("<u2", SHORT) if len(points) <= np.iinfo(np.uint16).max else ("<u4", INTEGER)
         extent = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
         return {
             "attributes": {
                 "POSITION": self._append(points, "VEC3", FLOAT, POINTS, **extent),
                 "NORMAL": self._append(mesh.normals.astype("<f4"), "VEC3", FLOAT, POINTS),
             },
-            "indices": self._append(
-                indices.astype("<u2" if small else "<u4"), "SCALAR", SHORT if small else INTEGER, INDICES
-            ),
+            "indices": self._append(indices.astype(dtype), "SCALAR", component, INDICES),
         }
 
     def _append(self, array: AnyArray, kind: str, component: int, target: int, **more: Any) -> int:
@@ -125,11 +127,11 @@ def _material(name: str, look: Look) -> dict[str, Any]:
 
 
 def _container(document: dict[str, Any], data: bytes) -> bytes:
-    """JSON and one buffer as a GLB container."""
+    """Return JSON and one buffer as a GLB container."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % ALIGNED)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    return struct.pack("<4sII", b"glTF", GLB_VERSION, HEADER_BYTES + len(chunks)) + chunks
 
 
 def machine_glb(machine: Machine) -> bytes:
@@ -137,14 +139,9 @@ def machine_glb(machine: Machine) -> bytes:
     return glb(scene_of(machine))
 
 
-NEEDED = "STEP needs Open CASCADE, which "
-MISSING = "is not installed; install it with `{}`."
-BROKEN = "does not start: {reason}. On Debian and Ubuntu: apt-get install libgl1 libx11-6."
-
-
 def write_glb(analysis: Analysis, path: Path) -> list[Path]:
     """Write the machine at its pose as binary glTF: metres, y up."""
-    return _write(glb(scene_of(analysis.machine)), path)
+    return _write(machine_glb(analysis.machine), path)
 
 
 def write_step(analysis: Analysis, path: Path) -> list[Path]:
@@ -162,9 +159,14 @@ def _write(content: bytes, path: Path) -> list[Path]:
 
 
 def _step_writer() -> Any:
+    """Return the module that writes STEP, whose library is large and optional."""
     if find_spec("OCP") is None:
-        raise InputError(NEEDED + MISSING.format(extra_command("cad")))
+        command = extra_command("cad")
+        raise InputError(f"STEP needs Open CASCADE, which is not installed; install it with `{command}`.")
     try:
         return import_module("kinetostat.exchange.step_file")
     except ImportError as error:
-        raise InputError(NEEDED + BROKEN.format(reason=error)) from None
+        raise InputError(
+            f"STEP needs Open CASCADE, which does not start: {error}. On Debian and Ubuntu: apt-get install libgl1 "
+            "libx11-6."
+        ) from None
