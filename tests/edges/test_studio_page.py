@@ -145,7 +145,7 @@ def test_a_pose_that_takes_its_time_says_so(monkeypatch):
         assert panel.message.text.endswith("...")
         seen.set()
 
-    monkeypatch.setattr(lanes, "PATIENCE", 0.0)
+    monkeypatch.setattr(lanes, "SECONDS_BEFORE_BUSY", 0.0)
     monkeypatch.setattr(page_of_a_tab, "picture", patient)
     monkeypatch.setattr(ScenePanel, "wait", wait)
 

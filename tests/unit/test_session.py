@@ -13,7 +13,7 @@ from refusals import refused
 
 pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
 
-from kinetostat.studio.controls import PANELS, STEPS
+from kinetostat.studio.controls import CONTROL_PANELS, SLIDER_STEPS
 from kinetostat.studio.session import Memory, Session
 from kinetostat.studio.wording import full_label, shown_value
 
@@ -138,7 +138,7 @@ def test_every_number_has_a_control_and_text_that_can_be_typed(case):
     assert {path for path, control in session.controls.items() if len(control.parameter.leaves) == 1} == moved
     held = session.values()
     for path, control in session.controls.items():
-        assert control.panel in PANELS
+        assert control.panel in CONTROL_PANELS
         text = shown_value(control.parameter.quantity, held[path])
         session.write(path, text)
         assert session.value(path) == pytest.approx(held[path], rel=1e-5, abs=1e-12)
@@ -152,7 +152,7 @@ def test_sliders_contain_the_value_and_go_both_ways(case):
         if not control.slides:
             continue
         assert control.value_at(control.position_of(held[path])) == pytest.approx(held[path], rel=0.02, abs=0.02)
-        assert control.value_at(0) < control.value_at(STEPS // 2) < control.value_at(STEPS)
+        assert control.value_at(0) < control.value_at(SLIDER_STEPS // 2) < control.value_at(SLIDER_STEPS)
 
 
 def test_what_weighs_nothing_yet_has_a_slider_from_nothing_on():
@@ -161,11 +161,11 @@ def test_what_weighs_nothing_yet_has_a_slider_from_nothing_on():
     for path in ("tool.mass", "linear_density.legs", "drives.rotor_inertia", "drives.lead", "damping.ratio"):
         control = session.controls[path]
         assert (control.panel, control.value_at(0)) == ("Mass", 0.0)
-        session.slide(path, STEPS // 2)
+        session.slide(path, SLIDER_STEPS // 2)
         assert session.value(path) == pytest.approx(0.5 * control.high)
         assert control.high > 0.0
     with refused("which no body has"):
-        session.slide("tool.inertia.0", STEPS)
+        session.slide("tool.inertia.0", SLIDER_STEPS)
     session.settle()
     session.write("tool.inertia", "0.3 kg*m**2")
     session.write("tool.inertia.2", "0.5 kg*m**2")
@@ -174,9 +174,9 @@ def test_what_weighs_nothing_yet_has_a_slider_from_nothing_on():
 
 
 def test_the_last_position_of_a_stiffness_is_rigid(session):
-    session.slide("stiffness.passive_links", STEPS)
+    session.slide("stiffness.passive_links", SLIDER_STEPS)
     assert math.isinf(session.value("stiffness.passive_links.0"))
-    assert session.controls["stiffness.passive_links"].position_of(math.inf) == STEPS
+    assert session.controls["stiffness.passive_links"].position_of(math.inf) == SLIDER_STEPS
 
 
 @pytest.mark.parametrize("name", ["tripteron", "hexapod-hardware", "cogiro", "hexapod"])

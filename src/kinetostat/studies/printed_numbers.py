@@ -31,7 +31,7 @@ CITATION = (
     "(2002)"
 )
 MACHINE = "zhang-gosselin-4dof"
-ACTUATOR = 1000.0
+ACTUATOR_STIFFNESS = 1000.0
 """K_actuator, N/m, in every table."""
 
 
@@ -42,7 +42,7 @@ class PrintedRow:
     Attributes:
         label: what the paper prints in the column K_passive.
         setting: the value of both stiffness.passive_links that belongs to the numbers.
-        values: as
+        values: the printed numbers, digit for digit.
     """
 
     label: str
@@ -65,7 +65,7 @@ TABLE_3 = (
     PrintedRow("10^6 Ka", "1e10 N*m/rad", ("0.516397", "1.40459", "1.5e-10", "0.908722", "5.78e-11", "0.0111393")),
     PrintedRow("rigid", "rigid", ("0.516397", "1.40459", "0.0", "0.908722", "0.0", "0.0111393")),
 )
-"""Compliance, rad/(N·m) and m/N."""
+"""Diagonal of C, rad/(N·m) and m/N."""
 
 TABLE_4 = (
     PrintedRow("1000", "1e3 N*m/rad", ("8.50551", "26.21", "743.98", "70.4587", "2223.51", "3628.32")),
@@ -73,7 +73,7 @@ TABLE_4 = (
     PrintedRow("10^6 Ka", "1e9 N*m/rad", ("8.50551", "26.21", "7.40741e8", "70.4587", "1.92e9", "3628.32")),
     PrintedRow("10^7 Ka", "1e10 N*m/rad", ("8.50551", "26.21", "7.40741e9", "70.4587", "1.92e10", "3628.32")),
 )
-"""Stiffness, N·m/rad and N/m."""
+"""Diagonal of K, N·m/rad and N/m."""
 
 ONE_DIGIT = "one digit is wrong: the other rows of the table approach the rigid row in proportion to 1/K_passive"
 ERRATA = {
@@ -105,6 +105,8 @@ EQUATIONS_33_38 = {
 }
 """Equation number, and the coefficient of each stiffness in the diagonal of K."""
 
+# Section 4.3: compliances of the initial and the optimised design as printed, in the order rx ry rz x y z, their sums,
+# and the ratio of the sums. With 1e10 N·m/rad the passive links count as rigid there.
 INITIAL = ("0.5164", "1.4", "1.5e-10", "0.91", "5.78e-11", "0.011")
 INITIAL_SUM = "2.84085"
 OPTIMISED = ("0.12", "0.57", "3.747e-3", "0.32", "5e-11", "3.345e-3")
@@ -142,8 +144,8 @@ class PaperNumber:
     """One number of the paper.
 
     Attributes:
-        place: where it is printed, e.g. "Table III, row 1".
-        component: which number there.
+        place: its place in the paper, e.g. "Table III, row 1".
+        component: the component of the row, or the name of the number.
         printed: the value as printed.
         computed: the value that this program computes, SI.
         unit: unit of both values.
@@ -197,7 +199,7 @@ def table_3() -> Iterator[PaperNumber]:
 def _label_of_row_4(place: str, value: str) -> PaperNumber:
     """Compare the label of a row with the ratio K_passive / Ka that gives its printed C_rz: the label is wrong."""
     for exponent in range(10):
-        stiffness = ACTUATOR * 10**exponent
+        stiffness = ACTUATOR_STIFFNESS * 10**exponent
         if rounds_to(at(f"stiffness.passive_links={stiffness}").compliance.diagonal()[2], value):
             return compare(place, "K_passive / Ka", "1e6", float(10**exponent), "1")
     return compare(place, "K_passive / Ka", "1e6", 0.0, "1")
@@ -266,9 +268,9 @@ class EquationCheck:
 
     Attributes:
         equation: its number(s).
-        statement: what is tested, in our words.
-        residual: relative; should vanish.
-        tolerance: what it may be.
+        statement: the statement that is tested, in our words.
+        residual: relative difference between both sides, which should vanish.
+        tolerance: greatest residual with which the equation holds.
     """
 
     equation: str
@@ -309,7 +311,7 @@ def _rigid_checks(response: Response) -> Iterator[EquationCheck]:
     forces = b.T @ np.linalg.solve(aj.T, jacobian.T @ load_on_tool)
     gap = _gap(forces @ np.linalg.solve(b, aj), load_on_tool @ jacobian)
     yield EquationCheck("5-11", "actuator forces do the work of the wrench on every feasible twist", gap, ROUND_OFF)
-    actuator = np.eye(4) / ACTUATOR
+    actuator = np.eye(4) / ACTUATOR_STIFFNESS
     inner = np.linalg.solve(aj, b)
     rigid = jacobian @ inner @ actuator @ inner.T @ jacobian.T
     ours = _rows(respond(load(MACHINE, ["stiffness.passive_links=rigid"])).compliance)
@@ -326,7 +328,8 @@ def _flexible_checks(response: Response) -> Iterator[EquationCheck]:
     a, b, jacobian, virtual = _matrices(response)
     back = np.linalg.inv(np.hstack([jacobian, virtual]))
     springs = np.diag([0.0] * 4 + [1000.0, 1000.0])
-    stiffness = back.T @ springs @ back + a.T @ np.linalg.inv(b).T @ (ACTUATOR * np.eye(4)) @ np.linalg.inv(b) @ a
+    rates = np.linalg.inv(b) @ a
+    stiffness = back.T @ springs @ back + ACTUATOR_STIFFNESS * rates.T @ rates
     k, c = _rows(response.stiffness), _rows(response.compliance)
     gap = _gap(stiffness, k)
     yield EquationCheck("23-32", "K of the flexible machine equals sum of W G^-1 W^T", gap, ROUND_OFF)

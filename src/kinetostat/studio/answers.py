@@ -303,8 +303,10 @@ def _frequencies(machine: Machine) -> dict[str, str]:
     return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(axes) + 1)}
 
 
-POINTS, NEAR = 300, 40
-"""Frequencies of a response, over its range and about each mode besides: what a small plot can show."""
+RESPONSE_POINTS = 300
+"""Frequencies of a response over its range: about as many as a small plot has pixels across."""
+POINTS_ABOUT_MODE = 40
+"""Further frequencies about each mode, whose peak is narrower than a pixel."""
 
 
 @dataclass(frozen=True)
@@ -330,7 +332,7 @@ def ringing(machine: Machine) -> Ringing | str:
         return str(error)
     if not answer.modes:
         return Ringing(answer)
-    frequencies = frequency_range(answer, points=POINTS, near=NEAR)
+    frequencies = frequency_range(answer, points=RESPONSE_POINTS, near=POINTS_ABOUT_MODE)
     return Ringing(answer, frequencies, answer.receptance(frequencies.tolist()))
 
 

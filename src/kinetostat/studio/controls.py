@@ -17,12 +17,13 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.wording import label, table_of
 from kinetostat.units import KINDS
 
-PANELS = ("Pose", "Geometry", "Stiffness", "Mass", "Load")
-STEPS = 1000
+CONTROL_PANELS = ("Pose", "Geometry", "Stiffness", "Mass", "Load")
+"""Panels of the controls, in the order of their tabs."""
+SLIDER_STEPS = 1000
 """Positions of a slider: more than it has pixels."""
 LENGTH_SHARE = 0.75
 """Range of a length about its value, in units of the machine's length in the pose, of the value itself elsewhere."""
-TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0), "load": math.pi}
+ANGLE_RANGES = {"pose": math.radians(40.0), "geometry": math.radians(30.0), "load": math.pi}
 """Range of an angle about its value, rad."""
 STIFFNESS_FACTOR = 1e3
 """Factor by which a stiffness varies about its value, up and down: from a rubber to a rigid part."""
@@ -36,7 +37,7 @@ LARGEST_MASS = 1000.0
 """Upper end of the range of a mass that is zero, in kg per square of the machine's length: 10 kg for one of 10 cm."""
 SLENDERNESS = 10.0
 """Lengths of the machine over which such a mass would be spread as that of links: those of six legs and some more."""
-LARGEST = {
+LARGEST_OTHERS = {
     "drives.rotor_inertia": 1e-4,
     "drives.lead": 0.02,
     "drives.ratio": 100.0,
@@ -49,10 +50,10 @@ LARGEST = {
     "cutting.pressure": 4e9,
 }
 """Upper ends of the ranges of other numbers of vibrations that are zero, SI."""
-PRODUCTS = ("xy", "xz", "yz")
+PRODUCTS_OF_INERTIA = ("xy", "xz", "yz")
 """Entries of an inertia that may be negative."""
-ROOM = 3.0
-"""Upper end of the range of such a number that is not zero, in units of itself: what it is lies well within."""
+HEADROOM = 3.0
+"""Upper end of the range of such a number that is not zero, in units of itself, so that it lies well within."""
 OF_LOADED_STATES = (
     "load.gravity",
     "load.gravity_angle",
@@ -73,7 +74,7 @@ class Control:
 
     Attributes:
         parameter: the number that it sets.
-        panel: one of `PANELS`.
+        panel: one of `CONTROL_PANELS`.
         group: heading within the panel.
         low, high: ends of its slider, SI; equal where there is none.
         logarithmic: whether positions are spaced by a constant factor; of a stiffness the
@@ -111,8 +112,8 @@ class Control:
         return self.low < self.high
 
     def value_at(self, position: int) -> float:
-        """Return the SI value at a position from 0 to `STEPS`."""
-        share = min(max(position, 0), STEPS) / STEPS
+        """Return the SI value at a position from 0 to `SLIDER_STEPS`."""
+        share = min(max(position, 0), SLIDER_STEPS) / SLIDER_STEPS
         if not self.logarithmic:
             return self.low + (self.high - self.low) * share
         quantity = self.parameter.quantity
@@ -130,10 +131,10 @@ class Control:
             share = math.log(value / self.low) / math.log(self.high / self.low)
         else:
             share = float(value > 0.0)
-        return round(STEPS * min(max(share, 0.0), 1.0))
+        return round(SLIDER_STEPS * min(max(share, 0.0), 1.0))
 
 
-DERIVED = ("axis", "first_axis", "second_axis")
+DERIVED_FIELDS = ("axis", "first_axis", "second_axis")
 """Fields of a joint that may follow from another joint: `axis = "ball"` points to the ball joint."""
 
 
@@ -167,7 +168,7 @@ def _derived_fields(machine: Machine) -> set[str]:
         if isinstance(value, list)
     }
     fields = {parameter.path for parameter in parameters(machine.family) if parameter.path.startswith("legs.")}
-    return {path for path in fields if path.rpartition(".")[2] in DERIVED and path not in written}
+    return {path for path in fields if path.rpartition(".")[2] in DERIVED_FIELDS and path not in written}
 
 
 def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
@@ -199,8 +200,8 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
         return Control(parameter, panel, group, 0.0, 0.0, False)
     usual = _usual(parameter, length) if panel == "Mass" else None
     if usual is not None:
-        most = ROOM * abs(value) or usual
-        product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS)
+        most = HEADROOM * abs(value) or usual
+        product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS_OF_INERTIA)
         least = LEAST_SHARE * most if quantity.positive else 0.0
         return Control(parameter, panel, group, -most if product else least, most, False)
     low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
@@ -215,7 +216,7 @@ def _range(kind: str, stiff: bool, value: float, table: str, length: float) -> t
         middle = value if 0.0 < value < math.inf else USUAL_STIFFNESS
         return middle / STIFFNESS_FACTOR, middle * STIFFNESS_FACTOR, True
     if kind == "angle":
-        around = TURN.get(table, TURN["geometry"])
+        around = ANGLE_RANGES.get(table, ANGLE_RANGES["geometry"])
         return value - around, value + around, False
     if kind == "length":
         around = LENGTH_SHARE * (length if table == "pose" or value == 0.0 else abs(value))
@@ -233,25 +234,25 @@ def _usual(parameter: Parameter, length: float) -> float | None:
     """Return the upper end of the slider of a number that is zero; None for what has a range as any other number."""
     mass = LARGEST_MASS * length**2
     kinds = {"mass": mass, "inertia": mass * length**2, "linear density": mass / (SLENDERNESS * length)}
-    return LARGEST.get(parameter.path, kinds.get(parameter.quantity.kind))
+    return LARGEST_OTHERS.get(parameter.path, kinds.get(parameter.quantity.kind))
 
 
 # The factor by which the deflected shape is exaggerated: a slider as well, but no number of the machine.
 
 AUTO = "auto"
 """Word that leaves the choice of the factor to the page."""
-DECADES = (-3, 9)
+FACTOR_DECADES = (-3, 9)
 """Powers of ten between which the factor lies: shapes smaller than they are, and picometres as centimetres."""
-ROUND = (1.0, 2.0, 5.0)
+ROUND_FACTORS = (1.0, 2.0, 5.0)
 """Factors within a power of ten: about equal steps to the eye."""
-FACTOR_STEPS = len(ROUND) * (DECADES[1] - DECADES[0])
+FACTOR_STEPS = len(ROUND_FACTORS) * (FACTOR_DECADES[1] - FACTOR_DECADES[0])
 """Positions of the slider: 1, 2 and 5 times every power of ten."""
 
 
 def factor_at(position: int) -> float:
     """Return the exaggeration at a position from 0 to `FACTOR_STEPS`."""
-    decades, step = divmod(min(max(position, 0), FACTOR_STEPS), len(ROUND))
-    return float(f"{ROUND[step]:g}e{DECADES[0] + decades}")
+    decades, step = divmod(min(max(position, 0), FACTOR_STEPS), len(ROUND_FACTORS))
+    return float(f"{ROUND_FACTORS[step]:g}e{FACTOR_DECADES[0] + decades}")
 
 
 def factor_position(factor: float) -> int:
@@ -268,7 +269,7 @@ def read_factor(text: str) -> float | None:
     typed = text.strip().lstrip("×x").strip()
     if typed == AUTO or not typed or typed.endswith(f"({AUTO})"):
         return None
-    least, most = (10.0**power for power in DECADES)
+    least, most = (10.0**power for power in FACTOR_DECADES)
     try:
         factor = float(typed.replace(",", ""))
     except ValueError:

@@ -16,11 +16,11 @@ from nicegui import Client, background_tasks, context
 Request = TypeVar("Request")
 Result = TypeVar("Result")
 
-WORKERS = 4
+THREADS = 4
 """Threads for all pages: Python computes one thing at a time, so more of them would only delay the event loop."""
 THREADS_PER_PAGE = 2
 """Threads that one page may use at a time, so that a page with a slow machine leaves some to the others."""
-PATIENCE = 0.3
+SECONDS_BEFORE_BUSY = 0.3
 """Seconds that a computation may take before the page says that it is busy: a message for less would only flicker."""
 
 log = logging.getLogger("kinetostat")
@@ -81,7 +81,7 @@ class Lane(Generic[Request, Result]):
             request = self._waiting.pop()
             try:
                 working = asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
-                ended, _ = await asyncio.wait([working], timeout=PATIENCE)
+                ended, _ = await asyncio.wait([working], timeout=SECONDS_BEFORE_BUSY)
                 if self._open and not ended:
                     with self._page:
                         self._slow()
@@ -113,4 +113,4 @@ def _share(page: Client) -> asyncio.Semaphore:
 
 @cache
 def _workers() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(WORKERS, "studio")
+    return ThreadPoolExecutor(THREADS, "studio")

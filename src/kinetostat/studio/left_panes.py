@@ -21,7 +21,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
-from kinetostat.studio.controls import PANELS, STEPS, Control
+from kinetostat.studio.controls import CONTROL_PANELS, SLIDER_STEPS, Control
 from kinetostat.studio.elements import THROTTLE, QuantityRow, TextEditor
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
@@ -49,10 +49,10 @@ class ParametersPanel:
         self._waiting: tuple[str, int] | None = None
         self._rows: dict[str, QuantityRow] = {}
         with ui.tabs().classes("panel-tabs").props("dense no-caps") as tabs:
-            for panel in PANELS:
+            for panel in CONTROL_PANELS:
                 ui.tab(panel).mark(f"tab-{panel}")
-        with ui.tab_panels(tabs, value=PANELS[0], animated=False).classes("panel-body").props("keep-alive"):
-            self._places = {panel: self._place(panel) for panel in PANELS}
+        with ui.tab_panels(tabs, value=CONTROL_PANELS[0], animated=False).classes("panel-body").props("keep-alive"):
+            self._places = {panel: self._place(panel) for panel in CONTROL_PANELS}
         self.fill()
 
     @staticmethod
@@ -96,7 +96,7 @@ class ParametersPanel:
     def _make(self, members: list[Control]) -> None:
         present = self._session.values()
         for control in members:
-            row = QuantityRow(control.label, control.parameter.quantity.meaning, STEPS, control.slides)
+            row = QuantityRow(control.label, control.parameter.quantity.meaning, SLIDER_STEPS, control.slides)
             row.mark(f"control {control.path}")
             row.on("slide", partial(self._slide, control.path), throttle=THROTTLE)
             row.on("settle", partial(self._settle, control.path))

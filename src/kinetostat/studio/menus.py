@@ -26,7 +26,7 @@ REPORTS = (
 """Name, suffix and description of each kind of report."""
 SHARED = ("page", "link")
 """Formats for people who have no kinetostat."""
-SHARE = "Share and export: reports, the machine as a page or a link, and formats of other programs"
+SHARE_HINT = "Share and export: reports, the machine as a page or a link, and formats of other programs"
 BUSY = "Another file is being written; wait until it is done."
 WRITING = Turns(2, BUSY)
 """Files of all tabs that are written at a time."""
@@ -40,7 +40,7 @@ class FilesMenu:
         self._session = session
         self._process: asyncio.subprocess.Process | None = None
         self._busy = False
-        self._button = icon_button("ios_share", SHARE, lambda: None, "files")
+        self._button = icon_button("ios_share", SHARE_HINT, lambda: None, "files")
         with self._button, ui.menu().props('auto-close max-height="90vh"'):
             for name, suffix, summary in REPORTS:
                 self._item(name, suffix, summary, ["report"])
@@ -116,13 +116,13 @@ def _archive_of(files: Sequence[tuple[str, bytes]]) -> bytes:
 
 PICTURES = Path(__file__).parent / "gallery_pictures"
 """Pictures by the names of machines; `benchmarks/gallery_pictures.py` makes them. A machine may be without one."""
-ADDRESS = "/gallery"
+PICTURE_ADDRESS = "/gallery"
 """Address from which the browser gets the pictures."""
 
 
 def serve_pictures() -> None:
     """Let browsers load the pictures."""
-    app.add_static_files(ADDRESS, PICTURES)
+    app.add_static_files(PICTURE_ADDRESS, PICTURES)
 
 
 def about(text: str) -> str:
@@ -165,7 +165,7 @@ class Gallery:
             for name, text in bundled().items():
                 with ui.element("button").classes("gallery-card").mark(f"gallery {name}") as card:
                     if (PICTURES / f"{name}.webp").exists():
-                        picture = ui.element("img").props(f'src="{ADDRESS}/{name}.webp" alt="" loading="lazy"')
+                        picture = ui.element("img").props(f'src="{PICTURE_ADDRESS}/{name}.webp" alt="" loading="lazy"')
                         picture.props('width="240" height="180"')
                     ui.label(name).classes("gallery-name")
                     ui.label(about(text)).classes("gallery-about")

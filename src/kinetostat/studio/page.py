@@ -42,7 +42,7 @@ ACCENT = "#0b5ea8"
 MODES = {"Explore": "studio", "Text": "studio texting", "Design": "studio designing", "Ask": "studio asking"}
 """Panes beside the machine: its numbers, the text of its file, the design or the ask tab; also classes of the page."""
 EXPLORE, TEXT, DESIGN, ASK = MODES
-OTHER = "own"
+OWN_MACHINE = "own"
 """Key in the list of machines of one that is not bundled."""
 
 
@@ -140,9 +140,9 @@ class StudioPage:
         """Show another machine: every control, list and picture is made again."""
         machine = self.session.machine
         names = {name: name for name in bundled()}
-        options = names if self.session.name else {OTHER: machine.name, **names}
+        options = names if self.session.name else {OWN_MACHINE: machine.name, **names}
         self._listening = False
-        self.machines.set_options(options, value=self.session.name or OTHER)
+        self.machines.set_options(options, value=self.session.name or OWN_MACHINE)
         self._listening = True
         ui.page_title(f"{machine.name} · kinetostat studio")
         self._sizes = proportions_of(machine, state_of(self.session.origin).configuration)
@@ -233,7 +233,7 @@ class StudioPage:
         self._front = None
 
     def _choose(self) -> None:
-        if self._listening and self.machines.value != OTHER:
+        if self._listening and self.machines.value != OWN_MACHINE:
             name = str(self.machines.value)
             self._attempt(lambda: self.session.open(name))
 

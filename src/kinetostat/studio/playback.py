@@ -126,7 +126,9 @@ class Playback:
                 self._player = Player(PATH_PERIOD, 1, self._go, is_busy, "Play or pause", "path")
                 icon_button("add_location_alt", "Keep this pose", self._keep, "path-keep")
                 self.upload = upload_field(self._open, refuse, "path-upload", ".csv")
-                icon_button("folder_open", "Open a CSV file of poses", self._pick, "path-open")
+                icon_button(
+                    "folder_open", "Open a CSV file of poses", lambda: self.upload.run_method("pickFiles"), "path-open"
+                )
                 icon_button("delete_outline", "Forget the path", self.clear, "path-clear")
                 ui.space()
                 icon_button("close", "Close", self.menu.close, "path-close")
@@ -142,9 +144,6 @@ class Playback:
         """Forget the path, because its poses are those of another machine or nobody wants it any more."""
         self._kept, self._path = [], {}
         self._show()
-
-    def _pick(self) -> None:
-        self.upload.run_method("pickFiles")
 
     async def _open(self, event: events.UploadEventArguments) -> None:
         """Take the poses of a CSV file."""
@@ -199,10 +198,11 @@ def poses_between(kept: list[dict[str, float]]) -> Poses:
 
 
 FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
+"""Kinds of curves, as their buttons name them."""
 FRAMES = 100
 """Steps of a motion that is played: a movement to the eye, and each is a whole analysis."""
 FRAME_PERIOD = 0.12
-"""Seconds between two of them, if the computer keeps up: the longest at which steps still look like a motion."""
+"""Seconds between two steps, if the computer keeps up: the longest at which they still look like a motion."""
 POINTS_SHOWN = 300
 """Points of a curve: about as many as it has pixels across."""
 NO_MOTION = (
@@ -224,7 +224,9 @@ class DrivesPanel(Panel):
         self._lane = Lane(drives_along, self._deliver)
         with ui.row().classes("panel-tools"):
             self.upload = upload_field(self._open, refuse, "drives-upload", ".csv")
-            icon_button("folder_open", "Open a CSV file of a motion", self._pick, "drives-open")
+            icon_button(
+                "folder_open", "Open a CSV file of a motion", lambda: self.upload.run_method("pickFiles"), "drives-open"
+            )
             self.kind = toggle([FORCE, SPEED, TORQUE, POWER, TOOL], FORCE, self._draw, "drives-kind")
         self.about = ui.html(paragraph(NO_MOTION), sanitize=False).mark("drives-about")
         with ui.element("div").classes("vibration") as self.content:
@@ -262,9 +264,6 @@ class DrivesPanel(Panel):
         self._player.pause()
         self._asked = self._session.machine
         self._lane.ask(MotionRequest(self._session.machine, self._text))
-
-    def _pick(self) -> None:
-        self.upload.run_method("pickFiles")
 
     async def _open(self, event: events.UploadEventArguments) -> None:
         """Take the motion of a CSV file."""

@@ -16,7 +16,7 @@ from kinetostat.spec.document import parse, text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 
-MODESTY = 10
+NICENESS = 10
 """Added to `nice` of such a process, so that the pages get their time first."""
 
 
@@ -57,13 +57,13 @@ def make_modest(process: int) -> None:
     """Let a process, by its number, give way to the pages, where the system can."""
     if sys.platform != "win32":
         with suppress(ProcessLookupError):  # it has ended already
-            os.setpriority(os.PRIO_PROCESS, process, MODESTY)
+            os.setpriority(os.PRIO_PROCESS, process, NICENESS)
 
 
 READING_PROGRAM = "kinetostat.studio.processes"
 SECONDS_TO_READ = 10
 """Processor time of the process, s; a usual machine takes one second, nearly all of it to start."""
-PATIENCE = 60.0
+SECONDS_TO_WAIT = 60.0
 """Time, s, after which the process is stopped, on a server with much other work as well."""
 MEMORY_TO_READ = 2 << 30
 """Address space of the process, bytes; its libraries take half a gigabyte."""
@@ -92,7 +92,7 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
         )  # fmt: skip
         make_modest(process.pid)
         try:
-            answer, _ = await asyncio.wait_for(process.communicate(data), PATIENCE)
+            answer, _ = await asyncio.wait_for(process.communicate(data), SECONDS_TO_WAIT)
         except TimeoutError:
             answer = b""
         finally:

@@ -20,21 +20,24 @@ from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.views.scene.anatomy import anatomy
 
 MOVES, TURNS = ("x", "y", "z"), ("rx", "ry", "rz")
+"""Axes of the base along which a platform can be pulled, and about which it can be turned."""
 PLATFORM, BASE, HEAD = "platform", "base", "head"
 """Kinds of handles: of the whole platform, of a joint on the base, or of a joint on the platform."""
-HOLD = 0.03
+HOLDING_WEIGHT = 0.03
 """Weight of what should stay (the orientation under a push, the place under a turn) against what is pulled."""
-LEAST_FOLLOWED, MOST_ASIDE = 0.5, 5.0
-"""A platform is free along or about an axis if it can follow a unit pull by this share, and moves aside by less than
-this (in units of the machine's length, and rad)."""
+LEAST_FOLLOWED = 0.5
+"""Share of a unit pull along or about an axis that a platform must be able to follow, so that it is free there."""
+MOST_ASIDE = 5.0
+"""Motion aside that such a pull may cause, in units of the machine's length or rad: more of it looks like flight."""
 FAINT_EFFECT = 1e-3
 """Share of the largest effect on a part from which a number counts as one that moves it."""
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Step of finite differences, in units of the machine's length or in rad: half of the digits are left to slopes."""
-ITERATIONS, HALVINGS = 6, 4
-"""Steps of a pull, and halvings of a step, at most: the next position of the pointer goes on from where these have
-led."""
-REACHED = 1e-7
+MOST_PULL_STEPS = 6
+"""Greatest number of steps of a pull: the next position of the pointer goes on from where these have led."""
+MOST_HALVINGS = 4
+"""Greatest number of halvings of a step: what a sixteenth of it does not improve, the pull does not move."""
+SAME_PLACE = 1e-7
 """Residual, in units of the machine's length, at which the part is where it was pulled: far less than a pixel."""
 DECIMALS = 9
 """Decimals of metres and radians: finer than anybody can pull, and without the digits of round-off."""
@@ -107,7 +110,7 @@ def _follows(slopes: Array, k: int, weights: Array) -> bool:
 
 def _weights(axis: str) -> Array:
     """Return what counts of the platform's motion under a pull: the place under a push, the turn under a turn."""
-    return np.array([1.0] * 3 + [HOLD] * 3 if axis in MOVES else [HOLD] * 3 + [1.0] * 3)
+    return np.array([1.0] * 3 + [HOLDING_WEIGHT] * 3 if axis in MOVES else [HOLDING_WEIGHT] * 3 + [1.0] * 3)
 
 
 def numbers_after_pull(pull: Pull) -> dict[str, float]:
@@ -164,13 +167,13 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
     """Go downhill by Gauss and Newton; a step that leads out of reach, or uphill, is halved."""
     numbers, units = problem.start, problem.units
     residual, effective = problem.at(numbers), np.zeros(len(numbers), dtype=bool)
-    for _ in range(ITERATIONS):
-        if not np.isfinite(residual).all() or np.abs(residual).max() < REACHED:
+    for _ in range(MOST_PULL_STEPS):
+        if not np.isfinite(residual).all() or np.abs(residual).max() < SAME_PLACE:
             break
         slopes = _slopes(problem, numbers, residual)
         effective = effective | slopes.any(axis=0)
         step = units * np.linalg.lstsq(slopes, -residual, rcond=NO_MOTION)[0]
-        for _ in range(HALVINGS):
+        for _ in range(MOST_HALVINGS):
             trial = problem.at(numbers + step)
             if np.isfinite(trial).all() and np.linalg.norm(trial) < np.linalg.norm(residual):
                 break
@@ -180,7 +183,7 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
         numbers, residual = numbers + step, trial
     # What has moved less than a residual may be left is round-off: it stays as it was written, to the last digit.
     start = problem.start
-    numbers = np.where(np.abs(numbers - start) > REACHED * units, np.round(numbers, DECIMALS), start)
+    numbers = np.where(np.abs(numbers - start) > SAME_PLACE * units, np.round(numbers, DECIMALS), start)
     # All numbers that have an effect, changed or not: a whole pull changes the same ones, and is one step to undo.
     return {path: float(n) for path, n, counts in zip(problem.unknowns, numbers, effective, strict=True) if counts}
 
@@ -192,8 +195,8 @@ def _slopes(problem: _Problem, numbers: Array | None = None, residual: Array | N
     columns = []
     for k, unit in enumerate(problem.units):
         ahead = numbers.copy()
-        ahead[k] += DIFFERENCE * unit
-        columns.append((problem.at(ahead) - residual) / DIFFERENCE)
+        ahead[k] += DIFFERENCE_STEP * unit
+        columns.append((problem.at(ahead) - residual) / DIFFERENCE_STEP)
     slopes = np.nan_to_num(np.array(columns, dtype=float).T.reshape(len(residual), len(columns)))
     effects = np.linalg.norm(slopes, axis=0)
     return slopes * (effects > FAINT_EFFECT * effects.max(initial=0.0))

@@ -26,9 +26,9 @@ from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.wording import typed_value, unit_shown
 from kinetostat.units import UnitError
 
-TEXT = "text"
+TYPED_TEXT = "text"
 """Word in the place of a path while the text of the machine is being typed."""
-REMEMBERED = 200
+MOST_UNDONE_STEPS = 200
 """Steps that can be undone: more than anybody goes back, at some kilobytes each."""
 
 
@@ -118,7 +118,7 @@ class Session:
         same_family = machine.family.name == self.machine.family.name
         alike = same_family and values(machine).keys() == values(self.machine).keys()
         if alike:
-            source = (TEXT,) if typed else ()
+            source = (TYPED_TEXT,) if typed else ()
             if not typed or self._dragged != source:
                 self._note()
             self.machine, self._dragged = machine, source
@@ -151,7 +151,7 @@ class Session:
             InputError: the numbers contradict each other; the machine is again as it was before the drag.
         """
         dragged, self._dragged = self._dragged, ()
-        if any(path != TEXT and related(self.machine, path) for path in dragged):
+        if any(path != TYPED_TEXT and related(self.machine, path) for path in dragged):
             try:
                 self.machine = read_again(self.machine)
             except InputError:
@@ -199,7 +199,7 @@ class Session:
 
     def _note(self) -> None:
         """Add the present machine to the history; a new branch begins, so nothing can be redone."""
-        self._past = [*self._past[-REMEMBERED + 1 :], self.machine]
+        self._past = [*self._past[-MOST_UNDONE_STEPS + 1 :], self.machine]
         self._future.clear()
 
     @property
@@ -253,9 +253,9 @@ def file_stem(name: str) -> str:
     return "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower()).strip("-") or "machine"
 
 
-MACHINE, FILE = "machine", "file"
+MACHINE_KEY, FILE_KEY = "machine", "file"
 """Keys of a bundled machine's name, and of a compressed machine file."""
-STATE = "load.state"
+STATE_KEY = "load.state"
 """Key of the state in which the machine is shown, if that is not the one of its file."""
 LONGEST_ADDRESS = 8000
 """Characters of an address; browsers and servers take some more. A machine that needs more has no link."""
@@ -267,8 +267,8 @@ def address_of(memory: Memory) -> str:
     if origin.name != machine.name or origin.family.literals != machine.family.literals:
         origin = machine
     bundled_origin = memory.name and origin is memory.origin
-    start = (MACHINE, memory.name) if bundled_origin else (FILE, _packed_text(as_toml(origin)))
-    state = [] if origin.loaded is machine.loaded else [(STATE, machine.state)]
+    start = (MACHINE_KEY, memory.name) if bundled_origin else (FILE_KEY, _packed_text(as_toml(origin)))
+    state = [] if origin.loaded is machine.loaded else [(STATE_KEY, machine.state)]
     query = urlencode([start, *state, *_changes(origin, machine)], quote_via=quote, safe="/*")
     return query if len(query) <= LONGEST_ADDRESS else ""
 
@@ -294,17 +294,17 @@ def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
         InputError: it names no machine, or the machine or a change of it has a mistake.
     """
     (key, text), *changes = [*query] or [("", "")]
-    if key == MACHINE:
-        choice(text, bundled(), f"{MACHINE} in the address")
+    if key == MACHINE_KEY:
+        choice(text, bundled(), f"{MACHINE_KEY} in the address")
         name, origin = text, load(text)
-    elif key == FILE:
+    elif key == FILE_KEY:
         name, origin = "", build(_unpacked_text(text), "the machine in the address")
     else:
-        raise InputError(f"the address names no machine; it must begin with ?{MACHINE}=... or ?{FILE}=... .")
+        raise InputError(f"the address names no machine; it must begin with ?{MACHINE_KEY}=... or ?{FILE_KEY}=... .")
     if not changes:
         return Memory(origin, name)
     numbers = dict(changes)
-    state = choice(numbers.pop(STATE, origin.state), STATES, f"{STATE} in the address")
+    state = choice(numbers.pop(STATE_KEY, origin.state), STATES, f"{STATE_KEY} in the address")
     return Memory(origin, name, read_again(replace(changed(origin, numbers), loaded=STATES[state])))
 
 
@@ -323,5 +323,5 @@ def _unpacked_text(packed: str) -> str:
     except (ValueError, zlib.error):
         pass
     raise InputError(
-        f"the machine file in the address is damaged or too large; copy the whole address after ?{FILE}= ."
+        f"the machine file in the address is damaged or too large; copy the whole address after ?{FILE_KEY}= ."
     )

@@ -95,9 +95,9 @@ class DesignTab:
         self.runs.follow(run)
 
 
-LEAST = 2
+LEAST_COMPARED = 2
 """Designs that are compared at a time, at least; `MOST_DESIGNS` at most, as in the command."""
-PRESENT = 0
+PRESENT_NUMBER = 0
 """The number of the present machine in the list; favourites begin at 1."""
 PRESENT_NAME = "present machine"
 
@@ -151,10 +151,10 @@ class FavouritesPanel:
     def fill(self) -> None:
         """List the favourites that there are now."""
         favourites = self._favourites.every()
-        self._chosen &= {PRESENT, *(favourite.number for favourite in favourites)}
+        self._chosen &= {PRESENT_NUMBER, *(favourite.number for favourite in favourites)}
         self._list.clear()
         with self._list:
-            self._line(PRESENT, PRESENT_NAME, "")
+            self._line(PRESENT_NUMBER, PRESENT_NAME, "")
             for kept in favourites:
                 with self._line(kept.number, kept.name, kept.note):
                     self._button("input", f"Load {kept.name}", partial(self._take, kept), f"{kept.number} load")
@@ -183,7 +183,7 @@ class FavouritesPanel:
         self._count()
 
     def _count(self) -> None:
-        self.compare.set_enabled(LEAST <= len(self._chosen) <= MOST_DESIGNS)
+        self.compare.set_enabled(LEAST_COMPARED <= len(self._chosen) <= MOST_DESIGNS)
 
     def _keep(self) -> None:
         try:
@@ -214,9 +214,9 @@ class FavouritesPanel:
         except InputError as error:
             refuse(str(error))
             return
-        if PRESENT in self._chosen:
+        if PRESENT_NUMBER in self._chosen:
             machines.insert(0, (PRESENT_NAME, self._session.machine))
-        if len(machines) >= LEAST:
+        if len(machines) >= LEAST_COMPARED:
             self._lane.ask((machines, _entries_of(self.quantities.value), _entries_of(self.over.value)))
 
     def _show(self, _request: Request, shown: str | InputError) -> None:

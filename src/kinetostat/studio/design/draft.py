@@ -24,7 +24,7 @@ from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.wording import shown_value, typed_value
 from kinetostat.units import UNIT, UnitError
 
-AROUND = 0.2
+BOUNDS_SHARE = 0.2
 """Bounds of a new variable, as a share of its present value: a change that a designer would consider."""
 FORM = "the study"
 """Name of a draft in messages, where a file would have its path."""
@@ -164,7 +164,7 @@ def usual_bounds(control: Control, value: float) -> tuple[str, str]:
     """Return bounds for a new variable as text: 20 % about its value, or of the slider's end if that is zero."""
     quantity = control.parameter.quantity
     middle = value if math.isfinite(value) and (value or not quantity.stiff) else USUAL_STIFFNESS
-    around = AROUND * abs(middle) if middle else AROUND * max(control.high, 1e-9)
+    around = BOUNDS_SHARE * abs(middle) if middle else BOUNDS_SHARE * max(control.high, 1e-9)
     low, high = middle - around, min(middle + around, quantity.most)
     return shown_value(quantity, low), shown_value(quantity, high)
 

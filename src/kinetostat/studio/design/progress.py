@@ -20,7 +20,7 @@ from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_pr
 from kinetostat.studies.study_folder import Record, read_history
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
-EXACT = 9
+OBJECTIVE_DIGITS = 9
 """Digits with which objectives are shown: the last ones still change while a search converges."""
 
 
@@ -65,7 +65,7 @@ class Progress:
     def exact(self, objective: Objective, value: float) -> str:
         """Return the value of an objective with all its digits and its unit; a sum of several kinds has none."""
         scale = self.scale(objective)
-        return with_unit(number(value * scale.factor, digits=EXACT), scale.unit.replace("SI", "1"))
+        return with_unit(number(value * scale.factor, digits=OBJECTIVE_DIGITS), scale.unit.replace("SI", "1"))
 
     def design(self, place: int) -> Machine:
         """Return the design at a place of the front as a machine; with one objective, place 0 is the best design."""

@@ -33,7 +33,7 @@ from kinetostat.studio.wording import paragraph
 NOTHING = "No search has been started yet. Choose variables and objectives of the study, then start it."
 DAMAGED = 'Search {} cannot be shown, because its folder "{}" is damaged: {}. The other searches are not affected.'
 NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
-INTERVAL = 0.5
+LOOK_PERIOD = 0.5
 """Seconds between two looks at a search: it seems to move, and reading takes milliseconds."""
 NO_COLOUR = -1
 """The choice of no objective for the colour of a front."""
@@ -89,7 +89,7 @@ class RunPanel:
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
         self.curve = CurveView("objective of the best design and mean of all, over the steps").mark("run-curve")
         self.front = FrontPanel(self._load_design)
-        self.timer = ui.timer(INTERVAL, self.refresh, active=False)
+        self.timer = ui.timer(LOOK_PERIOD, self.refresh, active=False)
 
     def place_result(self) -> None:
         """Make the place of the result; the table of the front must have its place already."""

@@ -16,9 +16,10 @@ from kinetostat.spec.document import read
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import write_text
 
-MOST = 100
+MOST_FAVOURITES = 100
 """Machines that are kept: more than anybody reads in a list."""
 LONGEST_FAVOURITE_NAME, LONGEST_FAVOURITE_NOTE = 80, 400
+"""Characters of a name and of a note: a line, and some sentences of a list."""
 RUNS, FAVOURITES = "runs", "favourites"
 """Folders of searches and of machines that are kept, in the state folder."""
 REMARK = "# Note:"
@@ -132,8 +133,10 @@ class Favourites:
         if len(note) > LONGEST_FAVOURITE_NOTE:
             raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_FAVOURITE_NOTE}.")
         present = numbered_entries(self._folder)
-        if len(present) >= MOST:
-            raise InputError(f"{MOST} favourites are kept, the most there may be; delete one that you no longer need.")
+        if len(present) >= MOST_FAVOURITES:
+            raise InputError(
+                f"{MOST_FAVOURITES} favourites are kept, the most there may be; delete one that you no longer need."
+            )
         number = max(present, default=0) + 1
         path = self._folder / f"{number:04d}-{slug(name, 'machine')}.toml"
         lines = as_file(replace(machine, name=name)).splitlines(keepends=True)

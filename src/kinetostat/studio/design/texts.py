@@ -15,7 +15,7 @@ from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studio.design.progress import EXACT, Progress
+from kinetostat.studio.design.progress import OBJECTIVE_DIGITS, Progress
 from kinetostat.studio.question_process import figure_html
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, titled_table
 from kinetostat.views.comparison import (
@@ -119,7 +119,7 @@ def _remarks(result: dict[str, Any]) -> list[str]:
 
 
 def _exact(scale: Scale, *values: float | None) -> list[str]:
-    return [number(value and value * scale.factor, digits=EXACT) for value in values]
+    return [number(value and value * scale.factor, digits=OBJECTIVE_DIGITS) for value in values]
 
 
 def _ratio(before: float | None, after: float | None) -> str:

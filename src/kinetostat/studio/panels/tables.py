@@ -35,7 +35,8 @@ from kinetostat.views.loaded import (
 from kinetostat.views.report.content import as_table
 from kinetostat.views.tables import headline, requirement_lines
 
-KINDS = {"C": "compliance", "K": "stiffness"}
+MATRIX_NAMES = {"C": "compliance", "K": "stiffness"}
+"""Matrices by the letter on their button."""
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
 
 
@@ -47,7 +48,7 @@ class MatricesPanel(Panel):
     def build(self) -> None:
         self._report: Report | None = None
         with ui.row().classes("panel-tools"):
-            self.kind = toggle(list(KINDS), "C", self._draw, "matrix-kind")
+            self.kind = toggle(list(MATRIX_NAMES), "C", self._draw, "matrix-kind")
             ui.space()
             copy = ui.button("Copy", icon="content_copy", on_click=self._copy).props("flat dense no-caps")
             copy.mark("matrix-copy").tooltip("copy the matrix with all digits, separated by tabs, for a spreadsheet")
@@ -83,17 +84,17 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
         kind: "C" or "K".
     """
     names, rows, display = analysis.components, _rows(analysis, kind), analysis.machine.display
-    title = f"{KINDS[kind]} matrix {kind}"
+    title = f"{MATRIX_NAMES[kind]} matrix {kind}"
     if rows is not None:
-        units = [[entry_unit(KINDS[kind], row, column) for column in names] for row in names]
+        units = [[entry_unit(MATRIX_NAMES[kind], row, column) for column in names] for row in names]
         cells = [
             [entry(value, unit, display) for value, unit in zip(row, of_row, strict=True)]
             for row, of_row in zip(rows, units, strict=True)
         ]
         body = [[name, *row] for name, row in zip(names, cells, strict=True)]
-        return table(title, ["", *names], body, "matrix") + paragraph(matrix_units(KINDS[kind], display))
+        return table(title, ["", *names], body, "matrix") + paragraph(matrix_units(MATRIX_NAMES[kind], display))
     diagonal = zip(names, _diagonal(analysis, kind), strict=True)
-    body = [[name, engineering(value, entry_unit(KINDS[kind], name, name), display)] for name, value in diagonal]
+    body = [[name, engineering(value, entry_unit(MATRIX_NAMES[kind], name, name), display)] for name, value in diagonal]
     reason = "A part is free" if kind == "C" else "A part is rigid"
     note = paragraph(f"{reason}, so {kind} is not finite; its diagonal is shown.")
     return note + table(title, ["", "diagonal"], body, "matrix")

@@ -18,7 +18,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import Mode
 from kinetostat.studio.answers import Report, Ringing, SwingRequest, finite, ringing, swing, weighs
-from kinetostat.studio.controls import STEPS
+from kinetostat.studio.controls import SLIDER_STEPS
 from kinetostat.studio.elements import CurveView, DesignTable, QuantityRow, choice, icon_button, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
@@ -30,19 +30,19 @@ from kinetostat.views.vibration import LEAST_SHARE, MOST_PARTS, cut_sentence, da
 MODES, RESPONSE = "Modes", "Response"
 CUT = "the cut"
 """Name of the direction across the cut, in the place of a component."""
-HEADS = ["frequency", "tool", "modal mass", "most strain energy", "most kinetic energy"]
+MODE_HEADS = ["frequency", "tool", "modal mass", "most strain energy", "most kinetic energy"]
 COMPUTING = "Natural frequencies, modes and the response of the tool are being computed ..."
-MASS = "tool.mass"
+MASS_PATH = "tool.mass"
 NO_MASS = "Nothing says what this machine weighs, and so its natural frequencies are not known."
 MASS_HINT = (
     "Give the mass of platform and tool here, and the modes follow at once. Inertia, links, drives and damping are in "
     "the panel Mass."
 )
-COUPLED = 1e-9
+LEAST_COUPLING = 1e-9
 """Share of the direct responses below which a response between two components is round-off."""
 LARGEST_MASS = 1e300
 """In the place of an infinite modal mass, kg: a browser has no infinity."""
-DIGITS = 5
+PLOT_DIGITS = 5
 """Significant digits of a point of a curve: finer than a pixel, and half of the bytes of a float."""
 
 
@@ -61,7 +61,9 @@ class VibrationPanel(Panel):
         self._modes, self._swings = Lane(ringing, self._deliver), Lane(swing, self._show_swing)
         self.view.on("swinging", self._show_play_state)
         self.about = ui.html("", sanitize=False).mark("vibration-about")
-        self.mass = QuantityRow("mass of platform and tool", MASS_HINT, STEPS, slides=False).mark("vibration-mass")
+        self.mass = QuantityRow("mass of platform and tool", MASS_HINT, SLIDER_STEPS, slides=False).mark(
+            "vibration-mass"
+        )
         self.mass.on("write", self._take_mass)
         with ui.element("div").classes("vibration") as self.content:
             with ui.row().classes("panel-tools"):
@@ -136,15 +138,17 @@ class VibrationPanel(Panel):
     def _ask_for_mass(self, machine: Machine) -> None:
         self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(MASS_HINT))
         if self._session is not None:
-            control = self._session.controls[MASS]
-            self.mass.show_value(shown_value(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
+            control = self._session.controls[MASS_PATH]
+            self.mass.show_value(
+                shown_value(control.parameter.quantity, self._session.value(MASS_PATH), machine.display), 0
+            )
 
     def _take_mass(self, event: GenericEventArguments) -> None:
         """Give the machine the mass that was typed, or say why that is not possible."""
         if self._session is None:
             return
         try:
-            self._session.write(MASS, str(event.args))
+            self._session.write(MASS_PATH, str(event.args))
         except InputError as error:
             self.mass.complain(str(error))
         else:
@@ -206,7 +210,7 @@ class VibrationPanel(Panel):
         directions = [_unit_screw(machine, name) for name in (moved, pushed)]
         curve = _response_between(directions[0], receptance, directions[1])
         direct = [np.abs(_response_between(screw, receptance, screw)).max() for screw in directions]
-        coupled = bool(np.abs(curve).max() > COUPLED * math.sqrt(direct[0] * direct[1]))
+        coupled = bool(np.abs(curve).max() > LEAST_COUPLING * math.sqrt(direct[0] * direct[1]))
         self.none.set_visibility(not coupled)
         self.none.set_text(f"A load {direction_phrase(pushed)} does not move the tool {direction_phrase(moved)}.")
         for view in (self.size, self.phase):
@@ -263,12 +267,12 @@ def mode_rows(new: Ringing) -> tuple[list[str], list[list[float]], list[list[str
         ]
         for mode in modes
     ]
-    ranks = [sorted({row[column] for row in texts}).index for column in range(len(HEADS))]
+    ranks = [sorted({row[column] for row in texts}).index for column in range(len(MODE_HEADS))]
     values = [
         [mode.frequency, ranks[1](row[1]), min(mode.modal_mass, LARGEST_MASS), ranks[3](row[3]), ranks[4](row[4])]
         for mode, row in zip(modes, texts, strict=True)
     ]
-    return HEADS, values, texts
+    return MODE_HEADS, values, texts
 
 
 def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
@@ -311,4 +315,4 @@ def _response_between(moved: Array, receptance: Complex, pushed: Array) -> Compl
 
 def _plot_values(values: Array) -> list[float | None]:
     """Return points of a curve in the digits that a plot can show."""
-    return finite(np.array([float(f"{value:.{DIGITS}g}") for value in values]))
+    return finite(np.array([float(f"{value:.{PLOT_DIGITS}g}") for value in values]))
