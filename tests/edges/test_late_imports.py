@@ -35,3 +35,20 @@ for _ in range(2):
     print(gc.get_threshold()[0], len(gc.callbacks))
 """
     assert run(program) == ["1000000", "100000", "0", "100000", "0"]
+
+
+def test_answers_are_described_without_the_library_of_figures():
+    """Figures of an answer are in its file; who prints it pays for none. The paper's page has pictures in any case."""
+    program = """
+import sys
+from importlib import import_module
+from kinetostat.views.questions import ANSWERS, QUESTIONS
+places = {place.rpartition(".")[0] for place in [*ANSWERS.values(), *(place for _, place in QUESTIONS.values())]}
+for place in sorted(places - {"views.paper"}):
+    import_module(f"kinetostat.{place}")
+    if "matplotlib" in sys.modules:
+        print(place)
+        break
+print("end")
+"""
+    assert run(program) == ["end"]

@@ -39,6 +39,8 @@ BLOCK_SIZE = 3.4
 """Size of a block around joints that coincide, in radii of a leg; one around others is as much larger than they."""
 FLATNESS = 0.2
 """Spread of joints across their mean plane, as a share of their greatest spread, above which a platform is a block."""
+LEAST_LEAN = 0.05
+"""Sine of the angle between the links together and the plane of their joints, below which they lie in this plane."""
 PLATE_MARGIN = {"base": 3.6, "platform": 2.9}
 """Width of the rim of a plate beyond its joints, in radii of a leg."""
 PLATE_THICKNESS = {"base": 1.7, "platform": 1.3}
@@ -132,19 +134,18 @@ def plate_behind(
         side: direction from the plate to the joints, used if the links lie in the plane of the joints.
     """
     points = np.array([joint.components() for joint in joints], dtype=float)
-    centre = Vector(*points.mean(axis=0).tolist())
-    spread = points - points.mean(axis=0)
-    sizes, axes = np.linalg.svd(spread)[1:]
-    flat = len(points) > 2 and sizes[1] > HUB_SPREAD * radius
-    normal = Vector(*axes[2].tolist()) if flat else frame.rotation.z
+    centre = points.mean(axis=0)
+    spreads, axes = np.linalg.svd(points - centre)[1:]
+    span_a_plane = len(points) > 2 and spreads[1] > HUB_SPREAD * radius
+    normal = Vector(*axes[2].tolist()) if span_a_plane else frame.rotation.z
     inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
-    lean = inward.dot(normal)
     # Links in the plane of the joints do not say on which side the plate has room; then `side` decides.
-    normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
-    place, block = upright(centre, normal, frame.rotation.x), None
-    if len(points) > 1 and float(sizes[0]) < HUB_SPREAD * radius:
+    lean = inward.dot(normal) if abs(inward.dot(normal)) > LEAST_LEAN else side.dot(normal)
+    normal = normal if lean > 0.0 else -normal
+    place, block = upright(Vector(*centre.tolist()), normal, frame.rotation.x), None
+    if len(points) > 1 and float(spreads[0]) < HUB_SPREAD * radius:
         block = Vector(*[BLOCK_SIZE * radius] * 3)
-    elif name == "platform" and len(points) > 3 and sizes[2] > FLATNESS * sizes[0]:
+    elif name == "platform" and len(points) > 3 and spreads[2] > FLATNESS * spreads[0]:
         in_frame = np.array([frame.rotation.inverse().apply(joint).components() for joint in joints], dtype=float)
         low, high = in_frame.min(axis=0), in_frame.max(axis=0)
         place = Displacement(frame.rotation, frame.rotation.apply(Vector(*(0.5 * (low + high)).tolist())))
@@ -171,8 +172,8 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     """Build the scene of a machine: base, platform, legs, springs, tool, frames and labels.
 
     Args:
-        machine: gives the tool.
-        configuration: its pose, with every joint placed.
+        machine: the machine, which has a tool.
+        configuration: the machine at a pose that places every joint.
         sizes: the proportions that `proportions_of` returns.
     """
     legs = [anatomy(leg) for leg in configuration.legs]
