@@ -140,12 +140,12 @@ def _masses(model: Model, parts: Sequence[Mass]) -> dict[str, float]:
 
     Bodies of legs without known masses get the mean of the others.
     """
-    bodies, known = _moving_bodies(model), [part for part in parts if part.mass is not None]
-    masses = {}
+    bodies, known = _moving_bodies(model), [(part, float(part.mass)) for part in parts if part.mass is not None]
+    masses: dict[str, float] = {}
     for body in bodies:
-        of_leg = sum(float(part.mass) for part in known if part.leg == body.leg)
+        of_leg = sum(mass for part, mass in known if part.leg == body.leg)
         masses[body.name] = of_leg / sum(other.leg == body.leg for other in bodies)
-    masses[model.platform.name] = sum(float(part.mass) for part in known if part.name == PLATFORM)
+    masses[model.platform.name] = sum(mass for part, mass in known if part.name == PLATFORM)
     positive = [mass for mass in masses.values() if mass > 0.0]
     mean = sum(positive) / len(positive) if positive else NOMINAL_MASS
     return {name: mass or mean for name, mass in masses.items()}

@@ -38,7 +38,7 @@ class Trial:
     """One of the results from which an engine's final one follows.
 
     Attributes:
-        scale: the quantity that was varied, see `Answer.varied`.
+        scale: value of the quantity that was varied, see `Answer.varied`.
         compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6].
     """
 
@@ -55,7 +55,7 @@ class Answer:
             have are 0.
         second_best: C by the engine's next best way, if there is one; their difference is the uncertainty.
         varied: the quantity that the trials vary, in words.
-        trials: in the order of their scale.
+        trials: the trials in the order of their scale.
     """
 
     compliance: Array
@@ -69,28 +69,27 @@ def block_differences(
 ) -> dict[str, float]:
     """Return the relative difference of two compliances in their blocks: rotation, coupling, translation.
 
-    A block of `expected`, or of `scale` if given, is measured by its Frobenius norm, the coupling by the geometric mean
-    of the two diagonal blocks: for a positive semi-definite matrix it is at most that, and no unit is mixed. Where the
-    machine is rigid in one diagonal block (it is below the share `vanishing` of the other), there is nothing to compare
-    with; then the other block is the measure, converted by `length` (m).
+    A block of `expected`, or of `scale` if it is given, is measured by its Frobenius norm, the coupling by the
+    geometric mean of the two diagonal blocks: for a positive semi-definite matrix it is at most that, and no unit is
+    mixed. Where the machine is rigid in one diagonal block (it is below the share `vanishing` of the other), there is
+    nothing to compare with; then the other block is the measure, converted by `length` (m).
     """
     measure = expected if scale is None else scale
-    turning, moving = (float(np.linalg.norm(measure[b, b])) for b in (ROTATIONS, TRANSLATIONS))
-    if turning * length**2 < vanishing * moving:
-        turning = moving / length**2
-    elif moving < vanishing * turning * length**2:
-        moving = turning * length**2
-    sizes = {
-        "rotation": (ROTATIONS, ROTATIONS, turning),
-        "coupling": (ROTATIONS, TRANSLATIONS, float(np.sqrt(turning * moving))),
-        "translation": (TRANSLATIONS, TRANSLATIONS, moving),
+    rotation, translation = (float(np.linalg.norm(measure[block, block])) for block in (ROTATIONS, TRANSLATIONS))
+    if rotation * length**2 < vanishing * translation:
+        rotation = translation / length**2
+    elif translation < vanishing * rotation * length**2:
+        translation = rotation * length**2
+    blocks = {
+        "rotation": (ROTATIONS, ROTATIONS, rotation),
+        "coupling": (ROTATIONS, TRANSLATIONS, float(np.sqrt(rotation * translation))),
+        "translation": (TRANSLATIONS, TRANSLATIONS, translation),
     }
-    error = actual - expected
-    errors = {
-        name: max(float(np.linalg.norm(error[rows, columns])), float(np.linalg.norm(error[columns, rows])))
-        for name, (rows, columns, _) in sizes.items()
-    }
-    return {name: errors[name] / size if size > 0.0 else errors[name] for name, (_, _, size) in sizes.items()}
+    error, result = actual - expected, {}
+    for name, (rows, columns, size) in blocks.items():
+        norm = max(float(np.linalg.norm(error[rows, columns])), float(np.linalg.norm(error[columns, rows])))
+        result[name] = norm / size if size > 0.0 else norm
+    return result
 
 
 def difference(actual: Array, expected: Array, length: float, vanishing: float = RIGID_BLOCK_OF_ENGINE) -> float:
@@ -106,11 +105,11 @@ class Engine:
     """An independent engine, in which a machine can be rebuilt.
 
     Attributes:
-        name: as in `kinetostat validate --engine`.
+        name: its name as in `kinetostat validate --engine`.
         package: its name for pip.
         needs: modules that must be installed.
         builder: the kinetostat module whose `solve` rebuilds a machine in it.
-        summary: how it models a machine.
+        summary: its model of a machine, in words.
         modes: the kinetostat module whose `frequencies` rebuilds it with its masses; empty if the engine has none.
     """
 
@@ -148,7 +147,7 @@ class Engine:
         return self._answer_of(lambda: import_module(self.modes).frequencies(machine)) if self.modes else np.zeros(0)
 
     def _answer_of(self, question: Callable[[], Any]) -> Any:
-        """Answer of the engine to a question; its trouble is an InputError."""
+        """Return the answer of the engine to a question; what it raises becomes an InputError."""
         if self.version is None:
             raise InputError(
                 f"The engine {self.name} is not installed. {INSTALL_ENGINE.format(extra_command('validate'))}"
@@ -164,19 +163,19 @@ class Engine:
 
 KNOWN = (
     Engine(
-        "exudyn",
-        "exudyn",
-        ("exudyn", "scipy"),
-        "kinetostat.validation.exudyn_machine",
-        "multibody dynamics: rigid bodies, exact constraints and springs",
-        "kinetostat.validation.exudyn_machine",
+        name="exudyn",
+        package="exudyn",
+        needs=("exudyn", "scipy"),
+        builder="kinetostat.validation.exudyn_machine",
+        summary="multibody dynamics: rigid bodies, exact constraints and springs",
+        modes="kinetostat.validation.exudyn_machine",
     ),
     Engine(
-        "pynite",
-        "PyNiteFEA",
-        ("Pynite", "scipy"),
-        "kinetostat.validation.pynite_machine",
-        "frame analysis: straight members, releases and stiff parts",
+        name="pynite",
+        package="PyNiteFEA",
+        needs=("Pynite", "scipy"),
+        builder="kinetostat.validation.pynite_machine",
+        summary="frame analysis: straight members, releases and stiff parts",
     ),
 )
 """Every engine in which a machine can be rebuilt; the first can build any machine."""
@@ -187,13 +186,13 @@ class Validation(ImmutableAnswer):
     """Compliance of a machine by kinetostat and by an independent engine, at T, base axes, order rx ry rz x y z, SI.
 
     Attributes:
-        machine: at its pose.
+        machine: the machine at its pose.
         engine, version: name and version of the independent engine.
         ours, theirs: C by kinetostat and by the engine [6 x 6], without round-off; absent rows are 0.
-        differences: relative, by block: rotation, coupling, translation.
-        uncertainty: how far the engine's two best results differ, in the same measure; infinite if it has only one.
+        differences: relative differences by block: rotation, coupling, translation.
+        uncertainty: difference of the engine's two best results, in the same measure; infinite if it has only one.
         varied: the quantity that the engine's trials vary, in words.
-        trials: scale of each, and its difference from kinetostat's C.
+        trials: scale of each trial, and its difference from kinetostat's C.
         frequencies: the lowest natural frequencies of the unloaded machine by kinetostat and by the engine, Hz; none
             where nothing has a mass, or the engine has no modes.
     """
@@ -258,7 +257,7 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     """Rebuild a machine in an independent engine and compare the compliances at its tool point.
 
     Args:
-        machine: at its pose, where it must be reachable, regular and without a free direction.
+        machine: the machine at its pose, where it must be reachable, regular and without a free direction.
         engine: name of the engine; the first that is installed if None.
 
     Raises:
@@ -272,13 +271,13 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     answer = chosen.solve(drawn.configuration, drawn.reference)
     length = float(response.configuration.length)
     uncertainty = _uncertainty(answer, ours, length)
-    trusted = max(ROUND_OFF_OF_ENTRY, uncertainty if uncertainty < AGREED else 0.0)
+    round_off = max(ROUND_OFF_OF_ENTRY, uncertainty if uncertainty < AGREED else 0.0)
     return Validation(
         machine=machine,
         engine=chosen.name,
         version=chosen.version or "",
         ours=np.array(clean_matrix(ours.tolist())),
-        theirs=np.array(clean_matrix(answer.compliance.tolist(), trusted)),
+        theirs=np.array(clean_matrix(answer.compliance.tolist(), round_off)),
         differences=block_differences(answer.compliance, ours, length),
         uncertainty=uncertainty,
         varied=answer.varied,
@@ -296,8 +295,8 @@ def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, floa
     """Return the lowest natural frequencies of an unloaded machine by kinetostat and by an engine, Hz.
 
     Args:
-        machine: at its pose, where it must be sound.
-        engine: that is installed.
+        machine: the machine at its pose, where it must be sound.
+        engine: an engine that is installed.
 
     Returns:
         A pair for each mode, infinite where one of them has no further mode; none without a mass, or if the engine
@@ -306,11 +305,11 @@ def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, floa
     Raises:
         InputError: if the machine has a part that the engine cannot have.
     """
-    counted = frequencies(state_of(machine).free_equations)[0].tolist()
-    ours = [frequency for frequency in counted if math.isfinite(frequency)]
+    lowest = frequencies(state_of(machine).free_equations)[0].tolist()
+    ours = [frequency for frequency in lowest if math.isfinite(frequency)]
     if not ours or not engine.modes:
         return ()
-    theirs = engine.frequencies(machine)[: len(counted)].tolist()
+    theirs = engine.frequencies(machine)[: len(lowest)].tolist()
     return tuple(zip_longest(ours, theirs, fillvalue=math.inf))
 
 
@@ -328,8 +327,7 @@ def _our_compliance(response: Response) -> Array:
     if not np.all(np.isfinite(ours)):
         raise InputError(
             "A spring without stiffness leaves the platform free, so that there is no finite compliance to compare; "
-            "give "
-            "every spring a stiffness with --set."
+            "give every spring a stiffness with --set."
         )
     if not np.any(ours):
         raise InputError("Every part is rigid: C is 0 in any engine; give a part a finite stiffness with --set.")

@@ -23,15 +23,18 @@ from kinetostat.machine.parts import Arm
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import COINCIDENT
 
+PIECES_OF_BALL = 3
+"""Pieces of a spherical joint: revolutes about one point."""
+
 
 @dataclass(frozen=True)
 class StrutPiece:
     """A straight part between two spherical joints: it carries a force along its line; its idle spin is omitted.
 
     Attributes:
-        name: of the part.
+        name: name of the part.
         start, end: centres of the joints, base frame, m.
-        stiffness: between them, N/m; infinity if rigid.
+        stiffness: stiffness between them, N/m; infinity if rigid.
         preload: tension at this length, N.
     """
 
@@ -63,8 +66,8 @@ def pieces(leg: Leg, plane: Plane | None = None, struts: bool = True) -> tuple[P
     pieces that move in its plane remain.
 
     Args:
-        leg: at the pose.
-        plane: of a planar machine.
+        leg: the leg at the pose.
+        plane: the plane of a planar machine.
         struts: whether the parts between two spherical joints become a strut.
 
     Raises:
@@ -73,14 +76,14 @@ def pieces(leg: Leg, plane: Plane | None = None, struts: bool = True) -> tuple[P
     size = _extent(leg)
     chain: list[Piece] = []
     for element in leg.chain:
-        chain += _plain(leg, element)
+        chain += _pieces_of(leg, element)
     if plane is None and struts:
         return _with_struts(leg.name, chain, COINCIDENT * size)
     return tuple(piece for piece in chain if plane is None or moves_in(plane, piece))
 
 
 def bodies_before(leg: Leg, station: Station, plane: Plane | None = None, struts: bool = True) -> int:
-    """Return how many pieces of a leg are between the base and the body that carries a station.
+    """Return the number of pieces of a leg between the base and the body that carries a station.
 
     What is on a strut is carried by its neighbours: the body at the end that is nearer.
 
@@ -91,19 +94,24 @@ def bodies_before(leg: Leg, station: Station, plane: Plane | None = None, struts
     Raises:
         InputError: if the station is within a part that another program cannot cut.
     """
-    carried, point = station
-    whole, part = pieces(leg, plane, struts), pieces(replace(leg, chain=leg.chain[:carried]), plane, struts)
-    same = next((i for i, (a, b) in enumerate(zip(whole, part, strict=False)) if a != b), len(part))
-    if same == len(part):
-        return same
-    cut = whole[same]
-    if not isinstance(cut, StrutPiece):
-        raise InputError(f"{leg.name} has a mass within {cut.name}, which cannot be rebuilt in another program.")
-    near, far = (float((end - point).norm()) for end in (cut.start, cut.end))
-    return same if near < far else same + 1
+    elements, point = station
+    whole, part = pieces(leg, plane, struts), pieces(replace(leg, chain=leg.chain[:elements]), plane, struts)
+    count = next((i for i, (a, b) in enumerate(zip(whole, part, strict=False)) if a != b), len(part))
+    if count == len(part):
+        return count
+    piece = whole[count]
+    if not isinstance(piece, StrutPiece):
+        raise InputError(f"{leg.name} has a mass within {piece.name}, which cannot be rebuilt in another program.")
+    near, far = (float((end - point).norm()) for end in (piece.start, piece.end))
+    return count if near < far else count + 1
 
 
-def _plain(leg: Leg, element: Element) -> list[Piece]:
+def _pieces_of(leg: Leg, element: Element) -> list[Piece]:
+    """Return an element as pieces: none if it is rigid.
+
+    Raises:
+        InputError: if it is of a kind that cannot be built in another engine.
+    """
     if isinstance(element, Spring):
         if element.stiffness == 0.0:
             return [element.joint]
@@ -142,75 +150,70 @@ def moves_in(plane: Plane, piece: Piece) -> bool:
     if COINCIDENT < along < 1.0 - COINCIDENT:
         raise InputError(
             f'The axis of "{joint.name or piece.name}" must lie in the plane of the planar machine or be '
-            "perpendicular to "
-            "it; turn it."
+            "perpendicular to it; turn it."
         )
-    return (along > 0.5) != (joint.point is None)
+    is_normal = along > 0.5  # it is 0 or 1 but for round-off
+    return is_normal != (joint.point is None)
 
 
 def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece, ...]:
     """Return the chain with every strut in it as one piece."""
     result: list[Piece] = []
-    at = 0
-    while at < len(chain):
-        strut, after = _strut(name, chain, at, near)
-        result.append(strut or chain[at])
-        at = after if strut else at + 1
+    while chain:
+        strut, count = _first_strut(name, chain, near)
+        result.append(strut or chain[0])
+        chain = chain[count:]
     return tuple(result)
 
 
-def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[StrutPiece | None, int]:
-    """Return the strut that begins at a position of the chain, if there is one, and the position after it."""
-    first, inside = _ball(chain, at, near)
-    if first is None:
-        return None, at
-    for last in range(inside, len(chain)):
-        second, after = _ball(chain, last, near)
-        if second is not None and float(np.linalg.norm(array(second - first))) > near:
-            row = _in_a_row(chain[inside:last], first, second, near)
-            return (None, at) if row is None else (StrutPiece(name, first, second, *row), after)
-    return None, at
+def _first_strut(name: str, chain: Sequence[Piece], near: float) -> tuple[StrutPiece | None, int]:
+    """Return the strut with which a chain begins, if there is one, and the number of its pieces, otherwise 1."""
+    start = _first_ball(chain, near)
+    if start is None:
+        return None, 1
+    for last in range(PIECES_OF_BALL, len(chain)):
+        end = _first_ball(chain[last:], near)
+        if end is not None and float(np.linalg.norm(array(end - start))) > near:
+            spring = _spring_in_series(chain[PIECES_OF_BALL:last], start, end, near)
+            if spring is None:
+                return None, 1
+            stiffness, preload = spring
+            return StrutPiece(name, start, end, stiffness, preload), last + PIECES_OF_BALL
+    return None, 1
 
 
-def _ball(chain: Sequence[Piece], at: int, near: float) -> tuple[Vector | None, int]:
-    """Centre of the spherical joint (three revolutes through a point) at a position, and the position after it."""
-    axes: list[Array] = []
-    centre: Vector | None = None
-    for i, piece in enumerate(chain[at : at + 3], at + 1):
-        if not isinstance(piece, Joint) or piece.point is None or piece.pitch != 0.0:
-            return None, at
-        centre = centre or piece.point
-        if float(np.linalg.norm(array(piece.point - centre))) > near:
-            return None, at
-        axes.append(array(piece.axis))
-        if len(axes) == 3 and abs(float(np.linalg.det(axes))) > COINCIDENT:
-            return centre, i
-    return None, at
+def _first_ball(chain: Sequence[Piece], near: float) -> Vector | None:
+    """Return the centre of the spherical joint, three revolutes through a point, with which a chain begins, if any."""
+    first = [piece for piece in chain[:PIECES_OF_BALL] if isinstance(piece, Joint) and piece.pitch == 0.0]
+    points = [joint.point for joint in first if joint.point is not None]
+    if len(points) < PIECES_OF_BALL or any(_distance(point, points[0]) > near for point in points):
+        return None
+    volume = float(np.linalg.det([array(joint.axis) for joint in first]))
+    return points[0] if abs(volume) > COINCIDENT else None
 
 
-def _in_a_row(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> tuple[float, float] | None:
-    """Stiffness (N/m) and preload (N) of parts in a row; None if they do more than stretch along their line."""
+def _spring_in_series(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> tuple[float, float] | None:
+    """Return stiffness (N/m) and preload (N) of parts in a row; None if they do more than stretch along their line."""
     span = array(end - start)
     along = span / np.linalg.norm(span)
-    compliance = shorter = 0.0
+    compliance = contraction = 0.0
     for part in parts:
-        if isinstance(part, Spring) and part.joint.point is None and _parallel(array(part.joint.axis), along):
+        if isinstance(part, Spring) and part.joint.point is None and _is_parallel(part.joint, along):
             compliance += 1.0 / float(part.stiffness)
-            shorter += float(part.preload) / float(part.stiffness)
-        elif isinstance(part, Beam) and _spans(part, (start, end), near):
+            contraction += float(part.preload) / float(part.stiffness)
+        elif isinstance(part, Beam) and _distance(part.start, start) < near and _distance(part.end, end) < near:
             compliance += float(np.linalg.norm(span)) / float(part.rigidity.axial)
         elif not (isinstance(part, Spring) and _turns_about(part.joint, (start, end), near)):
             return None
-    return (1.0 / compliance, shorter / compliance) if compliance > 0.0 else (RIGID, 0.0)
+    return (1.0 / compliance, contraction / compliance) if compliance > 0.0 else (RIGID, 0.0)
 
 
-def _parallel(a: Array, b: Array) -> bool:
-    return float(np.linalg.norm(np.cross(a, b))) < COINCIDENT
+def _distance(a: Vector, b: Vector) -> float:
+    return float(np.linalg.norm(array(a - b)))
 
 
-def _spans(beam: Beam, ends: tuple[Vector, Vector], near: float) -> bool:
-    pairs = zip((beam.start, beam.end), ends, strict=True)
-    return all(float(np.linalg.norm(array(point - end))) < near for point, end in pairs)
+def _is_parallel(joint: Joint, direction: Array) -> bool:
+    return float(np.linalg.norm(np.cross(array(joint.axis), direction))) < COINCIDENT
 
 
 def _turns_about(joint: Joint, centres: Sequence[Vector], near: float) -> bool:
@@ -239,15 +242,15 @@ def end_compliance(beam: Beam) -> Array:
     Analysis, section 5.6.
     """
     length, rigidity = section_axes(beam)[1], beam.rigidity
-    c = np.zeros((6, 6))
-    c[0, 0], c[3, 3] = length / float(rigidity.torsion), length / float(rigidity.axial)
+    result = np.zeros((6, 6))
+    result[0, 0], result[3, 3] = length / float(rigidity.torsion), length / float(rigidity.axial)
     planes = ((4, 2, 1.0, rigidity.bending_z, rigidity.shear_y), (5, 1, -1.0, rigidity.bending_y, rigidity.shear_z))
     for across, about, sign, bending, shear in planes:
-        soft = 1.0 / float(bending)
-        c[across, across] = length**3 / 3.0 * soft + length / float(shear)
-        c[about, about] = length * soft
-        c[across, about] = c[about, across] = sign * length**2 / 2.0 * soft
-    return c
+        softness = 1.0 / float(bending)
+        result[across, across] = length**3 / 3.0 * softness + length / float(shear)
+        result[about, about] = length * softness
+        result[across, about] = result[about, across] = sign * length**2 / 2.0 * softness
+    return result
 
 
 def in_plane(beam: Beam, normal: Vector) -> tuple[bool, ...]:
@@ -262,9 +265,9 @@ class Heavy:
     """A rigid mass on a body.
 
     Attributes:
-        mass: kg.
-        centre: of it, base frame, m [3].
-        inertia: about that centre, base axes, kg·m² [3 x 3].
+        mass: its mass, kg.
+        centre: centre of the mass, base frame, m [3].
+        inertia: inertia about that centre, base axes, kg·m² [3 x 3].
     """
 
     mass: float
@@ -277,12 +280,12 @@ class HeavyLink:
     """A link that has a mass.
 
     Attributes:
-        name: of the link.
-        mass: kg.
+        name: name of the link.
+        mass: its mass, kg.
         leg: number of its leg, from 0.
-        bodies: which bodies of the leg carry its ends, or its centre of mass; counted from the base, which is 0.
+        bodies: numbers of the leg's bodies that carry its ends, or its centre of mass, from the base, which is 0.
         points: those ends or that centre, base frame, m.
-        inertia: about that centre, base axes, kg·m² [3 x 3]; zero of a uniform rod between its ends.
+        inertia: inertia about that centre, base axes, kg·m² [3 x 3]; zero for a uniform rod between its ends.
     """
 
     name: str
@@ -297,8 +300,8 @@ def on_platform(machine: Machine, place: Displacement) -> Iterator[Heavy]:
     """Give the platform with its tool, and the payload, as far as they have a mass.
 
     Args:
-        machine: with the table [tool].
-        place: of the platform at its pose.
+        machine: the machine with its table [tool].
+        place: placement of the platform at its pose.
     """
     tool = machine.tables["tool"]
     axes = columns(place.rotation)
