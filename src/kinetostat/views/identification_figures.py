@@ -23,6 +23,8 @@ PATH_SIZE = 6.0
 """Size of the letters of these paths, points."""
 LEAST_PATH_WIDTH = 1.4
 """Least room for these paths, inches."""
+MATRIX_SIZES, UNKNOWN_SIZE = (2.5, 9.0), 0.14
+"""Least and greatest side of the matrix of correlations, and what an unknown adds to it, a line of its path; inches."""
 LEAST_HEIGHT = 0.3
 """Least height of a panel of places as a share of its width: places on a bed lie on a line, seen from the front."""
 ROOM_ABOVE_RESIDUALS, OUTLIER_PLACE = 1.3, 0.94
@@ -49,13 +51,13 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
     """
     fit, observed = answer.fit, answer.observed
     turns = np.isin(_component_names(answer), (*ROTATION, *EULER))
-    parts = [(rows, turning) for rows, turning in ((~turns, False), (turns, True)) if rows.any()]
-    beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
+    kinds = [(rows, turning) for rows, turning in ((~turns, False), (turns, True)) if rows.any()]
+    outlier_note = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
     with new_figure(
-        (6.4, 2.3 * len(parts) + 0.7), title.format(answer.machine.name), "measured less computed", beyond
+        (6.4, 2.3 * len(kinds) + 0.7), title.format(answer.machine.name), "measured less computed", outlier_note
     ) as figure:
-        panels = figure.subplots(len(parts), 2, squeeze=False, sharex=True)
-        for row, (rows, turning) in zip(panels, parts, strict=True):
+        panels = figure.subplots(len(kinds), 2, squeeze=False, sharex=True)
+        for row, (rows, turning) in zip(panels, kinds, strict=True):
             scale = answer.machine.display.deflection(motion_unit(turning))
             for panel, residuals, head in zip(row, (fit.before, fit.after), ("as drawn", "as identified"), strict=True):
                 _draw_residuals(panel, answer, rows, residuals * observed.sigma * scale.factor)
@@ -80,10 +82,10 @@ def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: 
         of_name = rows & kept & (names == name)
         panel.plot(lines[of_name], residuals[of_name], ".", color=colour, ms=3, label=name)
     edge = ROOM_ABOVE_RESIDUALS * np.abs(residuals[rows & kept]).max(initial=LEAST_RESIDUAL)
-    aside = rows & ~kept
-    if aside.any():
-        shown = np.clip(residuals[aside], -OUTLIER_PLACE * edge, OUTLIER_PLACE * edge)
-        panel.plot(lines[aside], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
+    outliers = rows & ~kept
+    if outliers.any():
+        shown = np.clip(residuals[outliers], -OUTLIER_PLACE * edge, OUTLIER_PLACE * edge)
+        panel.plot(lines[outliers], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
     panel.set_ylim(-edge, edge)
 
 
@@ -92,9 +94,10 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     matrix = answer.fit.correlations.copy()
     hidden = ~np.isfinite(answer.fit.half_intervals)
     matrix[hidden] = matrix[:, hidden] = np.nan
-    size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
-    few = answer.unknowns if len(matrix) <= MOST_PATHS else ()
-    names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in few]
+    least, greatest = MATRIX_SIZES
+    size = min(least + UNKNOWN_SIZE * len(matrix), greatest)
+    named = answer.unknowns if len(matrix) <= MOST_PATHS else ()
+    names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in named]
     beside = max(LEAST_PATH_WIDTH, width_of(names, PATH_SIZE))
     with new_figure((size + beside + 0.8, size + beside + 0.2), title.format(answer.machine.name)) as figure:
         panel = figure.subplots()
@@ -119,8 +122,8 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
                 panel.plot(*places, "o", mfc="none", color=COLOURS[1], label="to be measured next (platform point)")
             panel.set(title=view, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
             low, high = panel.get_ylim()
-            lacking = max(0.0, LEAST_HEIGHT * float(np.ptp(panel.get_xlim())) - (high - low))
-            panel.set_ylim(low - lacking / 2.0, high + lacking / 2.0)
+            shortfall = max(0.0, LEAST_HEIGHT * float(np.ptp(panel.get_xlim())) - (high - low))
+            panel.set_ylim(low - shortfall / 2.0, high + shortfall / 2.0)
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

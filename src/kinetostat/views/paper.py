@@ -97,13 +97,13 @@ def write_all(
 
 def figures(reproduction: Reproduction) -> dict[str, Drawing]:
     """Return the figures by file name."""
-    # The paper calls this offset of the passive leg y, the coordinate of its figure.
-    section = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
-    section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
+    # The offset of the passive leg is the coordinate y of the paper's figure.
+    maps = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
+    maps = maps.assign_coords(y=maps["y"].assign_attrs(field="pose.y"))
     draw = {
         "machine": partial(three_views, reproduction.machine, title=MACHINE_TITLE),
         "figure-4": partial(grid_curves, reproduction.curves, GROUPS["stiffness"], title=FIGURE_4),
-        "figure-5": partial(contour_maps, section, GROUPS["compliance"], title=FIGURE_5),
+        "figure-5": partial(contour_maps, maps, GROUPS["compliance"], title=FIGURE_5),
         "figure-6": partial(convergence, reproduction.search.log, title=FIGURE_6),
     }
     return {name: Drawing(CAPTIONS[name], function) for name, function in draw.items()}

@@ -29,6 +29,9 @@ from kinetostat.views.scene.solids import Solid, Swept, Turned, solid_data, unit
 
 LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
 """Longest semi-axis of an ellipsoid as a share of the machine's diagonal: it stands out and hides no leg."""
+DIRECTION_LENGTH, DIRECTION_RADIUS, TURN_RADIUS = 0.45, 0.006, 0.1
+"""Length and thickness of the arrow along a direction, and radius of the one around it, as shares of the machine's
+diagonal: they end beside the legs."""
 THINNEST = 0.012
 """Least semi-axis in units of the longest: an ellipsoid that is flat or thin can still be seen."""
 
@@ -78,10 +81,9 @@ def softest_solids(principal: Mapping[str, Principal], point: Vector, sizes: Pro
     """Draw arrows along and about the softest directions of translation and rotation."""
     solids = []
     for block, axes in principal.items():
-        if not len(axes.compliances) or axes.compliances[-1] <= 0.0:
-            continue
-        axis = Vector(*axes.directions[-1])
-        solids += _direction_solids(f"softest {block}", f"soft {block}", block == "rotation", axis, point, sizes)
+        if len(axes.compliances) and axes.compliances[-1] > 0.0:
+            arrow = _turning_arrow if block == "rotation" else _straight_arrow
+            solids += arrow(f"softest {block}", f"soft {block}", Vector(*axes.directions[-1]), point, sizes)
     return solids
 
 
@@ -90,26 +92,28 @@ def twist_solids(twists: Sequence[Sequence[float]], point: Vector, sizes: Propor
     solids = []
     for n, twist in enumerate(twists, 1):
         turning, sliding = Vector(*twist[:3]), Vector(*twist[3:])
-        if turning.norm() > 0.0:
-            # The arrow stands on the axis of the twist, beside the point. Its foot is omega x v / omega^2 from there.
-            foot = point + turning.cross(sliding) * (1.0 / turning.dot(turning))
-            nearest = foot + turning * ((point - foot).dot(turning) / turning.dot(turning))
-            solids += _direction_solids(f"free twist {n}", "soft rotation", True, unit(turning), nearest, sizes)
+        if turning.norm() > 0.0:  # the arrow stands on the axis of the twist, where that is nearest to the point
+            nearest = point + turning.cross(sliding) * (1.0 / turning.dot(turning))
+            solids += _turning_arrow(f"free twist {n}", "soft rotation", unit(turning), nearest, sizes)
         else:
-            solids += _direction_solids(f"free twist {n}", "soft translation", False, unit(sliding), point, sizes)
+            solids += _straight_arrow(f"free twist {n}", "soft translation", unit(sliding), point, sizes)
     return solids
 
 
-def _direction_solids(
-    name: str, material: str, turning: bool, axis: Vector, point: Vector, sizes: Proportions
-) -> list[Solid]:
-    size, thick = 0.3 * sizes.diagonal, 0.006 * sizes.diagonal
-    place = upright(point, axis)
-    if not turning:
-        return [Solid(name, shapes.double_arrow(1.5 * size, thick), material, place, layer="directions")]
-    head = shapes.cone(2.8 * thick, 0.0, 7.0 * thick)
-    bent = _bent_arrow((name, f"{name}/head"), 0.34 * size, math.radians(290), thick, head, material, place)
-    straight = Solid(f"{name}/axis", shapes.double_arrow(0.9 * size, 0.55 * thick), material, place)
+def _straight_arrow(name: str, material: str, axis: Vector, point: Vector, sizes: Proportions) -> list[Solid]:
+    """Return an arrow to both sides of a point along an axis."""
+    shape = shapes.double_arrow(DIRECTION_LENGTH * sizes.diagonal, DIRECTION_RADIUS * sizes.diagonal)
+    return [Solid(name, shape, material, upright(point, axis), layer="directions")]
+
+
+def _turning_arrow(name: str, material: str, axis: Vector, point: Vector, sizes: Proportions) -> list[Solid]:
+    """Return an arrow around an axis through a point, and the axis as a thinner one."""
+    length, radius = DIRECTION_LENGTH * sizes.diagonal, DIRECTION_RADIUS * sizes.diagonal
+    place, head = upright(point, axis), shapes.cone(2.8 * radius, 0.0, 7.0 * radius)
+    bent = _bent_arrow(
+        (name, f"{name}/head"), TURN_RADIUS * sizes.diagonal, math.radians(290), radius, head, material, place
+    )
+    straight = Solid(f"{name}/axis", shapes.double_arrow(0.6 * length, 0.55 * radius), material, place)
     return [replace(solid, layer="directions") for solid in (*bent, straight)]
 
 
