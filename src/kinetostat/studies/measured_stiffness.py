@@ -36,7 +36,8 @@ GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
 GEOMETRY_STEP = 1e-5
 """Step of differences by errors of geometry, rad or in units of the machine's length; its square is their error."""
 SAME_COMPLIANCE = 1e-9
-"""Share by which a machine that is placed as built may differ from the drawn one, without any error."""
+"""Share of the compliance by which a machine that is placed as built, but without errors, may differ from the drawn
+one: round-off of closing its legs."""
 COVERAGE_FACTOR = 2.0
 """Standard uncertainties that an interval reaches: about 95 % of normal values lie within."""
 LEAST_LIKELY = 0.05
@@ -146,15 +147,15 @@ def _agrees(model: ErrorModel, dyads: Array) -> bool:
     The two differ where springs change with the pose, as a strut does that is longer elsewhere.
     """
     drawn = dyads.sum(axis=3)
-    off = np.abs(compliances_as_built(np.zeros(len(model.errors)), model) - drawn)
-    return bool((off.max(axis=(1, 2)) <= SAME_COMPLIANCE * np.abs(drawn).max(axis=(1, 2))).all())
+    differences = np.abs(compliances_as_built(np.zeros(len(model.errors)), model) - drawn)
+    return bool((differences.max(axis=(1, 2)) <= SAME_COMPLIANCE * np.abs(drawn).max(axis=(1, 2))).all())
 
 
 def _change(model: ErrorModel, place: int) -> Array:
     """The change of the compliance per unit of an error, by central differences [n x 6 x 6]."""
-    size = GEOMETRY_STEP * (model.length if model.errors[place].kind == "length" else 1.0)
-    way = size * np.eye(len(model.errors))[place]
-    return (compliances_as_built(way, model) - compliances_as_built(-way, model)) / (2.0 * size)
+    step = GEOMETRY_STEP * (model.length if model.errors[place].kind == "length" else 1.0)
+    errors = step * np.eye(len(model.errors))[place]
+    return (compliances_as_built(errors, model) - compliances_as_built(-errors, model)) / (2.0 * step)
 
 
 @dataclass(frozen=True)
@@ -237,12 +238,12 @@ class MeasuredComparison:
     def message(self) -> str:
         """The verdict in words."""
         inside, count = sum(row.explained for row in self.rows), len(self.rows)
-        likely = f"{100.0 * self.probability:.2g} %" if self.probability > LEAST_PROBABILITY else "below 0.01 %"
+        probability = f"{100.0 * self.probability:.2g} %" if self.probability > LEAST_PROBABILITY else "below 0.01 %"
         text = (
             f"{self.machine.name}: {inside} of {count} measured numbers lie within twice the uncertainty of the "
             f"comparison. Together they are {'as' if self.agrees else 'not as'} near to the computed ones as "
             f"uncertainties allow (chi-square {self.chi_square:.3g} for {count}, probability "
-            f"{likely})"
+            f"{probability})"
         )
         if not self.agrees:
             return f"{text}: the model is wrong there, or the uncertainties are too small."
@@ -278,10 +279,10 @@ def validate_measured(
     pose = dict(measured.deflections.pose) if measured.deflections else {}
     count = len(measured.deflections) if measured.deflections else 1
     model = error_model(machine, pose, count, np.zeros(6))
-    bad = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
-    if bad.size:
-        sentence = Status(int(model.drawn.status[bad[0]])).sentence
-        line = f"line {measured.deflections.lines[bad[0]]}: " if measured.deflections else ""
+    unplaced = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
+    if unplaced.size:
+        sentence = Status(int(model.drawn.status[unplaced[0]])).sentence
+        line = f"line {measured.deflections.lines[unplaced[0]]}: " if measured.deflections else ""
         raise InputError(f'"{data}", {line}the drawn machine is not at the measured pose. {sentence}')
     response = respond(with_values(machine, pose) if pose else machine)
     computed = stacked_columns([entry for row in response.compliance.rows() for entry in row], count).reshape(-1, 6, 6)
@@ -292,27 +293,44 @@ def validate_measured(
 def _comparison(
     machine: Machine, model: ErrorModel, measured: MeasuredStiffness, computed: Array, uncertain: UncertainNumbers
 ) -> MeasuredComparison:
+    """Compare measured entries with the computed compliance of the drawn machine [n x 6 x 6].
+
+    The error of the computation is the difference of its two routes: the response, and the sum over springs.
+    """
     dyads = spring_dyads(model)
     changes, left_out = compliance_changes(model, uncertain, dyads)
-    compliance = computed + changes @ uncertain.values
+    compliance, between_routes = computed + changes @ uncertain.values, computed - dyads.sum(axis=3)
     loads = measured.deflections.wrenches if measured.deflections else np.zeros((1, 6))
-    parts = [
+    entries = [
         _Entry(entry, compliance[entry.row], loads[entry.row], machine.family.components, model.length)
         for entry in measured.entries
     ]
-    rates = np.array([part.changes(changes[part.entry.row]) for part in parts]).reshape(len(parts), -1)
-    numeric = np.array([part.changes((computed - dyads.sum(axis=3))[part.entry.row, :, :, None])[0] for part in parts])
+    rates = np.array([each.changes(changes[each.entry.row]) for each in entries]).reshape(len(entries), -1)
+    numeric = np.array([each.changes(between_routes[each.entry.row, :, :, None])[0] for each in entries])
     inputs = rates @ uncertain.covariance @ rates.T
-    spread = np.array([part.entry.sigma for part in parts])
+    sigma = np.array([each.entry.sigma for each in entries])
     rows = tuple(
-        MeasuredRow(part.entry, part.value, abs(float(off)), float(np.sqrt(max(size, 0.0))), part.entry.sigma)
-        for part, off, size in zip(parts, numeric, np.diag(inputs), strict=True)
+        MeasuredRow(
+            entry=each.entry,
+            predicted=each.value,
+            u_num=abs(float(error)),
+            u_input=float(np.sqrt(max(variance, 0.0))),
+            u_data=each.entry.sigma,
+        )
+        for each, error, variance in zip(entries, numeric, np.diag(inputs), strict=True)
     )
-    error = np.array([row.error for row in rows]) / spread
-    whole = (inputs + np.diag(numeric**2 + spread**2)) / np.outer(spread, spread)
-    distance = float(error @ np.linalg.solve(whole, error))
-    likely = float(chdtrc(len(rows), distance))
-    return MeasuredComparison(machine, measured.path, rows, distance, likely, uncertain.source, left_out)
+    errors = np.array([row.error for row in rows]) / sigma
+    covariance = (inputs + np.diag(numeric**2 + sigma**2)) / np.outer(sigma, sigma)
+    chi_square = float(errors @ np.linalg.solve(covariance, errors))
+    return MeasuredComparison(
+        machine=machine,
+        path=measured.path,
+        rows=rows,
+        chi_square=chi_square,
+        probability=float(chdtrc(len(rows), chi_square)),
+        source=uncertain.source,
+        left_out=left_out,
+    )
 
 
 class _Entry:
@@ -321,6 +339,18 @@ class _Entry:
     def __init__(
         self, entry: MeasuredEntry, compliance: Array, load: Array, components: Sequence[int], length: float
     ) -> None:
+        """Prepare it.
+
+        Args:
+            entry: the measured number.
+            compliance: compliance of the machine at its pose, SI [6 x 6].
+            load: wrench under which a deflection was measured, SI [6].
+            components: components of twists that the machine has; K is the inverse of C over these.
+            length: characteristic length of the machine, m.
+
+        Raises:
+            InputError: a stiffness was measured where the model is rigid.
+        """
         self.entry, self.load = entry, load
         self.matrix, self.i, self.j = entry.parts
         self.compliance = compliance

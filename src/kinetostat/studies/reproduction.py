@@ -221,8 +221,8 @@ def _free_compliances(passive_links: float | str) -> Array:
 
 
 def _proportional() -> Claim:
-    here = coefficients()
-    clean = all(here[k][i] <= NEGLIGIBLE_COEFFICIENT for k in ("k52", "k54") for i in FREE_AXES)
+    factors = coefficients()
+    clean = all(factors[k][i] <= NEGLIGIBLE_COEFFICIENT for k in ("k52", "k54") for i in FREE_AXES)
     tilted = coefficients("pose.theta5=-50 deg")["k54"][0]
     return Claim(
         "Guideline (ii)",
@@ -236,8 +236,8 @@ def _proportional() -> Claim:
 
 
 def _only_held_directions() -> Claim:
-    here = coefficients()
-    depending = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if here[k][i] > NEGLIGIBLE_COEFFICIENT}
+    factors = coefficients()
+    depending = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if factors[k][i] > NEGLIGIBLE_COEFFICIENT}
     return Claim(
         "Guideline (iii)",
         "The stiffness of the passive leg does not enter every direction; its part is to keep the platform to the "
@@ -248,22 +248,22 @@ def _only_held_directions() -> Claim:
 
 
 def _held_by_both() -> Claim:
-    here = coefficients()
+    factors = coefficients()
     figures = "; ".join(
-        f"K_{COMPONENTS[i]} = " + " + ".join(f"{factor[i]:.6g} {name}" for name, factor in here.items())
+        f"K_{COMPONENTS[i]} = " + " + ".join(f"{factor[i]:.6g} {name}" for name, factor in factors.items())
         for i in HELD_AXES
     )
     return Claim(
         "Guideline (iv)",
         "Actuator stiffness and passive leg stiffness together limit rotation about z and translation along y.",
         f"{figures}.",
-        _judge(all(here[k][i] > NEGLIGIBLE_COEFFICIENT for k in here for i in HELD_AXES)),
+        _judge(all(factors[k][i] > NEGLIGIBLE_COEFFICIENT for k in factors for i in HELD_AXES)),
     )
 
 
 def _first_link() -> Claim:
-    here = coefficients()
-    ratios = [here["k52"][i] / here["k54"][i] for i in HELD_AXES]
+    factors = coefficients()
+    ratios = [factors["k52"][i] / factors["k54"][i] for i in HELD_AXES]
     links = analyze(load(printed_numbers.MACHINE)).attribution[:2]
     shares = [float(np.nan_to_num(link.compliance_share[HELD_AXES[1]])) for link in links]
     return Claim(
@@ -278,9 +278,12 @@ def _first_link() -> Claim:
 
 
 def _stiff_enough() -> Claim:
-    here = coefficients()
+    factors = coefficients()
     shares = {
-        ratio: min(1 - here["Ka"][i] / (here["Ka"][i] + ratio * (here["k52"][i] + here["k54"][i])) for i in HELD_AXES)
+        ratio: min(
+            1 - factors["Ka"][i] / (factors["Ka"][i] + ratio * (factors["k52"][i] + factors["k54"][i]))
+            for i in HELD_AXES
+        )
         for ratio in (1.0, 10.0, 100.0)
     }
     enough = shares[100.0] > NEARLY_ALL
@@ -302,8 +305,8 @@ def _largest() -> Claim:
     along_z = {ratio: k[5] >= max(k[3:]) for ratio, k in table.items()}
     about_z = all(k[2] > k[0] for k in table.values())
     first, stiff = table[1.0], table[100.0]
-    here = coefficients()
-    crossing = (here["Ka"][5] - here["Ka"][4]) / (here["k52"][4] + here["k54"][4])
+    factors = coefficients()
+    crossing = (factors["Ka"][5] - factors["Ka"][4]) / (factors["k52"][4] + factors["k54"][4])
     return Claim(
         "Guideline (vii)",
         "Stiffness along z is the largest of all, and that about z exceeds that about x.",
@@ -318,13 +321,13 @@ def _largest() -> Claim:
 
 def _link_length() -> Claim:
     fixed = _stiffness_over([(f"geometry.passive_links={length}",) for length in LINK_LENGTHS])
-    grown = _stiffness_over([(f"geometry.passive_links={length}", f"pose.z={length}") for length in LINK_LENGTHS])
-    steps = [np.diff(fixed, axis=0) < 0, np.diff(grown, axis=0) < 0]
+    scaled = _stiffness_over([(f"geometry.passive_links={length}", f"pose.z={length}") for length in LINK_LENGTHS])
+    steps = [np.diff(fixed, axis=0) < 0, np.diff(scaled, axis=0) < 0]
     throughout = [np.asarray(falls.all(axis=0)) for falls in steps]
     always = throughout[0] & throughout[1]
     rising = "; ".join(
         f"{way} {', '.join(_stiffness_course(i, stiffness) for i in range(6) if not falls[i])}"
-        for way, stiffness, falls in zip(("z fixed:", "z in proportion:"), (fixed, grown), throughout, strict=True)
+        for way, stiffness, falls in zip(("z fixed:", "z in proportion:"), (fixed, scaled), throughout, strict=True)
     )
     return Claim(
         "Further fact (i)",

@@ -3,7 +3,7 @@
 A file of entries has the columns entry, value and sigma; one of deflections is a file of measurements.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,9 @@ from kinetostat.units import KINDS, UnitError, parse
 MEASURED_MATRICES = ("stiffness", "compliance", "free_stiffness")
 """Matrices to which an entry may belong: K, C, or 1 / C of its diagonal, which a load along one component measures."""
 COLUMNS = ("entry", "value", "sigma")
-KIND_OF = {kind.unit: kind.name for kind in KINDS.values() if kind.name.endswith((" stiffness", " compliance"))}
+"""Columns of a file of entries; the last one may be missing."""
+KIND_BY_UNIT = {kind.unit: kind.name for kind in KINDS.values() if kind.name.endswith((" stiffness", " compliance"))}
+"""Kinds of the entries of K and C by their SI units."""
 SIGMA_ADVICE = 'write a column sigma, such as 2 N/um or 3 %, or give --sigma "3 %"'
 
 
@@ -56,7 +58,7 @@ class MeasuredStiffness:
     """All that a file says.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         entries: the measured numbers in the order of the file.
         deflections: poses and loads where deflections were measured; None of a file of entries.
     """
@@ -70,8 +72,8 @@ def read_stiffness(machine: Machine, path: Path, sigma: str = "", sigma_angle: s
     """Read a measured stiffness.
 
     Args:
-        machine: that was measured.
-        path: of the file.
+        machine: the measured machine.
+        path: path of the file.
         sigma: standard deviation of what has none in the file: a share ("3 %"), or of deflections a length.
         sigma_angle: the same of deflections that are angles.
 
@@ -80,55 +82,61 @@ def read_stiffness(machine: Machine, path: Path, sigma: str = "", sigma_angle: s
             kind, or nothing says how sure it is; the message names file and line.
     """
     columns, lines = columns_of(path)
-    if not any(column.name == "entry" for column in columns):
-        return _deflections(machine, path, sigma, sigma_angle)
-    try:
-        return MeasuredStiffness(str(path), tuple(_entries(machine, columns, lines, sigma)))
-    except InputError as error:
-        raise InputError(f'"{path}"{"" if str(error).startswith(",") else ":"}{error}') from None
+    if any(column.name == "entry" for column in columns):
+        return MeasuredStiffness(str(path), tuple(_entries(machine, path, columns, lines, sigma)))
+    return _deflections(machine, path, sigma, sigma_angle)
 
 
-def _entries(machine: Machine, columns: Sequence[GivenColumn], lines: Sequence[int], sigma: str) -> list[MeasuredEntry]:
+def _entries(
+    machine: Machine, path: Path, columns: Sequence[GivenColumn], lines: Sequence[int], usual_sigma: str
+) -> list[MeasuredEntry]:
+    """The entries of a file; those without a standard deviation have the usual one, which may be empty."""
     by_name = {column.name: column for column in columns}
-    for name in COLUMNS[:2]:
-        if name not in by_name:
-            raise InputError(f" there is no column {name}; a file of entries has the columns {', '.join(COLUMNS)}.")
-    for name in by_name:
-        if name not in COLUMNS:
-            raise InputError(f" there is no column {name}; a file of entries has the columns {', '.join(COLUMNS)}.")
+    missing = [name for name in COLUMNS[:2] if name not in by_name]
+    unknown = [name for name in by_name if name not in COLUMNS]
+    for name in missing + unknown:
+        raise InputError(
+            f'"{path}": there is no column {name}; a file of entries has the columns {", ".join(COLUMNS)}.'
+        )
     texts = [by_name[name].entries if name in by_name else [""] * len(lines) for name in COLUMNS]
-    result: list[MeasuredEntry] = []
-    for line, entry, value, sure in zip(lines, *texts, strict=True):
-        read = _entry(machine, str(entry).strip(), str(value).strip(), str(sure).strip() or sigma, line)
-        if any(read.name == other.name for other in result):
-            raise InputError(f", line {line}: {read.name} stands in the file twice; keep one of them, or their mean.")
-        result.append(read)
-    return result
+    result: dict[str, MeasuredEntry] = {}
+    for line, *cells in zip(lines, *texts, strict=True):
+        name, value, sigma = (str(cell).strip() for cell in cells)
+        try:
+            entry = _entry(machine, name, value, sigma or usual_sigma, line)
+            if entry.name in result:
+                raise InputError(f"{entry.name} stands in the file twice; keep one of them, or their mean.")
+        except InputError as error:
+            raise InputError(f'"{path}", line {line}: {error}') from None
+        result[entry.name] = entry
+    return [*result.values()]
 
 
-def _entry(machine: Machine, name: str, value: str, sure: str, line: int) -> MeasuredEntry:
-    def refusal(what: str) -> InputError:
-        return InputError(f", line {line}: {what}")
+def _entry(machine: Machine, name: str, value: str, sigma: str, line: int) -> MeasuredEntry:
+    """Read a line: the name of an entry in either order of its components, and texts with units.
 
-    known = _entry_names(machine)
-    if name not in known:
-        raise refusal(
-            f"{shorten(name)} is not an entry of K or C of {machine.name}; write for example {known[-1]}, and choose "
+    Raises:
+        InputError: there is no such entry, or a text is not a quantity of its kind.
+    """
+    names = _entry_names(machine)
+    if name not in names:
+        raise InputError(
+            f"{shorten(name)} is not an entry of K or C of {machine.name}; write for example {names[-1]}, and choose "
             f"its components from {', '.join(machine.family.component_names)}."
         )
     name = name if name in QUANTITIES else _transposed_name(name)
     unit = QUANTITIES[name].unit
-    size = _number(value, KIND_OF[unit], lambda text: refusal(f"the value of {name} is {text}"))
-    if not sure:
-        raise refusal(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
-    share = sure.endswith("%")
-    sigma = _number(sure, "share" if share else KIND_OF[unit], lambda text: refusal(f"the sigma of {name} is {text}"))
-    sigma = sigma * abs(size) if share else sigma
-    if not sigma > 0.0:
-        raise refusal(f"the sigma of {name} is {sure}; it must be more than 0.")
+    size = _number(value, KIND_BY_UNIT[unit], f"the value of {name}")
+    if not sigma:
+        raise InputError(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
+    is_share = sigma.endswith("%")
+    deviation = _number(sigma, "share" if is_share else KIND_BY_UNIT[unit], f"the sigma of {name}")
+    deviation = deviation * abs(size) if is_share else deviation
+    if not deviation > 0.0:
+        raise InputError(f"the sigma of {name} is {sigma}; it must be more than 0.")
     if len(QUANTITIES[name].components) == 1 and not size > 0.0:
-        raise refusal(f"the value of {name} is {value}; what stands on the diagonal of K and C is more than 0.")
-    return MeasuredEntry(name, unit, size, sigma, line)
+        raise InputError(f"the value of {name} is {value}; what stands on the diagonal of K and C is more than 0.")
+    return MeasuredEntry(name=name, unit=unit, value=size, sigma=deviation, line=line)
 
 
 def _entry_names(machine: Machine) -> list[str]:
@@ -145,22 +153,21 @@ def _transposed_name(name: str) -> str:
     return f"{matrix}_{second}_{first}"
 
 
-def _number(text: str, kind: str, refusal: Callable[[str], InputError]) -> float:
+def _number(text: str, kind: str, subject: str) -> float:
+    """The finite number that a text means, SI; `subject` says in messages of what it is."""
     try:
         value = parse(text, kind)
     except UnitError as error:
-        raise InputError(f"{refusal(shorten(text))}: {error}.") from None
+        raise InputError(f"{subject} is {shorten(text)}: {error}.") from None
     if not np.isfinite(value):
-        raise InputError(f"{refusal(shorten(text))}; give a finite number.")
+        raise InputError(f"{subject} is {shorten(text)}; give a finite number.")
     return value
 
 
 def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> MeasuredStiffness:
-    length, angle = (
-        _default(text, kind, option)
-        for text, kind, option in ((sigma, "length", "--sigma"), (sigma_angle, "angle", "--sigma-angle"))
-    )
-    data = read_measurements(machine, path, Sigmas(length, angle))
+    """The deflections of a file of measurements as entries, one for each measured value."""
+    sigmas = Sigmas(_default(sigma, "length", "--sigma"), _default(sigma_angle, "angle", "--sigma-angle"))
+    data = read_measurements(machine, path, sigmas)
     names = [name for name in data.values if name.startswith("deflection.")]
     if not names:
         raise InputError(
@@ -170,20 +177,20 @@ def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> 
     entries = []
     for row in range(len(data)):
         for name in names:
-            value, sure = float(data.values[name][row]), float(data.sigma[name][row])
+            value, deviation = float(data.values[name][row]), float(data.sigma[name][row])
             if not np.isfinite(value):
                 continue
-            if not np.isfinite(sure):
+            if not np.isfinite(deviation):
                 raise data.refusal(row, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
             component = name.removeprefix("deflection.")
             unit = "rad" if component.startswith("r") else "m"
-            entries.append(MeasuredEntry(f"deflection_{component}", unit, value, sure, data.lines[row], row))
+            entries.append(MeasuredEntry(f"deflection_{component}", unit, value, deviation, data.lines[row], row))
     return MeasuredStiffness(str(path), tuple(entries), data)
 
 
 def _default(text: str, kind: str, option: str) -> float:
     """A standard deviation for what has none in the file, SI; infinity if it is not given."""
-    size = _number(text, kind, lambda given: InputError(f"{option} is {given}")) if text else np.inf
+    size = _number(text, kind, option) if text else np.inf
     if not size > 0.0:
         raise InputError(f"{option} is {text}; it must be more than 0.")
     return size

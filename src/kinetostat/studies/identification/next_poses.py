@@ -169,7 +169,8 @@ def _candidates(
     """
     scales = {path: _scale(machine, path, observed.model.length) for path in spans}
     poses = within_limits(machine, observed.data.pose, scales, CANDIDATES, rng)
-    area, allowed = WITHIN_LIMITS, (Status.OK,)
+    area = WITHIN_LIMITS
+    allowed: tuple[Status, ...] = (Status.OK,)
     if poses is None:
         poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
         area, allowed = (BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS), REGULAR
