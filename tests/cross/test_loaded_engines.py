@@ -60,7 +60,7 @@ class Engine:
         unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(exudyn_machine.settings_of(model))[1])))
         self.model, self.platform = exudyn_machine.build(configuration, reference, unit, preloaded=True)
         kinds = (self.model.items.Torque, self.model.items.Force)
-        marker = self.model.marker(self.platform, self.platform.at, np.eye(3))
+        marker = self.model.marker(self.platform, self.platform.origin, np.eye(3))
         self.loads = [self.model.system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in kinds]
         self._weigh()
         self.model.system.Assemble()

@@ -12,6 +12,8 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.machine.leg import Joint
+from kinetostat.validation.pieces import array
 
 TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
 """Places of Exudyn's x y z rx ry rz in kinetostat's rx ry rz x y z, and the other way round."""
@@ -22,14 +24,14 @@ class EngineBody:
     """A body and the place of its frame.
 
     Attributes:
-        number: of the body in the engine.
-        node: of its coordinates; None for the ground.
-        at: origin of its frame, base frame, m.
+        number: number of the body in the engine.
+        node: number of the node with its coordinates; None for the ground.
+        origin: origin of its frame, base frame, m.
     """
 
     number: int
     node: int | None
-    at: Array
+    origin: Array
 
 
 class Multibody:
@@ -39,8 +41,8 @@ class Multibody:
         engine, items: the imported package and its vocabulary.
         system: its `MainSystem`.
         ground: the base.
-        unit: N per unit of force in the engine: with the greatest stiffness near 1 its solver tells small numbers that
-            matter from round-off.
+        unit: force in N that is 1 in the engine: with the greatest stiffness near 1 its solver distinguishes small
+            numbers that matter from round-off.
         preloaded: whether springs carry their preloads.
         chains: bodies of each leg from the base to the platform.
     """
@@ -55,18 +57,18 @@ class Multibody:
         self.unit, self.preloaded = unit, preloaded
         self.chains: list[list[EngineBody]] = []
 
-    def body(self, at: Array) -> EngineBody:
+    def body(self, origin: Array) -> EngineBody:
         """Add a body without mass with its frame at a point (m)."""
-        node = int(self.system.AddNode(self.items.NodeRigidBodyRxyz(referenceCoordinates=[*at, 0.0, 0.0, 0.0])))
-        return EngineBody(self._rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, at)
+        node = int(self.system.AddNode(self.items.NodeRigidBodyRxyz(referenceCoordinates=[*origin, 0.0, 0.0, 0.0])))
+        return EngineBody(self._add_rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, origin)
 
     def weigh(self, body: EngineBody, mass: float, centre: Array, inertia: Array) -> None:
         """Add a mass (kg) to a body, with its centre at a point (m) and its inertia about it (kg·m² [3 x 3])."""
         if body.node is not None:
-            self._rigid(body.node, mass, centre - body.at, inertia)
+            self._add_rigid(body.node, mass, centre - body.origin, inertia)
 
-    def _rigid(self, node: int, mass: float, arm: Array, inertia: Array) -> int:
-        """Return a rigid body on a node, which several may share, with its centre of mass at an arm (m)."""
+    def _add_rigid(self, node: int, mass: float, arm: Array, inertia: Array) -> int:
+        """Add a rigid body on a node, which several may share, with its centre of mass at an arm (m)."""
         about_node = (inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))) / self.unit
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = about_node
         return int(
@@ -84,51 +86,46 @@ class Multibody:
         are nodes of an element with that matrix of mass, exactly at the points of the bodies, however these are placed.
         """
         nodes = [self.system.AddNode(self.items.NodePoint(referenceCoordinates=list(end))) for end in ends]
-        matrix = np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit)
-        nothing = np.zeros((6, 6))
-        self.system.AddObject(
-            self.items.ObjectGenericODE2(
-                nodeNumbers=nodes, massMatrix=matrix, stiffnessMatrix=nothing, dampingMatrix=nothing
-            )
-        )
+        self._add_mass_matrix(nodes, np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit))
         for body, end, node in zip(bodies, ends, nodes, strict=True):
-            place = self.items.MarkerBodyPosition(bodyNumber=body.number, localPosition=end - body.at)
+            place = self.items.MarkerBodyPosition(bodyNumber=body.number, localPosition=end - body.origin)
             markers = [self.items.MarkerNodePosition(nodeNumber=node), place]
             self.system.AddObject(self.items.SphericalJoint(markerNumbers=[self.system.AddMarker(m) for m in markers]))
 
-    def rotor(self, bodies: Sequence[EngineBody], line: tuple[Array | None, Array], inertia: float) -> None:
-        """Add what turns with the motion between two unloaded bodies, kg along a direction or kg·m² about a line.
+    def rotor(self, bodies: Sequence[EngineBody], joint: Joint, inertia: float) -> None:
+        """Add a rotor that turns with the motion between two unloaded bodies.
 
         It is an element with a matrix of mass over the coordinates of both bodies, at the place where they were built.
 
         Args:
-            bodies: near, far.
-            line: point (m) of an axis to turn about, None for a slide; its direction.
-            inertia: as the motion feels it.
+            bodies: the near and the far body.
+            joint: the motion between them.
+            inertia: inertia of the rotor as this motion feels it, kg of a slide or kg·m² of a turn.
         """
-        point, axis = line
-        rates, nodes = [], []
+        rates, nodes, axis = [], [], array(joint.axis)
         for body, sign in zip(bodies, (-1.0, 1.0), strict=True):
             if body.node is not None:
-                turning = axis if point is not None else np.zeros(3)
-                moving = np.zeros(3) if point is not None else axis
-                arm = np.zeros(3) if point is not None else np.cross(bodies[0].at - body.at, axis)
-                rates.append(sign * np.concatenate([moving, turning + arm]))
+                if joint.point is None:
+                    rate = [axis, np.cross(bodies[0].origin - body.origin, axis)]
+                else:
+                    rate = [np.zeros(3), axis]
+                rates.append(sign * np.concatenate(rate))
                 nodes.append(body.node)
         row = np.concatenate(rates)
-        nothing = np.zeros((len(row), len(row)))
+        self._add_mass_matrix(nodes, np.outer(row, row) * (inertia / self.unit))
+
+    def _add_mass_matrix(self, nodes: Sequence[int], matrix: Array) -> None:
+        """Add an element that has nothing but a matrix of mass over the coordinates of nodes."""
+        zeros = np.zeros_like(matrix)
         self.system.AddObject(
             self.items.ObjectGenericODE2(
-                nodeNumbers=nodes,
-                massMatrix=np.outer(row, row) * (inertia / self.unit),
-                stiffnessMatrix=nothing,
-                dampingMatrix=nothing,
+                nodeNumbers=nodes, massMatrix=matrix, stiffnessMatrix=zeros, dampingMatrix=zeros
             )
         )
 
     def marker(self, body: EngineBody, point: Array, axes: Array) -> int:
         """Add a frame on a body, at a point (m) with the given axes as columns (base frame)."""
-        place = self.engine.HT(rotation=axes, translation=point - body.at)
+        place = self.engine.HT(rotation=axes, translation=point - body.origin)
         return int(self.system.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body.number, localHT=place)))
 
     def couple(
@@ -142,11 +139,11 @@ class Multibody:
         """Constrain some of rx ry rz x y z between two bodies exactly, and let springs act on the others.
 
         Args:
-            bodies: near, far.
+            bodies: the near and the far body.
             frame: point (m) and axes (columns) of the six components, base frame.
-            constrained: which of them are.
-            stiffness: between them, N·m/rad, N/rad, N/m [6 x 6]; diagonal if there is a preload.
-            preload: of the springs, N·m and N [6].
+            constrained: whether each of these is constrained.
+            stiffness: stiffness of the springs, N·m/rad, N/rad, N/m [6 x 6]; diagonal if there is a preload.
+            preload: preload of the springs, N·m and N [6].
         """
         markers = [self.marker(body, *frame) for body in bodies]
         if any(constrained):
@@ -178,18 +175,18 @@ class Multibody:
     def thread(self, bodies: Sequence[EngineBody], line: tuple[Array, Array], pitch: float) -> None:
         """Couple the slide along a line (point in m, direction) to the turn about it: `pitch` m per rad."""
         point, axis = line
-        markers, rows, rest = [], [], []
+        markers, rows, offsets = [], [], []
         for body in bodies:
             node = self.system.AddNode(self.items.NodePointGround()) if body.node is None else body.node
             markers.append(self.system.AddMarker(self.items.MarkerNodeCoordinates(nodeNumber=node)))
-            row = np.concatenate([axis, np.cross(point - body.at, axis) - pitch * axis])
+            row = np.concatenate([axis, np.cross(point - body.origin, axis) - pitch * axis])
             rows.append(np.zeros((1, 0)) if body.node is None else row[None, :])
-            rest.append(0.0 if body.node is None else float(axis @ body.at))
+            offsets.append(0.0 if body.node is None else float(axis @ body.origin))
         self.system.AddObject(
             self.items.CoordinateVectorConstraint(
                 markerNumbers=markers,
                 scalingMarker0=rows[0],
                 scalingMarker1=rows[1],
-                offset=[rest[1] - rest[0]],  # the engine counts coordinates from the origin, not from rest
+                offset=[offsets[1] - offsets[0]],  # the engine counts coordinates from the origin, not from rest
             )
         )

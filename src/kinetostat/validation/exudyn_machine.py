@@ -39,9 +39,13 @@ from kinetostat.validation.pieces import (
 )
 
 MOTION_SHARES = (1e-3, 1e-4, 1e-5)
-"""Motions of the platform by finite loads: rad, or share of the machine's length."""
+"""Motions of the platform by finite loads, rad or share of the machine's length: the difference from small loads falls
+with the square of the motion, until round-off, which grows with its reciprocal, exceeds it."""
 VARIED_MOTION = "how far loads move the platform, rad or share of the machine's length"
-EPS = float(np.finfo(float).eps)
+BALANCED = 10.0 * float(np.finfo(float).eps)
+"""Imbalance of forces that ends Newton's method where the greatest stiffness is 1: below it round-off decides."""
+MOST_NEWTON_STEPS = 30
+"""Steps of Newton's method at most: far more than it takes where a load step converges at all."""
 ALL = (True,) * 6
 FACTORED_ONCE_FROM = 200
 """Coordinates from which Newton's steps share the factors of a matrix: these take the cube of the number, and most of
@@ -54,8 +58,8 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     """Return C from the engine's linearised equations, confirmed by its nonlinear statics under ever smaller loads.
 
     Args:
-        configuration: placed machine.
-        reference: where loads act and motions are read, base frame, m.
+        configuration: the placed machine.
+        reference: the point where loads act and motions are read, base frame, m.
 
     Raises:
         InputError: if the machine has a part that cannot be built, or a motion that nothing resists.
@@ -73,7 +77,7 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
 
 
 def _without_load(trials: tuple[Trial, ...]) -> Array | None:
-    """C under the two smallest loads extrapolated to none: central differences err by the load squared."""
+    """Return C under the two smallest loads extrapolated to none: central differences err by the load squared."""
     if len(trials) < 2:
         return None
     small, large = trials[:2]
@@ -82,7 +86,7 @@ def _without_load(trials: tuple[Trial, ...]) -> Array | None:
 
 
 def _tangent(model: Multibody, platform: EngineBody) -> Array:
-    """C of the unloaded system; the engine linearises and projects onto what its constraints leave free."""
+    """Return C of the unloaded system; the engine linearises and projects onto what its constraints leave free."""
     model.system.Assemble()
     system = model.system.ComputeLinearizedSystem(
         settings_of(model), projectIntoConstraintNullspace=True, returnConstraintNullspace=True
@@ -103,29 +107,30 @@ def _tangent(model: Multibody, platform: EngineBody) -> Array:
 
 
 def _finite_loads(model: Multibody, platform: EngineBody, tangent: Array, length: float) -> Iterable[Trial]:
-    """Nonlinear statics with loads that move the platform by MOTION_SHARES, central differences; smallest first."""
+    """Give C by nonlinear statics with loads that move the platform by `MOTION_SHARES`, smallest first."""
     unit_loads = _loads_for_unit_motion(tangent, length)
-    felt = np.flatnonzero(unit_loads)
+    acting = np.flatnonzero(unit_loads)
     shares = sorted(MOTION_SHARES)
-    pairs = np.repeat(unit_loads[felt, None] * np.eye(6)[felt], 2, axis=0) * np.tile([1.0, -1.0], len(felt))[:, None]
-    moved = _displacements(model, platform, np.concatenate([share * pairs for share in shares]) / model.unit)
-    for share, ends in zip(shares, np.split(moved, np.arange(1, len(shares)) * len(pairs)), strict=True):
+    signs = np.tile([1.0, -1.0], len(acting))[:, None]
+    pairs = np.repeat(unit_loads[acting, None] * np.eye(6)[acting], 2, axis=0) * signs
+    displacements = _displacements(model, platform, np.concatenate([share * pairs for share in shares]) / model.unit)
+    for share, ends in zip(shares, np.split(displacements, np.arange(1, len(shares)) * len(pairs)), strict=True):
         if len(ends) == len(pairs):
             compliance = np.zeros((6, 6))
-            compliance[:, felt] = (ends[::2] - ends[1::2]).T / (2.0 * share * unit_loads[felt])
+            compliance[:, acting] = (ends[::2] - ends[1::2]).T / (2.0 * share * unit_loads[acting])
             yield Trial(share, compliance)
 
 
 def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
-    """The N or N·m of each wrench that would move the platform by 1 rad or by `length` (m), whichever comes first.
+    """Return the size of each wrench, N or N·m, that would move the platform by 1 rad or `length` (m), at least.
 
     A wrench that moves nothing gets the size of the others; one that a planar machine does not have is 0.
     """
     arms = np.repeat([length, 1.0], 3)
     motion = np.max(np.abs(tangent) * np.repeat([1.0, 1.0 / length], 3)[:, None], axis=0) / arms
     exists = np.any(tangent != 0.0, axis=0)
-    felt = motion > UNMOVED * np.max(motion)
-    return np.asarray(exists / (np.where(felt, motion, np.max(motion)) * arms))
+    moves = motion > UNMOVED * np.max(motion)
+    return np.asarray(exists / (np.where(moves, motion, np.max(motion)) * arms))
 
 
 def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> Array:
@@ -135,7 +140,7 @@ def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> A
     step does not converge the run ends, and there are fewer displacements than wrenches.
     """
     system, engine, items = model.system, model.engine, model.items
-    marker = model.marker(platform, platform.at, np.eye(3))
+    marker = model.marker(platform, platform.origin, np.eye(3))
     steps = np.vstack([np.zeros(6), wrenches])
 
     def part_of_load(part: slice) -> Any:
@@ -161,7 +166,7 @@ def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> A
 
 
 def settings_of(model: Multibody) -> Any:
-    """Settings: silent, without files, and with a solver that copes with redundant constraints and idle motions."""
+    """Return settings: silent, no files, and a solver that copes with redundant constraints and idle motions."""
     settings = model.engine.SimulationSettings()
     settings.linearSolver.solverType = model.engine.LinearSolverType.EigenDense
     settings.linearSolver.ignoreSingularJacobian = True
@@ -170,8 +175,8 @@ def settings_of(model: Multibody) -> Any:
     settings.solution.file.write = False
     newton = settings.staticSolver.newton
     newton.relativeTolerance = NEWTON_STATICS
-    newton.absoluteTolerance = 10.0 * EPS  # the greatest stiffness is 1: closer to balance, round-off decides
-    newton.maxIterations = 30
+    newton.absoluteTolerance = BALANCED
+    newton.maxIterations = MOST_NEWTON_STEPS
     newton.useModifiedNewton = model.system.systemData.ODE2Size() > FACTORED_ONCE_FROM
     return settings
 
@@ -179,12 +184,12 @@ def settings_of(model: Multibody) -> Any:
 def build(
     configuration: Configuration, reference: Vector, unit: float = 1.0, preloaded: bool = False, struts: bool = True
 ) -> tuple[Multibody, EngineBody]:
-    """Build the machine; return it and its platform, whose frame is at `reference` (base frame, m); `unit` in N.
+    """Build the machine, and return it and its platform.
 
     Args:
-        configuration: placed machine.
-        reference: see above.
-        unit: see above.
+        configuration: the placed machine.
+        reference: the origin of the platform's frame, base frame, m.
+        unit: force in N that is 1 in the engine.
         preloaded: whether its springs carry their preloads; without them it is at rest unloaded.
         struts: whether the parts between two spherical joints are one bar, without bodies of its own.
 
@@ -212,10 +217,10 @@ def _leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: 
     """Return the bodies of one leg from ground to platform, with their connectors."""
     bodies = [model.ground]
     for piece in chain[:-1]:
-        bodies.append(_body(model, _far_point(piece, bodies[-1].at), plane))
+        bodies.append(_body(model, _far_point(piece, bodies[-1].origin), plane))
     bodies.append(platform)
     if not chain:
-        model.couple(bodies, (platform.at, np.eye(3)), ALL)
+        model.couple(bodies, (platform.origin, np.eye(3)), ALL)
     for piece, near, far in zip(chain, bodies, bodies[1:], strict=False):
         _connect(model, piece, (near, far), plane)
     return bodies
@@ -249,15 +254,15 @@ def _joint(
     plane: Plane | None,
     spring: tuple[float, float] | None = None,
 ) -> None:
-    """A joint: all components but one are constrained; on that one a spring may act (N/m, N·m/rad; preload N, N·m)."""
+    """Constrain all components but one; on that one a spring may act, of a stiffness (N/m, N·m/rad) and preload."""
     normal = None if plane is None else array(plane.frame.rotation.z)
     axes = _axes_around(array(joint.axis), normal)
-    slide = joint.point is None
-    point = bodies[0].at if joint.point is None else array(joint.point)
-    free = 5 if slide else 2
+    slides = joint.point is None
+    point = bodies[0].origin if joint.point is None else array(joint.point)
+    free = 5 if slides else 2  # the third axis is that of the joint
     constrained = [i != free for i in range(6)]
     if plane is not None:
-        constrained = [i in ((0, 4) if slide else (3, 4)) for i in range(6)]
+        constrained = [i in ((0, 4) if slides else (3, 4)) for i in range(6)]
     if joint.pitch != 0.0:
         constrained[5] = False
         model.thread(bodies, (point, axes[:, 2]), float(joint.pitch))
@@ -269,7 +274,7 @@ def _joint(
 
 def _axes_around(axis: Array, normal: Array | None = None) -> Array:
     """Return right-handed axes, the third along `axis`, the first along `normal` if that is across it."""
-    if normal is None or abs(float(normal @ axis)) > 0.5:
+    if normal is None or abs(float(normal @ axis)) > 0.5:  # it is 0 or 1 but for round-off
         normal = np.eye(3)[np.argmin(abs(axis))]
     x = normal - (normal @ axis) * axis
     x = x / np.linalg.norm(x)
@@ -277,7 +282,7 @@ def _axes_around(axis: Array, normal: Array | None = None) -> Array:
 
 
 def _beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
-    """The cantilever's 6x6 stiffness at the beam's end; rigid components are constrained."""
+    """Couple bodies by the cantilever's 6x6 stiffness at the beam's end; rigid components are constrained."""
     compliance = end_compliance(beam)
     moving = ALL if plane is None else in_plane(beam, plane.frame.rotation.z)
     if not any(moving):
@@ -294,7 +299,7 @@ def _beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Pla
 
 
 def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
-    """Two bars between points of the bodies, which also stay in the parallelogram's plane and parallel to it."""
+    """Add two bars between points of the bodies, which also stay in the parallelogram's plane and parallel to it."""
     normal = np.cross(array(piece.side), array(piece.far) - array(piece.near))
     if plane is None:
         axes = _axes_around(normal / np.linalg.norm(normal))
@@ -307,7 +312,7 @@ def frequencies(machine: Machine) -> Array:
     """Return the natural frequencies of the unloaded machine at its pose, ascending, Hz; none without a mass.
 
     Args:
-        machine: at a pose that it reaches, where nothing is free.
+        machine: the machine at a pose that it reaches, where nothing is free.
 
     Raises:
         InputError: if the machine has a part that cannot be built.
@@ -328,7 +333,7 @@ def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: Machi
 
     Args:
         model, platform: as `build` returns them.
-        machine: says what its platform, payload and rotors weigh.
+        machine: the machine with the masses of its platform, payload and rotors.
         drawn: its legs and links at the pose.
     """
     for part in on_platform(machine, drawn.configuration.platform):
@@ -347,16 +352,14 @@ def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration
     """Add the rotors of actuators, which move as the springs of the actuators deflect.
 
     Args:
-        model: unloaded, without struts, so that each spring of an actuator has two bodies.
-        machine: says how rotors are driven.
-        configuration: of it.
+        model: the unloaded model without struts, so that each spring of an actuator has two bodies.
+        machine: the machine with its drives.
+        configuration: the placed machine.
     """
     for leg, bodies in zip(configuration.legs, model.chains, strict=True):
         for piece, near, far in zip(pieces(leg, configuration.plane, struts=False), bodies, bodies[1:], strict=False):
             if isinstance(piece, Spring) and piece.actuated:
-                point, axis = piece.joint.point, array(piece.joint.axis)
-                line = None if point is None else array(point), axis
-                model.rotor((near, far), line, rotor_inertia(machine, piece))
+                model.rotor((near, far), piece.joint, rotor_inertia(machine, piece))
 
 
 def modal_frequencies(model: Multibody) -> Array:
@@ -368,13 +371,13 @@ def modal_frequencies(model: Multibody) -> Array:
     """
     mass, stiffness, *_ = model.system.ComputeLinearizedSystem(settings_of(model), projectIntoConstraintNullspace=True)
     sizes, shapes = np.linalg.eigh(0.5 * (stiffness + np.transpose(stiffness)))
-    stiff = sizes > IDLE_MOTION * np.max(sizes)
-    softened, idle = shapes[:, stiff] / np.sqrt(sizes[stiff]), shapes[:, ~stiff]
-    masses, turned = np.linalg.eigh(idle.T @ mass @ idle)
-    heavy = masses > MASSLESS_MODE * np.trace(mass)  # of the others round-off would decide
-    idle, masses = idle @ turned[:, heavy], masses[heavy]
-    softened -= idle @ (idle.T @ mass @ softened / masses[:, None])
-    periods = np.linalg.eigvalsh(softened.T @ np.asarray(mass) @ softened)[::-1]
-    round_off = NO_MOMENTUM * np.trace(mass) * np.sum(softened**2)
-    felt = periods[periods > max(MASSLESS_MODE * np.max(periods, initial=0.0), round_off)]
-    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(felt)))
+    is_stiff = sizes > IDLE_MOTION * np.max(sizes)
+    motions, idle = shapes[:, is_stiff] / np.sqrt(sizes[is_stiff]), shapes[:, ~is_stiff]
+    masses, axes = np.linalg.eigh(idle.T @ mass @ idle)
+    has_mass = masses > MASSLESS_MODE * np.trace(mass)  # of the others round-off would decide
+    idle, masses = idle @ axes[:, has_mass], masses[has_mass]
+    motions -= idle @ (idle.T @ mass @ motions / masses[:, None])
+    squares = np.linalg.eigvalsh(motions.T @ np.asarray(mass) @ motions)[::-1]
+    round_off = NO_MOMENTUM * np.trace(mass) * np.sum(motions**2)
+    squares = squares[squares > max(MASSLESS_MODE * np.max(squares, initial=0.0), round_off)]
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(squares)))
