@@ -240,24 +240,26 @@ class _Routes:
         program = self._program(self._weights, closed)
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-            given = program_columns(self._machine, self._form, columns, len(status), closed)
-            given += self._state(given, len(status), closed) + self._known_modes(columns, len(status))
+            program_inputs = program_columns(self._machine, self._form, columns, len(status), closed)
+            program_inputs += self._state(program_inputs, len(status), closed) + self._known_modes(columns, len(status))
             if self._known_slopes:
-                self._spread(*self._slopes(self._weights, given, status, closed), results)
+                self._spread(*self._slopes(self._weights, program_inputs, status, closed), results)
             else:
-                program.run(self._fixed, given, results, status)
+                program.run(self._fixed, program_inputs, results, status)
 
         return fill
 
     def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
-        given = program_columns(self._machine, self._form, columns, len(status))
-        rates = self._equations(given, len(status))
-        given += self._state(given, len(status), closed=False) + self._known_modes(columns, len(status))
-        objectives, partial = self._slopes(self._weights, given, status)
+        program_inputs = program_columns(self._machine, self._form, columns, len(status))
+        rates = self._equations(program_inputs, len(status))
+        program_inputs += self._state(program_inputs, len(status), closed=False) + self._known_modes(
+            columns, len(status)
+        )
+        objectives, partial = self._slopes(self._weights, program_inputs, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
 
-    def _equations(self, given: Sequence[Array], count: int) -> Array:
+    def _equations(self, program_inputs: Sequence[Array], count: int) -> Array:
         """Derivatives of the closing equations, and of those by which idle freedoms stand nearest to home, theory (34).
 
         The latter need the second derivatives of the closing equations along the idle motions: central differences of
@@ -268,12 +270,12 @@ class _Routes:
         """
 
         def rates_at(joints: Array) -> tuple[Array, Array]:
-            columns = [*given[: len(given) - len(joints) - 1], *joints, given[-1]]
+            columns = [*program_inputs[: len(program_inputs) - len(joints) - 1], *joints, program_inputs[-1]]
             values, rates = self._slopes((), columns, np.empty(count, dtype=np.int8))
             return values[-1], rates
 
         chains = self._machine.chains()
-        joints, first = np.stack(given[-chains.size - 1 : -1]), len(self._differentiated)
+        joints, first = np.stack(program_inputs[-chains.size - 1 : -1]), len(self._differentiated)
         length, rates = rates_at(joints)
         rates, length_rates = rates[:-1], rates[-1]
         units = units_of(chains, length).T
@@ -289,18 +291,20 @@ class _Routes:
             rows.append(row * length)
         return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 
-    def _state(self, given: Sequence[Array], count: int, closed: bool) -> list[Array]:
+    def _state(self, program_inputs: Sequence[Array], count: int, closed: bool) -> list[Array]:
         """Return the coordinates of the states of rest, if any objective is about the machine under load."""
         if not self._loaded:
             return []
         states = StatePrograms(self._machine, self._form, closed, self._native).rest_coordinates(
-            self._fixed, given, count
+            self._fixed, program_inputs, count
         )
         if self._mode_counts is None:
             return states
         return [
             *states,
-            *modes_at_rest(self._machine, self._form, self._fixed, [*given, *states], self._mode_counts, closed),
+            *modes_at_rest(
+                self._machine, self._form, self._fixed, [*program_inputs, *states], self._mode_counts, closed
+            ),
         ]
 
     def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
@@ -318,12 +322,12 @@ class _Routes:
             )
 
     def _slopes(
-        self, weights: tuple[Weights, ...], given: Sequence[Array], codes: Codes, closed: bool = False
+        self, weights: tuple[Weights, ...], program_inputs: Sequence[Array], codes: Codes, closed: bool = False
     ) -> tuple[Array, Array]:
         """Results [results x points] of a program and their derivatives [results x inputs x points], codes in place."""
         program = self._program(weights, closed)
         rows, inputs = np.empty((program.rows, len(codes))), len(self._differentiated) + (0 if closed else self._joints)
-        program.run(self._fixed, given, rows, codes)
+        program.run(self._fixed, program_inputs, rows, codes)
         count = program.rows // (1 + inputs)
         return rows[:count], rows[count:].reshape(count, inputs, len(codes))
 

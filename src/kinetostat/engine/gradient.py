@@ -60,7 +60,7 @@ def gradient(result: Operand, inputs: Sequence[Traced]) -> list[Operand]:
 
 def active_nodes(results: Iterable[Node], inputs: Iterable[Traced]) -> list[Node]:
     """The nodes on which a result depends smoothly and which so depend on an input, both included, operands first."""
-    reached, given = set(results), set(inputs)
+    reached, input_nodes = set(results), set(inputs)
     waiting = list(reached)
     while waiting:
         fresh = {operand for _, operand in parents(waiting.pop())} - reached
@@ -68,7 +68,7 @@ def active_nodes(results: Iterable[Node], inputs: Iterable[Traced]) -> list[Node
         waiting.extend(fresh)
     active: dict[Node, None] = {}
     for node in sorted(reached, key=lambda node: node.number):
-        if node in given or any(operand in active for _, operand in parents(node)):
+        if node in input_nodes or any(operand in active for _, operand in parents(node)):
             active[node] = None
     return list(active)
 

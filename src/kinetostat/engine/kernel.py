@@ -71,9 +71,9 @@ class FallingBack:
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
         self.first(columns, results, status)
-        left = np.flatnonzero(status == Status.NOT_CONVERGED)
-        if left.size:
-            fill_some(left, self.other(), columns, results, status)
+        unsolved = np.flatnonzero(status == Status.NOT_CONVERGED)
+        if unsolved.size:
+            fill_some(unsolved, self.other(), columns, results, status)
 
 
 class Identical:
@@ -179,8 +179,8 @@ class ProgramFill:
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
-        given = program_columns(self.machine, self.form, columns, len(status), self.closed)
-        self.program.run(self.fixed, given, results, status)
+        program_inputs = program_columns(self.machine, self.form, columns, len(status), self.closed)
+        self.program.run(self.fixed, program_inputs, results, status)
 
 
 def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str], judged: bool = True) -> Fill:
@@ -230,16 +230,16 @@ def program_columns(
         count: number of points.
         closed: whether the program closes the legs itself.
     """
-    served = [np.ascontiguousarray(columns[path], dtype=float) for path in form.varying]
-    given = [
+    values = [np.ascontiguousarray(columns[path], dtype=float) for path in form.varying]
+    result = [
         reduced_angles(column) if path in form.turning else column
-        for path, column in zip(form.varying, served, strict=True)
+        for path, column in zip(form.varying, values, strict=True)
     ]
     if machine.family.chains is None or closed:
-        return given
+        return result
     joints = solve_joints(with_values(machine, columns))
     by_joint = (np.array(np.broadcast_to(c, (count,)), dtype=float) for c in (*joints.coordinates, joints.status))
-    return [*given, *by_joint]
+    return [*result, *by_joint]
 
 
 @cache

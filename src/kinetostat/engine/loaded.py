@@ -246,17 +246,17 @@ class ModalFill:
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
         others, fixed = np.empty((self._count, len(status))), self._others.fixed
-        given = program_columns(self._machine, self._others.form, columns, len(status), self._closed)
+        program_inputs = program_columns(self._machine, self._others.form, columns, len(status), self._closed)
         states: list[Array] = []
         if isinstance(self._others, RestFill):
             states = [np.empty((self._others.size, len(status)))]
-            self._others.solve(given, others, status, *states)
+            self._others.solve(program_inputs, others, status, *states)
         else:
-            self._others.program.run(fixed, given, others, status)
+            self._others.program.run(fixed, program_inputs, others, status)
         for place, row in self._places:
             results[place] = others[row]
         for numbers, places, rows in self._modal:
-            values, sure = numbers.at(fixed, [*given, *states] if numbers.at_rest else given)
+            values, sure = numbers.at(fixed, [*program_inputs, *states] if numbers.at_rest else program_inputs)
             results[places] = values[rows]
             status[~sure & (status == Status.OK)] = Status.NOT_CONVERGED
         results[:, status != Status.OK] = np.nan

@@ -200,10 +200,10 @@ class Program:
         starts = np.array([row for column in columns for row in _addresses(column)], dtype=np.uintp)
         rows = np.array(_addresses(results), dtype=np.uintp)
         addresses = [ctypes.c_void_p(_address(array)) for array in (fixed, starts, rows, codes)]
-        call, given = self._call, (*addresses, ctypes.c_int64(count))
+        call, arguments = self._call, (*addresses, ctypes.c_int64(count))
 
         def evaluate(_kept: Any = (self, fixed, arrays, starts, rows)) -> None:
-            call(*given)
+            call(*arguments)
 
         return evaluate
 
@@ -211,12 +211,12 @@ class Program:
         """Evaluate fewer points than there are lanes, by repeating the last of them."""
         count = len(codes)
         if count:
-            given = rows_of(columns)
-            longer = np.empty((len(given), self.lanes))
-            for row, column in zip(longer, given, strict=True):
-                row[:count], row[count:] = column, column[-1]
+            rows = rows_of(columns)
+            padded_rows = np.empty((len(rows), self.lanes))
+            for padded_row, column in zip(padded_rows, rows, strict=True):
+                padded_row[:count], padded_row[count:] = column, column[-1]
             padded, all_codes = np.empty((len(results), self.lanes)), np.empty(self.lanes, dtype=np.int8)
-            self.run(fixed, list(longer), padded, all_codes)
+            self.run(fixed, list(padded_rows), padded, all_codes)
             results[:], codes[:] = padded[:, :count], all_codes[:count]
 
 

@@ -94,9 +94,9 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
         paths: leaf paths of the parameters to differentiate by.
         closed: whether joints are computed inside the program, as legs written leg by leg need it.
     """
-    given = traced_machine(kind, form)
-    joints = CLOSED_FORMS.over_scalars(given.machine.chains()) if closed else None
-    configuration = given.machine.configure(joints.coordinates if joints else ())
+    traced = traced_machine(kind, form)
+    joints = CLOSED_FORMS.over_scalars(traced.machine.chains()) if closed else None
+    configuration = traced.machine.configure(joints.coordinates if joints else ())
     status: Scalar = joints.status if joints else int(Status.OK)
     if joints:
         at_home = joint_actuators(kind.machine.chains(), leg_names(kind.machine))
@@ -105,13 +105,13 @@ def placement_of(kind: Specimen, form: Form, paths: Sequence[str], closed: bool)
         actuators = actuators_of(configuration)
         status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
     platform = configuration.platform
-    tool = platform.apply(Vector(*given.machine.tables["tool"].offset))
+    tool = platform.apply(Vector(*traced.machine.tables["tool"].offset))
     points = [point for leg in configuration.legs for point in drawn_points(leg)]
     vectors = [tool, platform.rotation.x, platform.rotation.y, platform.rotation.z, *points]
     wanted = [actuator.coordinate for actuator in actuators] + [c for vector in vectors for c in vector.components()]
     accepted = status < Status.OK + 0.5
     results = [result_of(where(accepted, value, math.nan)) for value in wanted]
-    formula = formula_of(given, (), results, result_of(status), paths)
+    formula = formula_of(traced, (), results, result_of(status), paths)
     return TracedPlacement(formula, tuple(actuators))
 
 
@@ -137,9 +137,9 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
         form: how its parameters enter.
         closed: as in `TraceOptions`.
     """
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    response = respond(given.machine, joints)
+    traced = traced_machine(kind, form)
+    joints, columns = traced_joints(traced, closed)
+    response = respond(traced.machine, joints)
     accepted = response.status < Status.OK + 0.5
     parts: dict[str, list[Scalar]] = {}
     for spring, share in zip(springs(response.configuration), compliance_shares(response.statics), strict=True):
@@ -148,7 +148,7 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
             before = parts.get(str(spring.of))
             parts[str(spring.of)] = [a + b for a, b in zip(before, diagonal, strict=True)] if before else diagonal
     results = [result_of(where(accepted, value, math.nan)) for row in parts.values() for value in row]
-    return TracedShares(formula_of(given, columns, results, result_of(response.status), ()), tuple(parts))
+    return TracedShares(formula_of(traced, columns, results, result_of(response.status), ()), tuple(parts))
 
 
 @dataclass(frozen=True)

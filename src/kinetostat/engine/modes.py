@@ -39,7 +39,7 @@ from kinetostat.vibration.springwise import Modal, ModeCounts, SpringMotions, mo
 
 
 def modes_at_rest(
-    machine: Machine, form: Form, fixed: Array, given: Sequence[Array], counts: ModeCounts, closed: bool
+    machine: Machine, form: Form, fixed: Array, program_inputs: Sequence[Array], counts: ModeCounts, closed: bool
 ) -> list[Array]:
     """Find the modes of states of rest.
 
@@ -47,7 +47,7 @@ def modes_at_rest(
         machine: a machine whose legs close loops.
         form: how its parameters enter the program.
         fixed: values of the parameters that are the same at all points.
-        given: columns of the other parameters, of joints if they are not `closed`, and of the states of rest.
+        program_inputs: columns of the other parameters, of joints if they are not `closed`, and of the states of rest.
         counts: how many modes are wanted.
         closed: whether programs compute the joints that close the legs by themselves, in closed form.
 
@@ -55,9 +55,9 @@ def modes_at_rest(
         The modes as further columns of programs of quantities: an array [points] for each of their numbers.
     """
     program = program_of(recipe_of(spring_parts_of, Specimen(machine), form, closed=closed, at_rest=True), native=False)
-    points, sizes = len(given[0]), sizes_over_springs(machine)
+    points, sizes = len(program_inputs[0]), sizes_over_springs(machine)
     parts = np.empty((program.rows, points))
-    program.run(fixed, given, parts, np.empty(points, dtype=np.int8))
+    program.run(fixed, program_inputs, parts, np.empty(points, dtype=np.int8))
     modes = [sizes.modes(parts, counts.loaded), sizes.modes(parts, counts.factor, massive=False)]
     return [*np.ascontiguousarray(np.concatenate(modes, axis=1).reshape(points, -1).T)]
 
@@ -70,8 +70,8 @@ def spring_parts_of(kind: Specimen, form: Form, closed: bool, at_rest: bool) -> 
         at_rest: whether the machine is at rest under its loads, whose coordinates are then the last columns; otherwise
             its springs are relaxed.
     """
-    given, columns, coordinates, motions = _traced_motions(kind, form, closed, at_rest)
-    return formula_of(given, columns, [result_of(part) for part in motions.parts()], 0.0, coordinates=coordinates)
+    traced, columns, coordinates, motions = _traced_motions(kind, form, closed, at_rest)
+    return formula_of(traced, columns, [result_of(part) for part in motions.parts()], 0.0, coordinates=coordinates)
 
 
 def pencil_of(kind: Specimen, form: Form, closed: bool, what: Modal) -> TracedFormula:
@@ -81,24 +81,24 @@ def pencil_of(kind: Specimen, form: Form, closed: bool, what: Modal) -> TracedFo
         kind, form, closed: as for `spring_parts_of`.
         what: see `SpringMotions.pencil`.
     """
-    given, columns, coordinates, motions = _traced_motions(kind, form, closed, at_rest=what != "free")
+    traced, columns, coordinates, motions = _traced_motions(kind, form, closed, at_rest=what != "free")
     results = [result_of(part) for part in motions.pencil(what)]
     code = result_of(where(motions.sure, int(Status.OK), int(Status.NOT_CONVERGED)))
-    return formula_of(given, columns, results, code, coordinates=coordinates)
+    return formula_of(traced, columns, results, code, coordinates=coordinates)
 
 
 def _traced_motions(
     kind: Specimen, form: Form, closed: bool, at_rest: bool
 ) -> tuple[TracedMachine, tuple[Traced, ...], tuple[Traced, ...], SpringMotions]:
     """A traced machine, columns of its joints and of its state of rest, and its motions; arguments as above."""
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    response = respond(given.machine, joints)
+    traced = traced_machine(kind, form)
+    joints, columns = traced_joints(traced, closed)
+    response = respond(traced.machine, joints)
     if not at_rest:
-        return given, columns, (), motions_without_loads(given.machine, response, joints)
-    equations = reduced_machine(given.machine, response, joints)
-    coordinates = new_inputs(given.graph, equations.size)
-    return given, columns, coordinates, SpringMotions(equations.cut, [*coordinates])
+        return traced, columns, (), motions_without_loads(traced.machine, response, joints)
+    equations = reduced_machine(traced.machine, response, joints)
+    coordinates = new_inputs(traced.graph, equations.size)
+    return traced, columns, coordinates, SpringMotions(equations.cut, [*coordinates])
 
 
 ALIGNED = 8
@@ -156,36 +156,37 @@ class ModalNumbers:
             self._matrices = machine_program_of(recipe_of(pencil_of, kind, form, closed=closed, what=what))
         self._eigenvalues = eigenvalue_program(self._pencil)
 
-    def at(self, fixed: Array, given: Sequence[Array]) -> tuple[Array, Mask]:
+    def at(self, fixed: Array, program_inputs: Sequence[Array]) -> tuple[Array, Mask]:
         """Find the numbers at some points.
 
         Args:
             fixed: values of the parameters that are the same at all points.
-            given: columns of the other parameters, of joints if they are not closed inside, and of the states of rest.
+            program_inputs: columns of the other parameters, of joints if they are not closed inside, and of states of
+                rest.
 
         Returns:
             The numbers [count x points], frequencies in Hz: infinite where there are fewer, NaN where springs and loads
             do not hold the machine; and whether the programs are sure of them [points].
         """
-        columns = np.array(rows_of(given))
+        columns = np.array(rows_of(program_inputs))
         points = columns.shape[1]
         squares, codes = np.empty((self._pencil.count, points)), np.empty(points, dtype=np.int8)
         size, lanes = min(points, POINTS_TOGETHER), self._eigenvalues.lanes
-        here, matrices, roots = (
+        block, matrices, roots = (
             _memory_of_vectors(rows, max(size, lanes)) for rows in (len(columns), self._matrices.rows, len(squares))
         )
         statuses, workspace = (
-            np.empty(here.shape[1], dtype=np.int8),
+            np.empty(block.shape[1], dtype=np.int8),
             _memory_of_vectors(self._pencil.layout.size, lanes),
         )
         workspace[:] = 0.0
         calls = (
-            self._matrices.call_on(fixed, [here], matrices, statuses),
+            self._matrices.call_on(fixed, [block], matrices, statuses),
             self._eigenvalues.call_on(workspace, [matrices], roots, np.empty_like(statuses)),
         )
         for first in range(0, points, max(size, 1)):
             part = slice(min(first, points - size), min(first, points - size) + size)
-            here[:, :size], here[:, size:] = columns[:, part], columns[:, part][:, -1:]
+            block[:, :size], block[:, size:] = columns[:, part], columns[:, part][:, -1:]
             for call in calls:
                 call()
             squares[:, part], codes[part] = roots[:, :size], statuses[:size]

@@ -115,24 +115,24 @@ def motion_of(
         joints_too: whether loads of joints and reflected inertia come after the numbers of the drives.
         closed: whether joints are closed inside the program.
     """
-    given = traced_machine(kind, form)
-    joints, columns = traced_joints(given, closed)
-    configuration = given.machine.configure(joints.coordinates if joints else ())
+    traced = traced_machine(kind, form)
+    joints, columns = traced_joints(traced, closed)
+    configuration = traced.machine.configure(joints.coordinates if joints else ())
     names = [path.removeprefix(POSE) for path in form.varying if path.startswith(POSE)]
     size = len(names)
-    moving = new_inputs(given.graph, 2 * size + links)
+    moving = new_inputs(traced.graph, 2 * size + links)
     direction = PoseRates(
         dict(zip(names, moving[:size], strict=True)), dict(zip(names, moving[size : 2 * size], strict=True))
     )
-    here = at_pose(given.machine, configuration, joints, plan, moving[2 * size :] or None)
-    results = drive_numbers(here, direction)
+    parts = at_pose(traced.machine, configuration, joints, plan, moving[2 * size :] or None)
+    results = drive_numbers(parts, direction)
     if joints_too:
-        results += motion_details(here, direction)
+        results += motion_details(parts, direction)
     status: Scalar = joints.status if joints else int(Status.OK)
     status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
     accepted = status < Status.OK + 0.5
     accepted_results = [result_of(where(accepted, value, math.nan)) for value in results]
-    return formula_of(given, columns, accepted_results, result_of(status), coordinates=moving)
+    return formula_of(traced, columns, accepted_results, result_of(status), coordinates=moving)
 
 
 @dataclass(frozen=True)
@@ -191,15 +191,15 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
 def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
     with np.errstate(all="ignore"):
         state = states_at(form.machine, path.columns, path.size)
-        here = form.at(state)
+        parts = form.at(state)
         rates, accelerations = (
             {name: column(np.asarray(values, dtype=float)) for name, values in part.items()}
             for part in (path.rates, path.accelerations)
         )
         direction = PoseRates(rates, accelerations)
-        numbers = drive_numbers(here, direction)
+        numbers = drive_numbers(parts, direction)
         if joints:
-            numbers += motion_details(here, direction)
+            numbers += motion_details(parts, direction)
         placed: Scalar = int(Status.OK) if state.joints is None else state.joints.status
         status = np.where(np.asarray(within_reach(state.configuration)), placed, int(Status.OUT_OF_REACH))
         results = stacked_columns(numbers, path.size).T.copy()
@@ -212,9 +212,9 @@ def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
     """By machine code, which closes the legs itself where they have closed forms; the rest is closed before it."""
     closed = closes_inside(form.machine)
     results, status = _run(form, path, joints, closed)
-    left = np.flatnonzero(status == Status.NOT_CONVERGED)
-    if closed and left.size:
-        results[:, left], status[left] = _run(form, path.at(left), joints, closed=False)
+    unsolved = np.flatnonzero(status == Status.NOT_CONVERGED)
+    if closed and unsolved.size:
+        results[:, unsolved], status[unsolved] = _run(form, path.at(unsolved), joints, closed=False)
     return results, status
 
 
@@ -223,11 +223,11 @@ def _run(form: RigidForm, path: Path, joints: bool, closed: bool) -> tuple[Array
     shape, fixed = form_of(machine, list(varying))
     options = {"plan": form.plan, "links": len(form.masses), "joints_too": joints, "closed": closed}
     program = program_of(recipe_of(motion_of, Specimen(machine), shape, **options))
-    given = program_columns(machine, shape, varying, path.size, closed)
-    given += [
+    program_inputs = program_columns(machine, shape, varying, path.size, closed)
+    program_inputs += [
         np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in path.pose
     ]
-    given += [np.full(path.size, mass) for mass in form.masses]
+    program_inputs += [np.full(path.size, mass) for mass in form.masses]
     results, status = np.empty((program.rows, path.size)), np.empty(path.size, dtype=np.int8)
-    program.run(fixed, given, results, status)
+    program.run(fixed, program_inputs, results, status)
     return results, status

@@ -234,8 +234,8 @@ def _drop_oldest(folder: int) -> None:
     total, now = sum(status.st_size for status, _ in files), time.time()
     room = MOST_BYTES if total <= MOST_BYTES else KEPT_SHARE * MOST_BYTES
     for status, name in files:
-        left = name.startswith(".") and now - status.st_mtime > HOUR
-        if left or (total > room and name != SECRET and not name.startswith(".")):
+        is_abandoned = name.startswith(".") and now - status.st_mtime > HOUR
+        if is_abandoned or (total > room and name != SECRET and not name.startswith(".")):
             with suppress(FileNotFoundError):
                 os.unlink(name, dir_fd=folder)
             total -= status.st_size
@@ -302,7 +302,7 @@ def _processor() -> str:
         return machine_code.host_description()  # LLVM has to load the code there in any case
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         first = [line.partition(":") for line in takewhile(str.strip, file)]  # until an empty line
-    known = [(name.strip(), text.strip()) for name, _, text in first if name.strip() in FEATURES]
-    if not known:
+    features = [(name.strip(), text.strip()) for name, _, text in first if name.strip() in FEATURES]
+    if not features:
         raise OSError("the system does not say what its processor can do")
-    return repr(known)
+    return repr(features)

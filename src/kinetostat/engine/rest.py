@@ -131,18 +131,18 @@ class RestFill:
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
-        given = program_columns(self._machine, self.form, columns, len(status), self._closed)
+        program_inputs = program_columns(self._machine, self.form, columns, len(status), self._closed)
         if self._states is None:
-            self.solve(given, results, status)
+            self.solve(program_inputs, results, status)
             return
-        given += self._states.rest_coordinates(self.fixed, given, len(status))
-        self._step.run(self.fixed, given, results, status)
+        program_inputs += self._states.rest_coordinates(self.fixed, program_inputs, len(status))
+        self._step.run(self.fixed, program_inputs, results, status)
 
-    def solve(self, given: list[Array], results: Array, status: Codes, states: Array | None = None) -> None:
+    def solve(self, program_inputs: list[Array], results: Array, status: Codes, states: Array | None = None) -> None:
         """Evaluate a slab of a machine whose legs close loops.
 
         Args:
-            given: columns of the programs before those of the states.
+            program_inputs: columns of the programs before those of the states.
             results, status: see `Fill`.
             states: array for the coordinates of the states of rest [size x points], if they are wanted.
         """
@@ -152,23 +152,23 @@ class RestFill:
         for start in range(0, count, together):
             part = slice(start, start + together)
             reached = None if states is None else states[:, part]
-            self._fill([column[part] for column in given], results[:, part], status[part], reached, memory)
+            self._fill([column[part] for column in program_inputs], results[:, part], status[part], reached, memory)
 
     def _fill(
-        self, given: list[Array], results: Array, status: Codes, reached: Array | None, memory: StepMemory
+        self, program_inputs: list[Array], results: Array, status: Codes, reached: Array | None, memory: StepMemory
     ) -> None:
         """Evaluate some points; `reached` takes the coordinates of their states, if it is given.
 
         A step gives the quantities, then the coordinates of the states, and in its last row the squares of its sizes.
         """
         count = len(status)
-        self._first.run(self.fixed, given, memory.last[self._count :, :count], np.empty(count, dtype=np.int8))
+        self._first.run(self.fixed, program_inputs, memory.last[self._count :, :count], np.empty(count, dtype=np.int8))
         if self._chord is not None:
-            self._approach(self._chord, given, memory, count)
+            self._approach(self._chord, program_inputs, memory, count)
         states, points = memory.last[self._count :, :count], np.arange(count)
         for _ in range(MOST_NEWTON_STEPS):
             stepped, codes = memory.next[:, : len(points)], np.empty(len(points), dtype=np.int8)
-            self._step.run(self.fixed, [*given, states[:-1]], stepped, codes)
+            self._step.run(self.fixed, [*program_inputs, states[:-1]], stepped, codes)
             places = slice(None) if len(points) == count else points  # a slice is copied much faster
             results[:, places], status[places] = stepped[: self._count], codes
             if reached is not None:
@@ -178,33 +178,33 @@ class RestFill:
                 break
             states = stepped[self._count :]
             if not moving.all():
-                points, given = points[moving], [column[moving] for column in given]
+                points, program_inputs = points[moving], [column[moving] for column in program_inputs]
                 states = states.compress(moving, axis=1)
             memory.swap()
 
-    def _approach(self, chord: Runnable, given: list[Array], memory: StepMemory, count: int) -> None:
+    def _approach(self, chord: Runnable, program_inputs: list[Array], memory: StepMemory, count: int) -> None:
         """Take steps of the chord method towards the states of rest, as long as they shrink fast.
 
         Args:
             chord: program of a step.
-            given: columns of the programs before those of the states.
+            program_inputs: columns of the programs before those of the states.
             memory: its last step has the states, before and after.
             count: number of points.
         """
         points = np.arange(count)
         for _ in range(MOST_CHORD_STEPS):
             states = memory.last[self._count :, :count]
-            every = len(points) == count
-            before = states if every else states.take(points, axis=1)
-            columns = given if every else [column[points] for column in given]
+            is_all = len(points) == count
+            starts = states if is_all else states.take(points, axis=1)
+            columns = program_inputs if is_all else [column[points] for column in program_inputs]
             stepped, codes = memory.next[self._count :, : len(points)], np.empty(len(points), dtype=np.int8)
-            chord.run(self.fixed, [*columns, before[:-1]], stepped, codes)
-            square_before, square = before[-1], stepped[-1]
+            chord.run(self.fixed, [*columns, starts[:-1]], stepped, codes)
+            square_before, square = starts[-1], stepped[-1]
             shrinking = square < SHRINKING**2 * square_before
             # The next step will be shorter by the same ratio: size * (size / size before).
             going_on = shrinking & (square * square > LAST_STEP**2 * square_before)
             stalled = ~shrinking & (square_before >= 0.0)  # not where the size is NaN: there is no state to be lost
-            if every and not stalled.any():
+            if is_all and not stalled.any():
                 memory.swap()
             else:
                 states[:, points[shrinking]] = stepped.compress(shrinking, axis=1)
@@ -236,28 +236,29 @@ class StatePrograms:
             recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, step=step)
             return program_of(recipe, self._native)
 
-    def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
+    def rest_coordinates(self, fixed: Array, program_inputs: Sequence[Array], count: int) -> list[Array]:
         """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.
 
         Args:
             fixed: values of the parameters that are the same at all points.
-            given: columns of the others, and of joints if they are not closed inside the programs.
+            program_inputs: columns of the others, and of joints if they are not closed inside the programs.
             count: number of points.
         """
         result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
-        self._first.run(fixed, given, result, codes)
+        self._first.run(fixed, program_inputs, result, codes)
         for _ in range(MOST_NEWTON_STEPS):
             moving = result[-1] > ONE_STEP_AWAY**2
             points = np.flatnonzero(moving)
             if not len(points):
                 break
-            step, columns = self._step("newton"), [*given, *result[:-1]]
-            every = 2 * len(points) > count  # then picking them out would take longer than computing the others as well
-            if not every:
+            step, columns = self._step("newton"), [*program_inputs, *result[:-1]]
+            # Picking out more than half of the points would take longer than computing the others as well.
+            computes_all = 2 * len(points) > count
+            if not computes_all:
                 columns = [column[points] for column in columns]
             stepped = np.empty((self._size + 1, len(columns[0])))
             step.run(fixed, columns, stepped, codes[: len(columns[0])])
-            if every:
+            if computes_all:
                 np.copyto(result, stepped, where=moving)
             else:
                 result[:, points] = stepped

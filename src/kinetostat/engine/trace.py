@@ -285,14 +285,14 @@ def rows_of(columns: Iterable[Array]) -> list[Array]:
 
 def needed_nodes(results: Iterable[Operand]) -> list[Node]:
     """The nodes on which some results depend, in the order in which they were traced: operands first."""
-    seen: set[Node] = set()
+    needed: set[Node] = set()
     waiting = list(results)
     while waiting:
         operand = waiting.pop()
-        if isinstance(operand, Node) and operand not in seen:
-            seen.add(operand)
+        if isinstance(operand, Node) and operand not in needed:
+            needed.add(operand)
             waiting.extend(operand.operands)
-    return sorted(seen, key=lambda node: node.number)
+    return sorted(needed, key=lambda node: node.number)
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:

@@ -82,11 +82,11 @@ def with_tensions(mechanism: Mechanism, least: Array, most: Array, rule: Rule) -
         The mechanism with these preloads, and where there are any within the bounds [n]; elsewhere they are zero.
     """
     bare = replace(mechanism, legs=tuple(replace(leg, preload=leg.preload * leg.hinged) for leg in mechanism.legs))
-    table, known = (_tensions_of_cables if _only_cables(bare) else _tensions)(bare, least, most, rule)
+    table, exist = (_tensions_of_cables if _only_cables(bare) else _tensions)(bare, least, most, rule)
     ends = np.cumsum([leg.size for leg in mechanism.legs])[:-1]
     parts = zip(bare.legs, np.split(table, ends, axis=1), strict=True)
     legs = [replace(leg, preload=leg.preload + part) for leg, part in parts]
-    return replace(bare, legs=tuple(legs)), known
+    return replace(bare, legs=tuple(legs)), exist
 
 
 def _only_cables(mechanism: Mechanism) -> bool:
@@ -107,9 +107,9 @@ def _tensions_of_cables(mechanism: Mechanism, least: Array, most: Array, rule: R
         motions = mechanism.ways.T @ np.swapaxes(leg.chain.twists, 1, 2) @ leg.chain.follows
         wrenches.append(_solution(np.swapaxes(motions, 1, 2), leg.sign))
     load = platform_load(mechanism, free_state(mechanism).platform)[0] @ mechanism.ways
-    tensions, known = distribution(np.stack(wrenches, axis=2), load, least, most, rule)
+    tensions, exist = distribution(np.stack(wrenches, axis=2), load, least, most, rule)
     parts = [tensions[:, [place]] * leg.sign for place, leg in enumerate(mechanism.legs)]
-    return np.where(known[:, None], np.concatenate(parts, axis=1), 0.0), known
+    return np.where(exist[:, None], np.concatenate(parts, axis=1), 0.0), exist
 
 
 def _solution(matrices: Array, right: Array) -> Array:

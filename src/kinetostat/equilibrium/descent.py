@@ -128,8 +128,8 @@ def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     size, fall = np.full((2, len(radius)), np.nan)
     parts = list(admissible(equations, tangent_matrices(equations)[2]))
     for part in parts:
-        left = equations.left[part.rows][:, moving, None]
-        unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ left)[:, :, 0]
+        residual = equations.left[part.rows][:, moving, None]
+        unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ residual)[:, :, 0]
     equations = balance(mechanism, state_after(mechanism, state, unknowns))
     unknowns = np.zeros_like(unknowns)
     for part in parts:
@@ -195,7 +195,7 @@ def _model(equations: Balance, part: Admissible) -> _Model:
     """The model of the potential at those poses whose admissible motions these are."""
     legs, starts = equations.mechanism.legs, starts_of(equations)
     elastic, geometric, _ = (matrix[part.rows] for matrix in tangent_matrices(equations))
-    left = equations.left[part.rows][:, places_of(equations)[0]]
+    residual = equations.left[part.rows][:, places_of(equations)[0]]
     lines, loads, springs = [], [], []
     for leg, coordinates, start in zip(legs, equations.state.coordinates, starts, strict=False):
         for i in np.flatnonzero(leg.sign):
@@ -203,8 +203,8 @@ def _model(equations: Balance, part: Admissible) -> _Model:
             springs.append(leg.stiffness[part.rows, i])
             lines.append(leg.sign[i] * part.motions[:, start + i])
             elastic[:, start + i, start + i] = 0.0
-            left[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
-    force = -(np.swapaxes(part.motions, 1, 2) @ left[:, :, None])[:, :, 0]
+            residual[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
+    force = -(np.swapaxes(part.motions, 1, 2) @ residual[:, :, None])[:, :, 0]
     columns = [np.stack(column, axis=1) for column in (lines, loads, springs) if column]
     nothing = np.zeros((len(part.rows), 0))
     no_springs = (np.zeros((len(part.rows), 0, part.motions.shape[2])), nothing, nothing)

@@ -215,8 +215,8 @@ def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) ->
 
 def _gap(platform: Motions, end: Motions) -> Array:
     """The screw from the end of a leg to the platform, to first order [6]: 0 where the leg closes."""
-    turned = platform.rotation[0] @ end.rotation[0].T
-    sines = of_scalars([0.5 * (turned[i, j] - turned[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))])
+    rotation = platform.rotation[0] @ end.rotation[0].T
+    sines = of_scalars([0.5 * (rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))])
     return np.concatenate([sines, platform.translation - end.translation - cross(sines, end.translation)], axis=1)[0]
 
 
@@ -365,9 +365,9 @@ class LegwiseTangent:
         step, motion, changes, place = [*moving], self._solved.twist.tolist(), [], len(self.pulls)
         for leg in self.legs:
             count = len(leg.gap)
-            moved, wrench = leg.step(self._solved.twist, self._solved.changes[place : place + count])
+            coordinates, wrench = leg.step(self._solved.twist, self._solved.changes[place : place + count])
             place += count
-            step, motion = [*step, *moved, *wrench], [*motion, *moved]
+            step, motion = [*step, *coordinates, *wrench], [*motion, *coordinates]
             changes.append(wrench)
         return step, motion, changes
 

@@ -136,12 +136,12 @@ def _last_stable(mechanism: Mechanism, shares: Array, last: LoadLimit | None) ->
         last: the state from which each of them is sought; the free state if None.
     """
     rows = np.zeros(len(shares), dtype=np.int64)
-    every, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
-    loaded = with_share(every, shares, preload=1.0)
+    repeated, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
+    loaded = with_share(repeated, shares, preload=1.0)
     solution = states_near(loaded, start, FEW_STEPS)
     stands = solution.settled & stabilities(solution.balance).stable
     if last is not None:
-        stands &= are_near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)
+        stands &= are_near(with_share(repeated, last.share, preload=1.0), start, loaded, solution.state)
     count = int(np.cumprod(stands).sum())
     if not count:
         return None

@@ -207,9 +207,9 @@ def platform_weights(machine: Machine, platform: Displacement) -> list[Weight]:
     ]
 
 
-def _unit_of_force(configuration: Configuration, length: Array, count: int | None, given: Scalar | None) -> Array:
-    if given is not None:
-        return of_scalars([given], count)[:, 0]
+def _unit_of_force(configuration: Configuration, length: Array, count: int | None, chosen: Scalar | None) -> Array:
+    if chosen is not None:
+        return of_scalars([chosen], count)[:, 0]
     stiffnesses = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
     return _typical_stiffness(of_scalars(stiffnesses, count)) * length
 
@@ -269,9 +269,9 @@ def with_drives(leg: ElasticLeg, units: Units, machine: Machine) -> ElasticLeg:
         for coordinate, spring in enumerate(leg.springs)
         if spring is not None and spring.actuated
     }
-    given = [number for drive in drives.values() for number in (drive.rotor_inertia, drive.rotor_damping)]
-    given += [damping.hinges, damping.slides]
-    if all(is_zero(number) for number in given):
+    numbers = [number for drive in drives.values() for number in (drive.rotor_inertia, drive.rotor_damping)]
+    numbers += [damping.hinges, damping.slides]
+    if all(is_zero(number) for number in numbers):
         return leg
     rotors, dampers = np.array(leg.rotors), np.array(leg.dampers)
     if units.count is None:

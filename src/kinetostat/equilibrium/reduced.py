@@ -62,16 +62,16 @@ class Place:
 def place_of(machine: Cut, coordinates: Row) -> Place:
     """Evaluate the equations of a machine whose loops are cut at some coordinates of its carrier."""
     mechanism, carrier = machine.mechanism, machine.carrier
-    moved = of_scalars(coordinates)
+    row = of_scalars(coordinates)
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = carrier.chain.place(moved, amounts)
+    placed = carrier.chain.place(row, amounts)
     platform = placed.end
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
     pulls = [pull_of(rod, None if free else platform) for rod in machine.rods]
     hold, fall = wrench_of_rods(pulls, [pull.tangent_weight for pull in pulls])
     load, change = platform_load(mechanism, platform)
-    terms = leg_terms(carrier, moved, load + hold, amounts, mechanism.gravity, placed)
+    terms = leg_terms(carrier, row, load + hold, amounts, mechanism.gravity, placed)
     twists = terms.rates[0]
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
@@ -258,13 +258,13 @@ class Tangent:
 
 def _displacement(platform: Motions, twist: Row) -> tuple[Row, Scalar]:
     """Rotation vector and displacement of the tool point after a step, and whether the turn is small enough."""
-    moved, rotation, shift = of_scalars(twist)[0], platform.rotation[0], platform.translation[0]
+    step, rotation, shift = of_scalars(twist)[0], platform.rotation[0], platform.translation[0]
     sines = [0.5 * (rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))]
     square, ratio = total([s * s for s in sines]), 0.0
     for coefficient in reversed(ARC_SINE):
         ratio = ratio * square + coefficient
-    turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
-    return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
+    rotation_vector = [sine * ratio + part for sine, part in zip(sines, step[:3], strict=True)]
+    return [*rotation_vector, *(shift + step[3:] + cross(step[:3], shift))], square < LARGEST_TURN**2
 
 
 def _without_round_off(compliance: Scalar) -> Scalar:
@@ -302,6 +302,8 @@ def _free_inverse_diagonal(rows: list[Row], most: int) -> tuple[Row, Scalar]:
     fixed = [rows[i][i] < ZERO_PIVOT for i in size]
     moving: Scalar = total([where(part, 0.0, 1.0) for part in fixed])
     rigid = [where(moving > most + 0.5, 1.0, where(part, 1.0, 0.0)) > 0.5 for part in fixed]
-    apart = [[where(rigid[i], float(i == j), where(rigid[j], float(i == j), rows[i][j])) for j in size] for i in size]
-    diagonal, sure = _inverse_diagonal(apart, len(rows))
+    separated = [
+        [where(rigid[i], float(i == j), where(rigid[j], float(i == j), rows[i][j])) for j in size] for i in size
+    ]
+    diagonal, sure = _inverse_diagonal(separated, len(rows))
     return [where(part, math.inf, k) for part, k in zip(rigid, diagonal, strict=True)], sure

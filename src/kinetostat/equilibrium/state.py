@@ -255,9 +255,9 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
     """
     kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
     reach = {path: NEARBY_DISTANCE * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
-    here, rng = values(machine), Random(0)
-    poses = [{path: here[path] + r * rng.uniform(-1.0, 1.0) for path, r in reach.items()} for _ in range(3)]
-    answers = [respond(with_values(machine, pose)) for pose in poses]
+    pose, rng = values(machine), Random(0)
+    poses = [{path: pose[path] + r * rng.uniform(-1.0, 1.0) for path, r in reach.items()} for _ in range(3)]
+    answers = [respond(with_values(machine, other)) for other in poses]
     return [answer.configuration for answer in answers if int(answer.status) in REGULAR]
 
 
@@ -327,8 +327,8 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         expansions, rises = (entries if isinstance(entries, tuple) else (entries,) for entries in tables)
         for expansion, rise in zip(expansions, rises, strict=True):
             growth_of(expansion, float(np.abs(stacked_columns([rise], count)).max(initial=0.0)), kind.name)
-    turned = np.any(stacked_columns([load.gravity_angle], count))
-    if turned and not stacked_columns(load.gravity_axis, count).any(axis=1).all():
+    is_turned = np.any(stacked_columns([load.gravity_angle], count))
+    if is_turned and not stacked_columns(load.gravity_axis, count).any(axis=1).all():
         raise InputError(
             f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
             "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."

@@ -287,14 +287,14 @@ def compliance(equations: Balance) -> Array:
     size = ways.shape[1]
     right = np.zeros((len(equations.left), equations.left.shape[1], size))
     right[:, :size] = np.eye(size)
-    moved = ways @ solve(equations, right)[:, :size] @ ways.T
+    twists = ways @ solve(equations, right)[:, :size] @ ways.T
     shift = _shift(-skew_of(equations.state.platform.translation))
-    moved = shift @ moved @ np.swapaxes(shift, 1, 2)
-    moved = 0.5 * (moved + np.swapaxes(moved, 1, 2))
-    sizes = np.abs(np.diagonal(moved, axis1=1, axis2=2))
+    twists = shift @ twists @ np.swapaxes(shift, 1, 2)
+    twists = 0.5 * (twists + np.swapaxes(twists, 1, 2))
+    sizes = np.abs(np.diagonal(twists, axis1=1, axis2=2))
     # In these units a typical spring has the compliance 1.
     moves = sizes > ROUND_OFF_OF_COMPLIANCE * np.maximum(sizes.sum(axis=1, keepdims=True), 1.0)
-    return np.where(moves[:, :, None] & moves[:, None] | np.isnan(moved), moved, 0.0)
+    return np.where(moves[:, :, None] & moves[:, None] | np.isnan(twists), twists, 0.0)
 
 
 def _shift(lever: Array) -> Array:
@@ -350,8 +350,8 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     exists = np.abs(ways).max(axis=1) > 0.0
     fixed = (np.diagonal(compliances, axis1=1, axis2=2) == 0.0) & exists
-    apart = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
-    result = np.where((rigid & ~apart)[:, None, None], np.inf, stiffness)
+    separable = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
+    result = np.where((rigid & ~separable)[:, None, None], np.inf, stiffness)
     return _with_held(result, fixed & rigid[:, None])
 
 
@@ -385,8 +385,8 @@ class Stabilities:
 
 def stability(equations: Balance) -> Stability:
     """Judge the state of rest at a single pose."""
-    every = stabilities(equations)
-    return Stability(bool(every.stable[0]), float(every.factor[0]), every.mode[0], every.legs[0])
+    judged = stabilities(equations)
+    return Stability(bool(judged.stable[0]), float(judged.factor[0]), judged.mode[0], judged.legs[0])
 
 
 def stabilities(equations: Balance) -> Stabilities:
@@ -398,21 +398,21 @@ def stabilities(equations: Balance) -> Stabilities:
     stable: Mask = np.array(sound)
     factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
     for part in admissible(equations, conditions, np.flatnonzero(sound)):
-        here, allowed = part.rows, part.motions
+        rows, allowed = part.rows, part.motions
         if not allowed.size:  # nothing can move at all
             continue
-        stiff, turning = (within(matrix[here], allowed) for matrix in (elastic, geometric))
+        stiff, turning = (within(matrix[rows], allowed) for matrix in (elastic, geometric))
         springs = spring_factor(equations, part)
         holds = holds_all(springs)
         whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
         # K_e + factor K_g is singular at factor = 1/share, so that the largest share decides.
         shares, vectors = np.linalg.eigh(-np.swapaxes(whitening, 1, 2) @ turning @ whitening)
         # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
-        stable[here] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
+        stable[rows] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
         grows = holds & (shares[:, -1] > UNRESISTED)
-        factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
-        moved = (allowed @ whitening @ vectors[:, :, -1:])[:, :, 0]
-        modes[here] = np.where(grows[:, None], moved / np.abs(moved).max(axis=1, keepdims=True), 0.0)
+        factors[rows] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
+        motions = (allowed @ whitening @ vectors[:, :, -1:])[:, :, 0]
+        modes[rows] = np.where(grows[:, None], motions / np.abs(motions).max(axis=1, keepdims=True), 0.0)
     legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
     return Stabilities(
         stable, factors, modes[:, :size] @ ways.T, np.stack(legs, axis=1) if legs else np.zeros((count, 0))

@@ -97,8 +97,8 @@ class Chain:
         if amounts is None:
             return each_about(self.twists, coordinates[:, self.coordinate])
         pairs = zip(self.coordinate, self.given, strict=True)
-        moved = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
-        return each_along(self.twists, np.stack(moved, axis=1))
+        motions = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
+        return each_along(self.twists, np.stack(motions, axis=1))
 
     def rates(self, placed: PlacedChain) -> Array:
         """Return the twist of the end per unit of each coordinate [n x 6 x coordinates]."""
@@ -127,11 +127,11 @@ def _motions_of(errors: Mapping[int, Array], count: int) -> dict[int, Motions]:
     """The displacements by small screw motions, all of them in one step."""
     if not errors:
         return {}
-    every = exponential(np.concatenate(list(errors.values())))
+    all_motions = exponential(np.concatenate(list(errors.values())))
     ends = np.cumsum([len(error) for error in errors.values()]).tolist()
     places = zip(errors, [0, *ends], ends, strict=False)
     return {
-        number: Motions(_repeat(every.rotation[a:b], count), _repeat(every.translation[a:b], count))
+        number: Motions(_repeat(all_motions.rotation[a:b], count), _repeat(all_motions.translation[a:b], count))
         for number, a, b in places
     }
 

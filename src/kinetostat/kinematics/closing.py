@@ -185,15 +185,15 @@ def rotation_between(start: Rotation, end: Rotation) -> Vector:
 
 def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
     """Return the difference between a placement and the pose, for each coordinate that the pose gives."""
-    given = chains.pose
-    gaps = [given[name] - getattr(end.translation, name) for name in POINT if name in given]
-    if all(name in given for name in ANGLES):
+    pose = chains.pose
+    gaps = [pose[name] - getattr(end.translation, name) for name in POINT if name in pose]
+    if all(name in pose for name in ANGLES):
         return gaps + _rotation_gap(end.rotation, platform_placement(chains).rotation, chains.length)
     sides = _sides(end.rotation)
     return gaps + [
-        chains.length * (sin(given[name]) * sides[name][0] - cos(given[name]) * sides[name][1])
+        chains.length * (sin(pose[name]) * sides[name][0] - cos(pose[name]) * sides[name][1])
         for name in ANGLES
-        if name in given
+        if name in pose
     ]
 
 
@@ -208,8 +208,8 @@ def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> 
     shift = (end.translation - start.translation) * (1.0 / length)
     turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
-    for apart in [a - b for a, b in turns]:
-        square = square + 0.5 * apart.dot(apart)
+    for difference in [a - b for a, b in turns]:
+        square = square + 0.5 * difference.dot(difference)
     return square
 
 

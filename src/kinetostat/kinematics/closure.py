@@ -65,10 +65,10 @@ def solve_joints(machine: Machine) -> Joints:
 def task_of(machine: Machine) -> Task:
     """Collect legs and poses of a machine written leg by leg, whose numbers are floats or arrays."""
     chains = machine.chains()
-    given = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
-    goal = np.atleast_2d(given)
+    pose = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
+    goal = np.atleast_2d(pose)
     count = max(len(goal), _batch(machine, chains))
-    return Task(chains, np.broadcast_to(goal, (count, goal.shape[1])), given.ndim == 1 and count == 1)
+    return Task(chains, np.broadcast_to(goal, (count, goal.shape[1])), pose.ndim == 1 and count == 1)
 
 
 def _batch(machine: Machine, chains: Chains) -> int:
@@ -124,15 +124,15 @@ class ClosedForms:
             closed = self.over_scalars(task.chains)
             coordinates = stacked_columns([_angle(amount) for amount in closed.coordinates], count)
             status = np.broadcast_to(np.asarray(closed.status), (count,))
-            left = status == Status.NOT_CONVERGED
-            if left.all():
+            unsolved = status == Status.NOT_CONVERGED
+            if unsolved.all():
                 return NEWTON(task)
             # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
             status = self._status_where_determined(task, np.where(np.isnan(coordinates), 0.0, coordinates), status)
-            if left.any():
-                followed, codes = joints_followed(task.chains, task.goal, left)
-                coordinates = np.where(left[:, None], followed, coordinates)
-                status = np.where(left, codes, status)
+            if unsolved.any():
+                followed, codes = joints_followed(task.chains, task.goal, unsolved)
+                coordinates = np.where(unsolved[:, None], followed, coordinates)
+                status = np.where(unsolved, codes, status)
         return task.joints(coordinates, status)
 
     @staticmethod

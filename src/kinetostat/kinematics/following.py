@@ -81,19 +81,21 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
     """
     count = len(problems.poses)
     unknowns, status = np.zeros((count, problems.size)), np.full(count, int(Status.NOT_CONVERGED))
-    left = np.arange(count)
+    unsolved = np.arange(count)
     for number, (plan, differs) in enumerate(ways(problems, goal)):
-        if not left.size:
+        if not unsolved.size:
             return unknowns, status
-        tried = left[differs[left]]
+        tried = unsolved[differs[unsolved]]
         if not tried.size:
             continue
         reached, solved = _by_way(problems.subset(tried), plan, coordinates_at(goal, tried))
-        taken = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
-        unknowns[tried[taken]], status[tried[solved]] = reached[taken], int(Status.OK)
-        left = left[status[left] != Status.OK]
-    unknowns[left], shown = _least_gap(problems.subset(left), unknowns[left], coordinates_at(goal, left))
-    status[left[shown]] = int(Status.OUT_OF_REACH)
+        kept = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
+        unknowns[tried[kept]], status[tried[solved]] = reached[kept], int(Status.OK)
+        unsolved = unsolved[status[unsolved] != Status.OK]
+    unknowns[unsolved], shown = _least_gap(
+        problems.subset(unsolved), unknowns[unsolved], coordinates_at(goal, unsolved)
+    )
+    status[unsolved[shown]] = int(Status.OUT_OF_REACH)
     return unknowns, status
 
 

@@ -118,8 +118,8 @@ class ByPose:
         self.units = np.array([self.length if kind == "length" else 1.0 for kind in self.kinds.values()])
         self.actuators: Sequence[Actuator] = actuators_of(configuration)
         self.slides = np.array([actuator.slides for actuator in self.actuators], dtype=bool)
-        given = values(machine)
-        self.start = np.array([float(given[path]) for path in self.kinds]) / self.units
+        numbers = values(machine)
+        self.start = np.array([float(numbers[path]) for path in self.kinds]) / self.units
 
     def _with_unknowns(self, unknowns: Array) -> Machine:
         return with_values(self.machine, dict(zip(self.kinds, (unknowns * self.units).T, strict=True)))
@@ -221,8 +221,8 @@ class LegByLeg:
         pose = {name: float(entry[0]) for name, entry in self.poses(unknowns[None], goal).items()}
         gap, _ = self.residuals(unknowns[None], goal)
         residual = float(np.abs(gap).max(initial=0.0))
-        at = Joints(tuple(joints.tolist()), int(Status.OK))
-        return AssemblyMode(pose, placement, residual, at)
+        placed_joints = Joints(tuple(joints.tolist()), int(Status.OK))
+        return AssemblyMode(pose, placement, residual, placed_joints)
 
     def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array) -> list[bool]:
         """See `System` [actuators]."""
@@ -264,8 +264,8 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
     """
     if machine.family.chains is None:
         return actuators_of(machine.configure())
-    at = (joints or closure.solve_joints(machine)).coordinates
-    return [actuator.at(at) for actuator in joint_actuators(machine.chains(), leg_names(machine))]
+    coordinates = (joints or closure.solve_joints(machine)).coordinates
+    return [actuator.at(coordinates) for actuator in joint_actuators(machine.chains(), leg_names(machine))]
 
 
 def undriven(system: System) -> bool:

@@ -89,8 +89,8 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
     ranks = freedoms(here, reference)
     general = [freedoms(pose, pose.platform.translation) for pose in nearby] or [ranks]
     full_cycle = min(pose.platform for pose in general)
-    usual = [max(pose.legs[i] for pose in general) for i in range(len(here.legs))]
-    lost = tuple(leg.name for leg, has, may in zip(here.legs, ranks.legs, usual, strict=True) if has < may)
+    general_ranks = [max(pose.legs[i] for pose in general) for i in range(len(here.legs))]
+    lost = tuple(leg.name for leg, has, may in zip(here.legs, ranks.legs, general_ranks, strict=True) if has < may)
     constraints, holding = _platform_wrenches(here, reference)
     kind = SortOfPose.REGULAR
     twists: tuple[tuple[float, ...], ...] = ()
@@ -100,11 +100,21 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
         kind, twists = SortOfPose.ACTUATION, _free_twists(holding, ranks.locked, float(here.length))
     elif lost:
         kind = SortOfPose.LEG
-    away = _twists_absent(here)
-    legs = [_least(_leg_screws(here, leg, reference), rank + away) for leg, rank in zip(here.legs, usual, strict=True)]
+    absent = _twists_absent(here)
+    legs = [
+        _least(_leg_screws(here, leg, reference), rank + absent)
+        for leg, rank in zip(here.legs, general_ranks, strict=True)
+    ]
     actuators = sum(len(_drives(leg)) for leg in here.legs)
     return Mobility(
-        ranks, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, TWISTS_IN_SPACE)
+        here=ranks,
+        full_cycle=full_cycle,
+        actuators=actuators,
+        kind=kind,
+        lost=lost,
+        twists=twists,
+        leg_least_singular_value=min(legs, default=1.0),
+        platform_least_singular_value=_least(holding, TWISTS_IN_SPACE),
     )
 
 
@@ -115,18 +125,22 @@ def _twists_absent(configuration: Configuration) -> int:
 
 def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     """Count the freedoms of a configuration; `reference` in the base frame, m."""
-    away = _twists_absent(configuration)
-    legs = [_rank(_leg_screws(configuration, leg, reference)) - away for leg in configuration.legs]
+    absent = _twists_absent(configuration)
+    legs = [_rank(_leg_screws(configuration, leg, reference)) - absent for leg in configuration.legs]
     constraints, holding = _platform_wrenches(configuration, reference)
     rank = _rank(constraints)
-    imposed = sum(TWISTS_IN_SPACE - away - leg for leg in legs)
+    imposed = sum(TWISTS_IN_SPACE - absent - leg for leg in legs)
     spins = sum(
         len(_drives(leg)) + len(_free(leg)) + sum(spring.hinge for spring in leg.springs) - has
         for leg, has in zip(configuration.legs, legs, strict=True)
         if not leg.lines
     )
     return Freedoms(
-        TWISTS_IN_SPACE - rank, tuple(legs), spins, imposed - (rank - away), TWISTS_IN_SPACE - _rank(holding)
+        platform=TWISTS_IN_SPACE - rank,
+        legs=tuple(legs),
+        idle=spins,
+        redundant=imposed - (rank - absent),
+        locked=TWISTS_IN_SPACE - _rank(holding),
     )
 
 
@@ -142,8 +156,8 @@ def task_coordinates(configuration: Configuration, reference: Vector) -> tuple[i
     """
     constraints, _ = _platform_wrenches(configuration, reference)
     count = TWISTS_IN_SPACE - _rank(constraints)
-    turned = np.linalg.svd(constraints)[0][:, TWISTS_IN_SPACE - count :]
-    free = np.vstack([turned[3:], turned[:3]])
+    free_twists = np.linalg.svd(constraints)[0][:, TWISTS_IN_SPACE - count :]
+    free = np.vstack([free_twists[3:], free_twists[:3]])
     kept: list[int] = []
     for number in range(TWISTS_IN_SPACE):
         if _rank(free[[*kept, number]]) > len(kept):
@@ -327,14 +341,14 @@ def actuator_jacobian(
     """
     wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     rates = []
-    at = 0  # the first row of the leg
+    first = 0  # row of the leg's first wrench
     for leg, leg_springs in zip(legs, springs, strict=True):
         for spring, loads in zip(leg_springs, leg.loads, strict=True):
             if spring.actuated and float(spring.stiffness) > 0.0:
                 rate = np.zeros(len(wrenches))
-                rate[at : at + len(loads)] = [float(load) for load in loads]
+                rate[first : first + len(loads)] = [float(load) for load in loads]
                 rates.append(rate)
-        at += len(leg.wrenches)
+        first += len(leg.wrenches)
     if not rates:
         return np.zeros((6, 0))
     scaled = np.linalg.pinv(columns(wrenches, 1.0 / length, 1.0).T) @ np.array(rates).T

@@ -148,8 +148,8 @@ def _curvature_along(problems: Problems, unknowns: Array, goal: Coordinates, mot
     count, size, _ = motions.shape
     curvature = np.broadcast_to(np.eye(size), (count, size, size)).copy()
     for k in range(size):
-        aside = CURVATURE_STEP * motions[:, k]
-        change = problems.gaps(unknowns + aside, goal)[1] - problems.gaps(unknowns - aside, goal)[1]
+        shift = CURVATURE_STEP * motions[:, k]
+        change = problems.gaps(unknowns + shift, goal)[1] - problems.gaps(unknowns - shift, goal)[1]
         curvature[:, k] -= np.einsum("nr,nrc,nic->ni", loads, change, motions) / (2.0 * CURVATURE_STEP)
     return curvature
 
@@ -161,9 +161,9 @@ def _closing_step(problems: Problems, start: Array, goal: Coordinates) -> tuple[
     return end.value, end.residual <= CLOSED
 
 
-def _least_motion(rates: Array, left: Array) -> Array:
+def _least_motion(rates: Array, gaps: Array) -> Array:
     """Least motions that close gaps, without any part along idle motions [n x unknowns]."""
-    return np.asarray(np.einsum("ncr,nr->nc", np.linalg.pinv(rates, rcond=IDLE_FREEDOM), left))
+    return np.asarray(np.einsum("ncr,nr->nc", np.linalg.pinv(rates, rcond=IDLE_FREEDOM), gaps))
 
 
 def nearest_pose(machine: Machine) -> dict[str, float]:
@@ -181,9 +181,9 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
     wish = np.array([float(chains.pose.get(name, home[name])) - home[name] for name in names]) / units
     are_angles = np.array([name in ANGLES for name in names])
     wish = np.where(are_angles, np.arctan2(np.sin(wish), np.cos(wish)), wish)
-    given = np.flatnonzero([name in chains.pose for name in names])
+    given_places = np.flatnonzero([name in chains.pose for name in names])
     first = problems.size - len(names)
-    best = _Search(problems, home, first + given, wish[given]).nearest()
+    best = _Search(problems, home, first + given_places, wish[given_places]).nearest()
     nearest = home | {name: home[name] + change for name, change in zip(names, best[first:] * units, strict=True)}
     return {name: 0.0 if abs(value) < NO_COORDINATE else float(value) for name, value in nearest.items()}
 
@@ -290,11 +290,11 @@ class _Search:
         count = len(steps)
         problems = self.problems.subset(np.zeros(count, dtype=int))
         enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG_STEP) ** 2)
-        left, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
+        gaps, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
-            left[rows], rates[rows] = problems.subset(rows).gaps(unknowns, self.home)
-            return largest(left[rows]), lambda going: least_norm(rates[rows[going]], left[rows[going]])
+            gaps[rows], rates[rows] = problems.subset(rows).gaps(unknowns, self.home)
+            return largest(gaps[rows]), lambda unsolved: least_norm(rates[rows[unsolved]], gaps[rows[unsolved]])
 
         end = newton(
             equations,
@@ -304,7 +304,7 @@ class _Search:
             residual_goal=enough,
             contraction=CLOSING_CONTRACTION,
         )
-        return _Place(np.where(end.converged[:, None], end.value, np.nan), left, rates)
+        return _Place(np.where(end.converged[:, None], end.value, np.nan), gaps, rates)
 
 
 def _allowed_motions(rates: Array) -> Array:

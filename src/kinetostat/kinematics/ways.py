@@ -71,9 +71,9 @@ def _part_of_a_turn(angle: Scalar) -> Scalar:
     return angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi))
 
 
-def _on_the_way(start: Coordinates, goal: Coordinates, moved: Array, turned: Array) -> Coordinates:
+def _on_the_way(start: Coordinates, goal: Coordinates, point_share: Array, angle_share: Array) -> Coordinates:
     """Coordinates from start to goal, at one share of the way for the point and another for the angles."""
-    shares = {name: moved if name in POINT else turned for name in goal}
+    shares = {name: point_share if name in POINT else angle_share for name in goal}
     return {
         name: value if isinstance(value, float) else start[name] + (value - start[name]) * shares[name]
         for name, value in goal.items()
@@ -159,20 +159,22 @@ class _LegEnds:
         pointed = [joint for joint in joints if joint.point is not None]
         count = len(problems.poses)
         self.start, self.goal = _start(problems, goal), _short(goal)
-        home, there = (rows_of(placement_of(columns_of(c)).translation, count) for c in (self.start, self.goal))
-        base, tip = (rows_of(pointed[k].point, count) if pointed else home for k in (0, -1))
-        self.base, self.offset = base, tip - home
+        home_point, goal_point = (
+            rows_of(placement_of(columns_of(c)).translation, count) for c in (self.start, self.goal)
+        )
+        base, tip = (rows_of(pointed[k].point, count) if pointed else home_point for k in (0, -1))
+        self.base, self.offset = base, tip - home_point
         end = placement_of(columns_of(self.goal)).rotation.apply(vector_of(self.offset))
-        self.arms = tip - base, there + rows_of(end, count) - base
+        self.arms = tip - base, goal_point + rows_of(end, count) - base
         self.axis = rows_of(_first_axis(pointed, joints), count)
 
     def at(self, share: Array, arm: Array) -> Coordinates:
         """The platform's coordinates where the last joint is at an arm from the first one."""
-        turned = _on_the_way(self.start, self.goal, share, share)
-        offset = rows_of(placement_of(columns_of(turned)).rotation.apply(vector_of(self.offset)), len(share))
-        point = self.base + arm - offset
-        given = {name: point[:, i] for i, name in enumerate(POINT) if not isinstance(self.goal[name], float)}
-        return turned | given
+        pose = _on_the_way(self.start, self.goal, share, share)
+        offset = rows_of(placement_of(columns_of(pose)).rotation.apply(vector_of(self.offset)), len(share))
+        position = self.base + arm - offset
+        point_of_pose = {name: position[:, i] for i, name in enumerate(POINT) if not isinstance(self.goal[name], float)}
+        return pose | point_of_pose
 
 
 def _first_axis(pointed: list[Joint], joints: list[Joint]) -> Vector:

@@ -142,13 +142,14 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
     motions: list[Motion] = []
     sizes: list[Scalar] = []
     for leg, mode in zip(balanced, modes, strict=True):
-        taken = sum(len(shares) for shares in sharing)
-        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[taken : taken + len(mode.wrenches)])
-        felt = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
+        first = sum(len(shares) for shares in sharing)
+        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[first : first + len(mode.wrenches)])
+        spring_twists = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
         sharing.append(shares)
-        flexibility += felt
+        flexibility += spring_twists
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
-        motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
+        twists, compliance = (shares, mode.compliance) if _in_series(leg) else (spring_twists, leg.compliance)
+        motions += zip(twists, compliance, strict=True)
         sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
     loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
     round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0
@@ -222,10 +223,10 @@ def without_round_off(compliance: Symmetric6, length: Scalar, round_off: Scalar)
     sizes = [turns + reciprocal(area) * moves, moves + area * turns]
     limits = [where(size < INFINITE, ROUND_OFF_OF_COMPLIANCE * size, 0.0) for size in sizes]
     limits = [larger(limit, least) for limit, least in zip(limits, (round_off, area * round_off), strict=True)]
-    moved = [compliance.entry(i, i) > limits[i // 3] for i in range(SIZE)]
+    moves = [compliance.entry(i, i) > limits[i // 3] for i in range(SIZE)]
     entries = []
     for entry, (i, j) in zip(compliance.upper, POSITIONS, strict=True):
-        entries.append(where(moved[i], where(moved[j], entry, 0.0), 0.0))
+        entries.append(where(moves[i], where(moves[j], entry, 0.0), 0.0))
     return Symmetric6(tuple(entries))
 
 
@@ -289,11 +290,11 @@ def least_energy_rows(
         return [NO_MOTION.components()] * len(wrenches), 0.0, 0.0
     balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
     compliance = [d for leg in modes for d in leg.compliance]
-    every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
+    balanced, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     guides = len(wrenches) - len(compliance)
     weights = compliance + [0.0] * guides
     squares = [square for leg in modes for square in leg.amount_squares()] + [1.0] * guides
-    shared, doubt = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, squares)
+    shared, doubt = least_energy([*zip(*balanced, strict=True)], [*zip(*null, strict=True)], weights, squares)
     for leg in modes:
         doubt = larger(doubt, leg.doubt)
     rows = [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)]

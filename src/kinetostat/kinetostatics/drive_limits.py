@@ -86,8 +86,8 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
 def play(machine: Machine, spring: Spring) -> Scalar:
     """The play of a drive as far as its encoder does not see it, m or rad."""
     drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
-    given = drive.backlash if spring.joint.point is None else drive.angular_backlash
-    return (1.0 - servo.position_at_load) * given
+    backlash = drive.backlash if spring.joint.point is None else drive.angular_backlash
+    return (1.0 - servo.position_at_load) * backlash
 
 
 def softness(machine: Machine, spring: Spring) -> Scalar:

@@ -72,8 +72,8 @@ def elements(configuration: Configuration) -> list[Element]:
             label = numbered[0][1].kind
             kind = (label, tuple(_unit(spring) for _, spring in numbered), numbered[0][1].actuated, alike)
             groups.setdefault(kind, {})[part] = numbered
-    every = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
-    return sorted(every, key=lambda element: not element.actuated)
+    result = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
+    return sorted(result, key=lambda element: not element.actuated)
 
 
 def with_links_together(alone: Sequence[Element]) -> list[Element]:

@@ -117,11 +117,11 @@ def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
     The point of a slide is its carriage, or the end of the chain before it if the carriage is not known.
     """
     named: dict[str, Vector] = {}
-    at = next(iter(leg.path), ZERO)
+    end = next(iter(leg.path), ZERO)
     for element in leg.chain:
         for name, joint in _joints(element):
-            named.setdefault(name, joint.point or joint.carriage or at)
-        at = element.path[-1] if element.path else at
+            named.setdefault(name, joint.point or joint.carriage or end)
+        end = element.path[-1] if element.path else end
     return list(named.items())
 
 

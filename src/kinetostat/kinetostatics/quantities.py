@@ -312,11 +312,11 @@ def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
-        moved = partial(_displacement, row=i)
+        motion = partial(_displacement, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
         stiff, soft = _stiffness_unit(i, i), rf"$1/C_{{t,{shown}}}$"
         entries += [
-            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", moved, (name,), loaded="displacement"),
+            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", motion, (name,), loaded="displacement"),
             MapQuantity(
                 f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded="stiffness"
             ),

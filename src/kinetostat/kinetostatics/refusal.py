@@ -100,8 +100,8 @@ def _off_constraint(machine: Machine) -> str:
 
 
 def _undetermined_pose(machine: Machine) -> str:
-    given = ", ".join(name.removeprefix("pose.") for name in vars(machine.tables["pose"]))
+    coordinates = ", ".join(name.removeprefix("pose.") for name in vars(machine.tables["pose"]))
     return (
-        f"The pose is not determined: the legs close at the given {given}, but the platform can still move there. "
-        "Give further coordinates in [pose], or move away from a singular pose."
+        f"The pose is not determined: the legs close at the given {coordinates}, but the platform can still move "
+        "there. Give further coordinates in [pose], or move away from a singular pose."
     )
