@@ -21,10 +21,11 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, Parameter, parameters, values
+from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.budget import budget
+from kinetostat.studies.evaluation import point_of_file
 from kinetostat.studies.poses import chosen_axes, given_poses, grid_of
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities
 from kinetostat.tolerances import EQUAL_DESIGNS
@@ -142,7 +143,7 @@ def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow
 def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> Iterator[DesignRow]:
     """The quantities that were named."""
     numbers_of_designs = [
-        _numbers_of(analysis.state.machine, _one_point(analysis.state.machine), names)[0]
+        _numbers_of(analysis.state.machine, point_of_file(analysis.state.machine), names)[0]
         for analysis, names in zip(analyses, _names_by_design(analyses, quantities), strict=True)
     ]
     for name in dict.fromkeys(name for numbers in numbers_of_designs for name in numbers):
@@ -177,7 +178,7 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
     machine, result = state.machine, dict[str, float | None]()
     if state.status is not Status.OK:
         return result
-    point = _one_point(machine)
+    point = point_of_file(machine)
     frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
     wanted = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
     if platform_is_loaded(machine):
@@ -191,12 +192,6 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
             continue
         result[row] = _number_or_none(_numbers_of(machine, point, [name])[0][name][0])
     return result
-
-
-def _one_point(machine: Machine) -> PointTable:
-    """The pose of a machine as a table of one point, which must have a column: its first coordinate."""
-    coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
-    return PointTable({coordinate.path: np.array([float(values(machine)[coordinate.path])])})
 
 
 def _quantities_of(machine: Machine, name: str) -> list[str]:

@@ -24,7 +24,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, find, values
+from kinetostat.machine.parameters import POSE, Parameter, find, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.studies.poses import PoseColumns
@@ -101,7 +101,7 @@ def answers_at(
         machine: gives all fields that the poses do not name.
         poses: the poses.
         quantities: names of quantities, groups, or "K" and "C".
-        progress: called with the number of points done and of all points.
+        progress: receives how far the work is.
 
     Raises:
         InputError: an unknown quantity, or one that the machine cannot have.
@@ -115,6 +115,12 @@ def answers_at(
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
     uncounted = uncounted_loads(state, computed.values, zip(poses.fields, poses.values, strict=True))
     return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status, uncounted)
+
+
+def point_of_file(machine: Machine) -> PointTable:
+    """The pose of a machine's file as a table of one point, which must have a column: its first coordinate."""
+    path, value = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
+    return PointTable({path: np.array([float(value)])})
 
 
 @lru_cache(MACHINES_KEPT)

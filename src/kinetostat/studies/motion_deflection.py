@@ -31,7 +31,7 @@ EXCITED = 0.01
 less than masses and damping ratios are known to."""
 CRITICAL = 1e-6
 """Least distance of a damping ratio from critical damping, where both poles of a swing are one and their difference has
-no digits left; at this distance it has ten, and the swing is wrong by a millionth."""
+no digits left; at this distance it loses three, and the swing is wrong by a millionth."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from kinetostat.spec.errors import InputError
 Phase: TypeAlias = tuple[float, float, float]
 """A part of a move whose acceleration changes evenly: its duration, s, and its first and last acceleration, m/s²."""
 Phases: TypeAlias = list[Phase]
-
+"""All parts of a move, in order."""
 STRAIGHT = 1e-9
 """Sine of the angle between two chords of an arc below which it is a straight line: with eight digits of a chord, the
 circle through its points has none."""

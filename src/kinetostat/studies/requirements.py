@@ -20,13 +20,14 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
+from kinetostat.machine.parameters import Parameter, find, shown, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.requirements import Requirement
+from kinetostat.studies.evaluation import point_of_file
 from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
@@ -246,13 +247,7 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
         return _poses_of_box(machine, requirement.over)
     if requirement.poses:
         return _poses_of_list(machine, requirement.poses)
-    # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
-    coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
-    return (
-        PointTable({coordinate.path: np.array([float(values(machine)[coordinate.path])])}),
-        [],
-        "at the pose of the file",
-    )
+    return point_of_file(machine), [], "at the pose of the file"
 
 
 def _poses_of_box(machine: Machine, over: Sequence[str]) -> tuple[Points, list[Parameter], str]:

@@ -13,7 +13,6 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
@@ -34,6 +33,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
+from kinetostat.studies.evaluation import point_of_file
 from kinetostat.studies.quantities import (
     cable_count,
     refuse_absent,
@@ -215,9 +215,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     here = values(machine)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
-    # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
-    column = next(path for path in here if path.startswith("pose."))
-    answer = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), names, by)
+    answer = evaluate_gradient(machine, point_of_file(machine), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         why = FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal

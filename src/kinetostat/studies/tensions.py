@@ -78,8 +78,8 @@ class Tensions(ImmutableAnswer):
         message: the answer in a sentence.
         cables: all cables.
         bounds: least and greatest tension that are allowed, N; the greatest one may be infinite.
-        capacity: how far the load with its box, or every required wrench, is inside the set of wrenches that the
-            cables can hold, N, moments over the length of the machine; negative where they cannot hold them.
+        capacity: distance of the load with its box, or of all required wrenches, from the border of the set of wrenches
+            that the cables can hold, N, moments over the length of the machine; negative where they cannot hold them.
         wrench_closure: positive where cables without an upper bound hold any wrench.
         required: number of wrenches that the capacity is about.
     """
@@ -163,6 +163,7 @@ def _required_loads(machine: Machine, wrenches: Any) -> Array:
 
 
 def _cable_states(machine: Machine, cables: Cables) -> tuple[CableState, ...]:
+    """The cables, straight ones (without a shape) or hanging ones."""
     tensions_or_nan, shape = cables.tensions[0][0], cables.shape
     straight = np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))[0]
     if shape is None:
@@ -199,7 +200,7 @@ class Carrying(ImmutableAnswer):
         dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
         legs: names of all legs.
         sets: names of the legs that carry together, the most frequent set first.
-        points: how many points of the grid have each set.
+        points: number of points of the grid with each set.
     """
 
     machine: Machine
@@ -246,21 +247,31 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
         columns = question.grid.columns(part.start, part.stop)
         carries[part], status[part] = _carrying_in_slab(machine, columns, part.stop - start, len(names))
         progress(part.stop, size)
-    at_rest = status == Status.OK
-    sets_at_rest = [tuple(row) for row in carries[at_rest].tolist()]
-    ranked = Counter(sets_at_rest).most_common()
-    places = {row: place for place, (row, _) in enumerate(ranked)}
-    codes = np.full(size, -1, dtype=np.int16)
-    codes[at_rest] = [places[row] for row in sets_at_rest]
-    sets = tuple(tuple(name for name, carried in zip(names, row, strict=True) if carried) for row, _ in ranked)
-    meanings = " ".join("+".join("_".join(name.split()) for name in names) or "none" for names in sets)
-    about = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": meanings}
+    codes, rows, counts = _numbered_sets(carries, status == Status.OK)
+    sets = tuple(tuple(name for name, carried in zip(names, row, strict=True) if carried) for row in rows)
+    words = ["+".join("_".join(name.split()) for name in members) or "none" for members in sets]
+    about = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": " ".join(words)}
     shape = question.grid.shape
     dataset = question.labels.assign(
         carrying=(question.dims, codes.reshape(shape), about),
         status=(question.dims, status.reshape(shape), datasets.ABOUT_STATUS),
     )
-    return Carrying(machine, dataset, tuple(names), sets, tuple(count for _, count in ranked))
+    return Carrying(machine=machine, dataset=dataset, legs=tuple(names), sets=sets, points=counts)
+
+
+def _numbered_sets(carries: Mask, at_rest: Mask) -> tuple[Codes, list[tuple[bool, ...]], tuple[int, ...]]:
+    """The number of the set of legs that carry at each point, -1 without rest; the sets; and how often each occurs.
+
+    Args:
+        carries: whether each leg carries at each point [points x legs].
+        at_rest: whether the machine comes to rest there [points].
+    """
+    sets_at_rest = [tuple(row) for row in carries[at_rest].tolist()]
+    ranked = Counter(sets_at_rest).most_common()
+    numbers_of_sets = {row: number for number, (row, _) in enumerate(ranked)}
+    codes = np.full(len(carries), -1, dtype=np.int16)
+    codes[at_rest] = [numbers_of_sets[row] for row in sets_at_rest]
+    return codes, [row for row, _ in ranked], tuple(count for _, count in ranked)
 
 
 def _carrying_in_slab(machine: Machine, columns: dict[str, Array], count: int, legs: int) -> tuple[Mask, Codes]:
