@@ -225,8 +225,8 @@ def least_squares(
     after another one.
 
     Args:
-        equations: function from the unknowns of some problems [k x unknowns], and their numbers, to what is left of the
-            equations [k x m] and how the unknowns reduce it [k x m x unknowns].
+        equations: function from the unknowns of some problems [k x unknowns], and their numbers, to the residuals of
+            the equations [k x m] and the rates at which the unknowns reduce them [k x m x unknowns].
         start: unknowns to begin with [n x unknowns].
         most_steps: number of steps that are tried at most.
         residual_goal: residual at which a problem has converged.
@@ -262,8 +262,8 @@ def damped_steps(residuals: Array, rates: Array, damping: Array) -> Array:
     """Return steps of damped least squares [n x unknowns].
 
     Args:
-        residuals: what is left of the equations [n x m].
-        rates: how the unknowns reduce it [n x m x unknowns].
+        residuals: residuals of the equations [n x m].
+        rates: rates at which the unknowns reduce them [n x m x unknowns].
         damping: share of the mean square of the rates that is added to their squares [n].
     """
     back = np.swapaxes(rates, 1, 2)

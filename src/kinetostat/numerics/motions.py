@@ -50,11 +50,11 @@ class Motions:
         The columns of a rotation are of length 1, so that small entries beside the diagonal give 1 minus the diagonal's
         entry with all digits.
         """
-        turned = self.rotation - IDENTITY
+        change = self.rotation - IDENTITY
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            beside = self.rotation[:, j, i] * self.rotation[:, j, i] + self.rotation[:, k, i] * self.rotation[:, k, i]
-            turned[:, i, i] = -beside / (1.0 + self.rotation[:, i, i])
-        return np.asarray(np.einsum("nij,nj->ni", turned, points) + self.translation)
+            squares = self.rotation[:, j, i] * self.rotation[:, j, i] + self.rotation[:, k, i] * self.rotation[:, k, i]
+            change[:, i, i] = -squares / (1.0 + self.rotation[:, i, i])
+        return np.asarray(np.einsum("nij,nj->ni", change, points) + self.translation)
 
     def twist(self, twists: Array) -> Array:
         """Return screws fixed in the bodies [n x 6] after the displacements (the adjoint map)."""
@@ -64,8 +64,8 @@ class Motions:
 
     def amounts(self) -> Array:
         """Rotation vectors and translations [n x 6]: how far bodies are turned, and where their origins are."""
-        turned = logarithm(Motions(self.rotation, np.zeros_like(self.translation)))
-        return np.concatenate([turned[:, :3], self.translation], axis=1)
+        twists = logarithm(Motions(self.rotation, np.zeros_like(self.translation)))
+        return np.concatenate([twists[:, :3], self.translation], axis=1)
 
     def at(self, rows: Integers) -> "Motions":
         """The displacements of some of the bodies, by number."""
@@ -125,8 +125,9 @@ def each_along(twists: Array, amounts: Array) -> list[Motions]:
     count, motions = amounts.shape
     if twists.dtype == object or amounts.dtype == object:
         return [along(twists[:, k], amounts[:, k]) for k in range(motions)]
-    every = exponential((twists * amounts[:, :, None]).reshape(-1, 6))
-    rotation, translation = every.rotation.reshape(count, motions, 3, 3), every.translation.reshape(count, motions, 3)
+    all_motions = exponential((twists * amounts[:, :, None]).reshape(-1, 6))
+    rotation = all_motions.rotation.reshape(count, motions, 3, 3)
+    translation = all_motions.translation.reshape(count, motions, 3)
     return [Motions(rotation[:, k], translation[:, k]) for k in range(motions)]
 
 
@@ -158,8 +159,8 @@ def each_about(twists: Array, amounts: Array) -> list[Motions]:
     amount = np.swapaxes(amounts.reshape(legs, -1, motions), 1, 2).reshape(len(screws), -1)
     angle = amount * size[:, None]
     terms = np.stack([np.ones_like(angle), amount, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2], axis=2)
-    every = (terms @ parts).reshape(legs, motions, -1, 12)
-    of_motions = [every[:, k].reshape(count, 12) for k in range(motions)]
+    numbers = (terms @ parts).reshape(legs, motions, -1, 12)
+    of_motions = [numbers[:, k].reshape(count, 12) for k in range(motions)]
     return [Motions(each[:, :9].reshape(-1, 3, 3), each[:, 9:]) for each in of_motions]
 
 

@@ -57,10 +57,10 @@ def _without_repetitions(points: Array) -> Array:
     """The points without those that equal an earlier one to round-off."""
     scale = SAME_VERTEX * np.abs(points).max()
     _, first = np.unique(np.round(points / scale), axis=0, return_index=True)
-    kept = points[np.sort(first)]
+    distinct = points[np.sort(first)]
     # Rounding may part two points that are one: what is left is compared directly.
-    differs = np.abs(kept[:, None] - kept[None]).max(axis=2) > 2.0 * scale
-    return np.asarray(kept[[bool(differs[i, :i].all()) for i in range(len(kept))]])
+    differs = np.abs(distinct[:, None] - distinct[None]).max(axis=2) > 2.0 * scale
+    return np.asarray(distinct[[bool(differs[i, :i].all()) for i in range(len(distinct))]])
 
 
 def outline(normals: Array, bounds: Array, reach: float) -> Array:

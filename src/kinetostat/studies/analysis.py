@@ -77,34 +77,34 @@ class Analysis(AnswerInState):
 
     Attributes:
         state: the machine at its pose, in the state that is meant.
-        status: of the pose. Unless it is OK, attribution, indices and loads are unknown, and the rest only where the
+        status: status of the pose. Unless it is OK, attribution, indices and loads are unknown, and the rest where the
             machine has no place; K and C are known at singular poses as far as they are finite.
-        message: what is special about the pose, or why it has no answer; one paragraph.
+        message: one paragraph on what is special about the pose, or on why it has no answer.
         components: names of the rows and columns of K and C: rx ry rz x y z, or rz x y of a planar machine.
         axes: "base" or "platform": the axes of K, C, the attribution, the indices and the load.
         platform: position of P, m, and rows of the rotation matrix of the platform, both in the base frame.
         stiffness: K [n x n], None where a direction is rigid (K has no finite value there).
         compliance: C [n x n], None where a direction is free.
-        finite_compliance: of a singular pose, C with NaN in the entries that are not finite; None at others.
+        finite_compliance: C of a singular pose, with NaN in the entries that are not finite; None at others.
         stiffness_diagonal, compliance_diagonal: their diagonals [n], infinity where rigid or free; empty without an
             answer.
-        rank: of C, or of K where a direction is free.
+        rank: rank of C, or of K where a direction is free.
         rigid, free: names of the springs with infinite and with zero stiffness.
-        attribution: what each spring contributes to K and C.
+        attribution: contribution of each spring to K and C.
         indices: numbers and directions read off K and C.
-        softest: of "translation" and "rotation", the softest direction and what makes it soft.
-        mobility: what can move, and the kind of pose.
+        softest: the softest direction of "translation" and of "rotation", and what makes it soft.
+        mobility: the motions that are free, and the kind of pose.
         internal_loads: statically indeterminate loads.
         load: effects of the machine's [load], None where it has none.
         masses: mass of each moving part.
-        actuators: where they stand: length of the leg, position, travel or angle, as each says; `forward` takes them.
-        singularity_margin: of the pose, theory section 2: the least of the next two.
+        actuators: actuators with their coordinates: length of the leg, position, travel or angle; `forward` takes them.
+        singularity_margin: singularity margin of the pose, theory section 2: the least of the next two.
         leg_singularity_margin, platform_singularity_margin: the least of any leg's passive joints, and that of the
             wrenches that hold the platform.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: condition number of the actuators' Jacobian, angles multiplied by the characteristic length;
             None where some actuators are rotary and others linear, or where there is no actuator.
-        characteristic_length: in m; it makes rotations comparable with translations.
+        characteristic_length: a length, m, that makes rotations comparable with translations.
         directions: stiffnesses along and about directions that were asked for.
         requirements: verdicts on the requirements of the machine's file, where they were asked for.
     """
@@ -146,8 +146,8 @@ class Analysis(AnswerInState):
     @property
     def moving_mass(self) -> float | None:
         """Mass of all moving parts whose mass is known, kg; None where none is known."""
-        known = [float(part.mass) for part in self.masses if part.mass is not None]
-        return sum(known) if known else None
+        masses = [float(part.mass) for part in self.masses if part.mass is not None]
+        return sum(masses) if masses else None
 
     @property
     def K(self) -> Array:  # noqa: N802
@@ -186,10 +186,12 @@ class Analysis(AnswerInState):
         row = self.components.index(choice(component, self.components, "component"))
         pick = attrgetter({"C": "compliance_share", "K": "stiffness_share"}[choice(matrix, ("C", "K"), "matrix")])
         parts = by_part(self.attribution).items()
-        known = {part: [pick(spring)[row] for spring in members] for part, members in parts}
-        if not known or np.isnan([*known.values()]).any():
+        shares_by_part = {part: [pick(spring)[row] for spring in members] for part, members in parts}
+        if not shares_by_part or np.isnan([*shares_by_part.values()]).any():
             raise InputError(f"{matrix}_{component} is zero or infinite here and has no shares. {self.message}")
-        return dict(sorted(((part, float(sum(shares))) for part, shares in known.items()), key=lambda pair: -pair[1]))
+        return dict(
+            sorted(((part, float(sum(shares))) for part, shares in shares_by_part.items()), key=lambda pair: -pair[1])
+        )
 
     @checked
     def to_pandas(self, which: str = "attribution") -> "pd.DataFrame":
@@ -245,8 +247,8 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     configuration = response.configuration
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
     if status is not Status.OK:
-        names, known = machine.family.component_names, _facts_without_answer(state, turn)
-        return Analysis(state, status, state.refusal, names, axes, **known)
+        names, facts = machine.family.component_names, _facts_without_answer(state, turn)
+        return Analysis(state, status, state.refusal, names, axes, **facts)
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -255,7 +257,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     kept = machine.family.components
     compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
     all_springs, length = springs(configuration), float(configuration.length)
-    known = _facts(state)
+    facts = _facts(state)
     extremes = conditioning(response.legs, length, response.guide)
     load = load_case(response, statics, turn, kept)
     indices = indices_of(stiffness_rows, compliance_rows, length, kept)
@@ -263,7 +265,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     return Analysis(
         state,
         status,
-        _message(state, response, known["rigid"], known["free"], stiffness_rows is not None, load),
+        _message(state, response, facts["rigid"], facts["free"], stiffness_rows is not None, load),
         components=machine.family.component_names,
         axes=axes,
         stiffness=stiffness_rows,
@@ -279,7 +281,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
         load=load,
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
-        **known,
+        **facts,
     )
 
 

@@ -350,8 +350,8 @@ def clean_screw(screw: AnyScrew, length: float, least: float = 0.0) -> AnyScrew:
     """
     sizes = [abs(c) * scale for c, scale in zip(screw.components(), [1.0] * 3 + [length] * 3, strict=True)]
     limit = ROUND_OFF_OF_ENTRY * max(least, *sizes)
-    kept = [float(c) if size > limit else 0.0 for c, size in zip(screw.components(), sizes, strict=True)]
-    return type(screw)(Vector(*kept[:3]), Vector(*kept[3:]))
+    components = [float(c) if size > limit else 0.0 for c, size in zip(screw.components(), sizes, strict=True)]
+    return type(screw)(Vector(*components[:3]), Vector(*components[3:]))
 
 
 def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUND_OFF_OF_ENTRY) -> list[list[float]]:
@@ -392,6 +392,6 @@ def _clean_sum(shares: Sequence[tuple[AnyScrew, Scalar]], length: float) -> tupl
         if math.isinf(weight):
             result.append((clean_screw(screw, length), weight))
             continue
-        kept = [float(c) if reached else 0.0 for c, reached in zip(screw.components(), is_reached, strict=True)]
-        result.append((type(screw)(Vector(*kept[:3]), Vector(*kept[3:])), weight))
+        numbers = [float(c) if reached else 0.0 for c, reached in zip(screw.components(), is_reached, strict=True)]
+        result.append((type(screw)(Vector(*numbers[:3]), Vector(*numbers[3:])), weight))
     return tuple(result)

@@ -33,14 +33,14 @@ class ForwardPose(ImmutableAnswer):
 
     Attributes:
         pose: coordinates of the machine's [pose] by name, m and rad: `machine.with_values(pose.pose)` takes them.
-        status: of the machine there: OK, JOINT_LIMIT or SINGULAR.
+        status: status of the machine there: OK, JOINT_LIMIT or SINGULAR.
         residual: the largest difference of an actuator from its coordinate, or gap of a leg, rad or in units of the
             machine's length.
         present: whether the machine comes to it from its own pose if its actuators move evenly, without passing a
             singularity.
         by_pose: whether the machine at this `pose` has its actuators there; if not, the pose belongs to another
             assembly mode of the legs than that of the home pose.
-        position: of P, base frame, m.
+        position: position of P, base frame, m.
         rotation: rows of the rotation matrix of the platform, base frame.
     """
 
@@ -182,10 +182,10 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
             f"further away (spread).{more}"
         )
     verb = "is" if len(modes) == 1 else "are"
-    first = f"Near the pose there {verb} {_count_of_modes(len(modes))} with these actuator coordinates."
+    first_sentence = f"Near the pose there {verb} {_count_of_modes(len(modes))} with these actuator coordinates."
     if not any(mode.present for mode in modes):
         return (
-            f"{first} Moved evenly, the actuators do not lead to any of them: the present mode ends on the way, at a "
-            "singularity or where a leg no longer reaches."
+            f"{first_sentence} Moved evenly, the actuators do not lead to any of them: the present mode ends on the "
+            "way, at a singularity or where a leg no longer reaches."
         )
-    return first if len(modes) == 1 else f"{first} The first is the one that the machine is in."
+    return first_sentence if len(modes) == 1 else f"{first_sentence} The first is the one that the machine is in."

@@ -48,7 +48,7 @@ def contributions(
 
     Args:
         springs: all springs of the machine, in the order of the statics.
-        statics: how they share loads, in the axes of K and C.
+        statics: the statics by which they share loads, in the axes of K and C.
         stiffness, compliance: K and C.
         kept: the components that the machine has, as indices into rx ry rz x y z.
     """
@@ -163,9 +163,9 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
     """
     parts: dict[str, float] = {}
     kinds: dict[str, dict[str, float]] = {}
-    known = {spring.name: spring for spring in springs}
+    springs_by_name = {spring.name: spring for spring in springs}
     for name, share in shares.items():
-        part, kind = (known[name].of, known[name].kind) if name in known else (name, name)
+        part, kind = (springs_by_name[name].of, springs_by_name[name].kind) if name in springs_by_name else (name, name)
         parts[part] = parts.get(part, 0.0) + share
         kinds.setdefault(kind, {})[part] = 0.0
     together = {

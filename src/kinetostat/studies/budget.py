@@ -206,8 +206,8 @@ def budget(
     that of the tool point and of the platform's orientation, to first order in the tolerances.
 
     Args:
-        machine: as drawn, with the tolerances of its file, or its state, as `state_of` returns it; its pose is the one
-            that counts, if no poses are given.
+        machine: the machine as drawn, with the tolerances of its file, or its state, as `state_of` returns it; its
+            pose counts if no poses are given.
         poses: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV file, as for `evaluate`.
         ranges: instead of poses, a grid: one axis each, "x=-2 cm:2 cm:11", coordinates of the pose only.
         tolerances: further lines as in the table [tolerances], after those of the file: {"joints": "0.05 mm"}.
@@ -217,7 +217,7 @@ def budget(
         exact: machines whose equations are solved exactly, at the pose of the machine.
         allocate: wanted error of the tool point (or along the direction), m or text with a unit: gives the tolerances
             of least cost that keep it.
-        by: what must keep it: "rss", the root of the sum of squares, or "worst", the worst case.
+        by: the sum of errors that must keep it: "rss", the root of the sum of squares, or "worst", the worst case.
         seed: seed of the random machines.
         progress: receives how far the work is.
 
@@ -354,10 +354,10 @@ def _answer(
 ) -> Budget:
     inputs, measures = sums.inputs, sums.measures
     if inputs is None or measures is None:
-        first = Status(int(status[0]))
+        reason = Status(int(status[0]))
         where = "the pose" if len(status) == 1 else "all poses"
         raise InputError(
-            f"{sums.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence} "
+            f"{sums.machine.name} has no result at {where} ({reason.word.replace('_', ' ')}): {reason.sentence} "
             f"{columns.unit_doubt if columns else ''}".rstrip()
         )
     pressed = np.concatenate(sums.pressed)
@@ -411,12 +411,12 @@ def _message(answer: Budget) -> str:
     where = "along the direction" if leading == "along" else "at the tool point"
     at_worst_pose = "" if len(answer.status) == 1 else f" at the worst of {int(answer.settled.sum())} poses"
     size, most = (_small_motion(answer, value, "m") for value in (usual, worst))
-    first = f"95 % of all machines are off by at most {size} {where}{at_worst_pose} (worst case {most})."
+    first_sentence = f"95 % of all machines are off by at most {size} {where}{at_worst_pose} (worst case {most})."
     if not worst:
         return f"The tolerances do not move the tool {where}. {answer.loads_left_out}".strip()
     shares_of_lines = answer.shares_by("line").items()
     ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in shares_of_lines if share > LEAST_NAMED_SHARE]
-    sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
+    sentences = [first_sentence, f"The variance comes from {', '.join(ranked[:4])}."]
     if answer.freedoms < len(answer.machine.family.components):
         sentences.append(_parasitic_sentence(answer, pose))
     if answer.pressed:

@@ -113,9 +113,9 @@ class Capability(AnswerInState):
         state: state of the machine.
         status: status of the pose.
         message: the answer in a sentence or two.
-        drives: with their limits and what they carry.
-        sets: of forces, moments, speeds, angular speeds and accelerations, as far as the file limits drives and the
-            machine has them.
+        drives: drives with their limits and what they carry.
+        sets: sets of forces, moments, speeds, angular speeds and accelerations, as far as the file limits drives and
+            the machine has them.
         direction: the direction that was asked for, base axes; empty if none.
     """
 
@@ -146,8 +146,9 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
     Loads come beside those of the file: the platform's to first order, or all of them at rest where `machine.loaded`.
 
     Args:
-        machine: with its pose, or its state; its drives are limited by [limits], and by [load] if they only pull.
-        along: a direction that is looked at, base axes; none if empty.
+        machine: the machine at its pose, or its state; its drives are limited by [limits], and by [load] if they only
+            pull.
+        along: a direction of interest, base axes; none if empty.
 
     Raises:
         InputError: nothing limits the drives, or the direction is zero.
@@ -169,7 +170,14 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
         twists = _twists(response, drives, block) if "speed" in kinds else None
         accelerations = _accelerations(response, drives, block) if "load" in kinds else None
         sets += [each for each in (wrenches, twists, accelerations) if each is not None]
-    return Capability(state, Status.OK, _message(state.machine, sets), drives, tuple(sets), direction)
+    return Capability(
+        state=state,
+        status=Status.OK,
+        message=_message(state.machine, sets),
+        drives=drives,
+        sets=tuple(sets),
+        direction=direction,
+    )
 
 
 def limits_of_drives(state: MachineState) -> set[str]:
@@ -211,8 +219,8 @@ def _wrenches(response: Response, drives: Sequence[DriveAtPose], block: str) -> 
     normals, bounds, names = [], [], []
     for face in response.faces:
         normal = np.array(face.normal.components(), dtype=float)
-        whole = np.linalg.norm(normal * np.repeat([length, 1.0], 3))
-        if np.linalg.norm(normal[part]) * (length if block == "rotation" else 1.0) <= DEPENDENT * whole:
+        size = np.linalg.norm(normal * np.repeat([length, 1.0], 3))
+        if np.linalg.norm(normal[part]) * (length if block == "rotation" else 1.0) <= DEPENDENT * size:
             continue
         for sign, bound in ((1.0, face.upper), (-1.0, -face.lower)):
             normals.append(sign * normal[part])
@@ -247,8 +255,8 @@ def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str
     directions = _null_space(_block_of(response.transmission.constraints, block), response.transmission, block)
     if not response.acceleration_faces or not directions.shape[1]:
         return None
-    whole = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)[:, BLOCKS[block]]
-    rows = whole @ directions @ directions.T
+    normals = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)
+    rows = normals[:, BLOCKS[block]] @ directions @ directions.T
     sizes = np.linalg.norm(rows, axis=1)
     met = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
     if not len(met):

@@ -171,11 +171,11 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     commanded = commanded_state(mechanism)
     equations = commanded.solution.balance
     stable = commanded.solution.settled & stabilities(equations).stable
-    before, left = (
+    missed_before, missed_after = (
         np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (commanded.first_error, commanded.error)
     )
-    left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
-    turned = np.linalg.norm(commanded.error[:, :3], axis=1)
+    missed_after = np.where(missed_after > ROUND_OFF_OF_ENTRY * length, missed_after, 0.0)
+    angle_after = np.linalg.norm(commanded.error[:, :3], axis=1)
     rates = commanded.rates[:, 3:] * (length[:, None] / units)[:, None]
 
     def where_stable(array: Array) -> Array:
@@ -185,9 +185,9 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
         actuators=tuple(actuators),
         coordinates=where_stable(stands + equations.state.amounts * units),
         unloaded=where_stable(stands),
-        before=where_stable(before),
-        left=where_stable(left),
-        turned=where_stable(turned),
+        before=where_stable(missed_before),
+        left=where_stable(missed_after),
+        turned=where_stable(angle_after),
         rates=where_stable(rates),
         status=np.where(stable, Status.OK, status).astype(np.int64),
     )
@@ -209,12 +209,12 @@ def _actuators(
     geometry = {path: column for path, column in tables.items() if not path.startswith("pose.")}
     homes = [{path: float(column[i]) for path, column in geometry.items()} for i in range(count if geometry else 1)]
     actuators_at_homes = [joint_actuators(with_values(machine, home).chains(), leg_names(machine)) for home in homes]
-    first = actuators_at_homes[0]
-    placed = [actuator.at(joints.coordinates) for actuator in first]
+    actuators_at_home = actuators_at_homes[0]
+    placed = [actuator.at(joints.coordinates) for actuator in actuators_at_home]
     signs = np.array([[actuator.sign for actuator in row] for row in actuators_at_homes])
     senses = np.broadcast_to(signs, (count, len(placed)))
     offsets = np.array([[actuator.offset for actuator in row] for row in actuators_at_homes])
-    offsets = offsets - [actuator.offset for actuator in first]
+    offsets = offsets - [actuator.offset for actuator in actuators_at_home]
     return placed, stacked_columns([actuator.coordinate for actuator in placed], count) + offsets, senses
 
 
@@ -329,7 +329,7 @@ def refuse_tensions(machine: Machine) -> None:
     """Refuse a machine whose file asks for chosen tensions: forces command its actuators, not coordinates.
 
     Raises:
-        InputError: it is such a machine.
+        InputError: the file asks for chosen tensions.
     """
     if not all(math.isinf(bound) for bound in (machine.tables["load"].min_tension, machine.tables["load"].max_tension)):
         raise InputError(
@@ -386,8 +386,8 @@ def without_command(machine: Machine, columns: Mapping[str, Array], status: Inte
     """
     lost = np.flatnonzero(status != Status.OK)
     machine_there = with_values(machine, {path: float(column[lost[0]]) for path, column in columns.items()})
-    first = Status(int(status[lost[0]]))
-    reason = first.sentence if first is Status.NO_REST else state_of(machine_there).refusal
+    first_status = Status(int(status[lost[0]]))
+    reason = first_status.sentence if first_status is Status.NO_REST else state_of(machine_there).refusal
     if len(status) == 1:
         return reason
     has = "has" if len(lost) == 1 else "have"
@@ -407,12 +407,12 @@ def _limits_passed(machine: Machine, columns: Mapping[str, Array], settled: Mask
         return ""
     path, number = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
     placed = {path: np.full(len(settled), number), **columns}
-    first = first_limit_passed(machine, {path: column[rows] for path, column in placed.items()}, names)
-    passed = np.flatnonzero(first >= 0)
-    if not passed.size:
+    limits_first_passed = first_limit_passed(machine, {path: column[rows] for path, column in placed.items()}, names)
+    places = np.flatnonzero(limits_first_passed >= 0)
+    if not places.size:
         return ""
-    limit = f"limits.{names[first[passed[0]]]}"
+    limit = f"limits.{names[limits_first_passed[places[0]]]}"
     if len(settled) == 1:
         return f" But the pose passes {limit}, see `kinetostat analyze` there."
-    where = f"{len(passed)} of {len(settled)} poses, first at pose {rows[passed[0]] + 1}: {limit}"
+    where = f"{len(places)} of {len(settled)} poses, first at pose {rows[places[0]] + 1}: {limit}"
     return f" But a limit of the file is passed at {where}."

@@ -46,7 +46,7 @@ class Design:
     Attributes:
         label: the name, as written.
         machine: the machine with its pose.
-        analysis: its analysis.
+        analysis: the analysis of the machine.
     """
 
     label: str
@@ -180,23 +180,23 @@ def compare(
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
-    given = list(_designs(designs))
+    read_designs = list(_designs(designs))
     if ranges and poses is not None:
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
-    for design in given:
+    for design in read_designs:
         _refuse_absent(design, ranges)
-    analyses, names, where = [design.analysis for design in given], several(quantities), ""
+    analyses, names, where = [design.analysis for design in read_designs], several(quantities), ""
     if ranges:
         where = f"over {', '.join(ranges)}"
     elif poses is not None:
         where = f"at the poses of {poses if isinstance(poses, str | Path) else 'the list'}"
     over, counts = rows_over(analyses, ranges, poses, names, progress) if where else ((), ())
     return Comparison(
-        designs=tuple(given),
-        differences=_differences(given),
+        designs=tuple(read_designs),
+        differences=_differences(read_designs),
         rows=rows_at_poses(analyses, names),
-        softest=tuple(_softest(design) for design in given),
-        verdicts=_verdicts(given),
+        softest=tuple(_softest(design) for design in read_designs),
+        verdicts=_verdicts(read_designs),
         ranges=tuple(ranges),
         where=where,
         poses=counts,
@@ -249,10 +249,10 @@ def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine | st
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
     """Fields that two designs have at least, whole ones where they have entries, and of which not all say the same."""
     numbers_of = [values(design.machine) for design in designs]
-    known = [_whole_fields(design.machine) for design in designs]
+    fields_by_design = [_whole_fields(design.machine) for design in designs]
     differences = []
-    for path in dict.fromkeys(path for fields in known for path in fields):
-        fields_of = tuple(fields.get(path) for fields in known)
+    for path in dict.fromkeys(path for fields in fields_by_design for path in fields):
+        fields_of = tuple(fields.get(path) for fields in fields_by_design)
         rows = tuple(
             tuple(numbers[leaf] for leaf in p.leaves) if p else ()
             for numbers, p in zip(numbers_of, fields_of, strict=True)
@@ -264,9 +264,9 @@ def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
 
 def _whole_fields(machine: Machine) -> dict[str, Parameter]:
     """The fields of a machine by path, those with entries as one."""
-    every = list(parameters(machine.family))
-    entries = {leaf for parameter in every if parameter.quantity.count for leaf in parameter.leaves}
-    return {parameter.path: parameter for parameter in every if parameter.path not in entries}
+    all_parameters = list(parameters(machine.family))
+    entries = {leaf for parameter in all_parameters if parameter.quantity.count for leaf in parameter.leaves}
+    return {parameter.path: parameter for parameter in all_parameters if parameter.path not in entries}
 
 
 def _softest(design: Design) -> tuple[SoftDirection, ...]:
@@ -274,14 +274,14 @@ def _softest(design: Design) -> tuple[SoftDirection, ...]:
     if not design.answered:
         return ()
     response, components = respond(design.machine), design.machine.family.components
-    whole = without_rounding(response.compliance.diagonal(), response)[:, 0]
+    diagonal = without_rounding(response.compliance.diagonal(), response)[:, 0]
     softest = []
     for block in (ROTATIONS, TRANSLATIONS):
-        known = [i for i in components if i in block and 0.0 < whole[i] < math.inf]
-        if known:
-            i = max(known, key=lambda i: whole[i])
+        compliant = [i for i in components if i in block and 0.0 < diagonal[i] < math.inf]
+        if compliant:
+            i = max(compliant, key=lambda i: diagonal[i])
             parts = [
-                (element.name, float(element_share(response, element)[i] / whole[i]))
+                (element.name, float(element_share(response, element)[i] / diagonal[i]))
                 for element in elements(response.configuration)
                 if element.stiffness != math.inf
             ]

@@ -113,7 +113,7 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
     """Find the stiffness and the damping of a machine's tool with its servo loops closed.
 
     Args:
-        machine: with its pose, masses and [servo], or its state; about its state under load where `machine.loaded`.
+        machine: the machine with pose, masses and [servo], or its state; under load where `machine.loaded` is set.
         along: direction in which the tool is pushed for the response, base axes; x, y and z if empty.
 
     Raises:

@@ -110,11 +110,11 @@ def shortest_law(
     middles = np.array([0.5 * (axis.min() + axis.max()) for axis in axes])
     halves = np.array([float(0.5 * (axis.max() - axis.min())) or 1.0 for axis in axes])
     points = [grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")]
-    known = np.isfinite(corrections).all(axis=1)
+    has_correction = np.isfinite(corrections).all(axis=1)
     best: tuple[Law, float] | None = None
-    for terms in _candidates(paths, [len(axis) for axis in axes], int(known.sum())):
-        functions = _functions(terms, [axis[known] for axis in points], middles, halves)
-        coefficients: Array = np.linalg.lstsq(functions, corrections[known], rcond=None)[0].astype(float)
+    for terms in _candidates(paths, [len(axis) for axis in axes], int(has_correction.sum())):
+        functions = _functions(terms, [axis[has_correction] for axis in points], middles, halves)
+        coefficients: Array = np.linalg.lstsq(functions, corrections[has_correction], rcond=None)[0].astype(float)
         law = _without_round_off(Law(tuple(paths), middles, halves, terms, coefficients))
         law_error = error(law)
         if best is None or law_error < best[1]:
@@ -181,7 +181,7 @@ class CorrectionTable(ImmutableAnswer):
         before: the largest error of the tool point without corrections, at points and middles of cells, m.
         left: the largest error that exact commands leave, m: what no actuator of the machine can change.
         error: the largest further error by interpolation, at the middles of cells, m; NaN if no cell is complete.
-        unknown: how many cells have a corner or middle without a command.
+        unknown: number of cells with a corner or middle without a command.
         law: the shortest law of the corrections.
         law_error: its largest error at points and middles of cells, m.
         tolerance: greatest error of the law, m.
@@ -251,14 +251,14 @@ def correction_table(
         raise InputError(
             f"the table has {grid.size:,} points; at most {MOST_TABLE_POINTS:,} are computed: lower the counts."
         )
-    wanted = None if tolerance is None else positive(tolerance, "length", "tolerance")
+    greatest_error = None if tolerance is None else positive(tolerance, "length", "tolerance")
     middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
     # Together, so that a table whose cells have no place is still a table.
     of_cells = middles.columns(0, middles.size)
     columns = {path: np.concatenate([values, of_cells[path]]) for path, values in grid.columns(0, grid.size).items()}
     answers = actuator_targets(machine, columns, grid.size + middles.size, progress)
     fields = tuple(parameter for _, parameter in pairs)
-    return _table_of(machine, fields, grid, middles, answers.split(grid.size), wanted)
+    return _table_of(machine, fields, grid, middles, answers.split(grid.size), greatest_error)
 
 
 def _table_of(
@@ -324,8 +324,8 @@ def _at_middles(values: Array, shape: Sequence[int]) -> Array:
 
 def _errors(solved: ActuatorTargets, corrections: Array) -> Array:
     """Distance of the corrected tool point from where exact corrections bring it, to first order, m [n]."""
-    off = np.einsum("nca,na->nc", solved.rates, corrections - solved.corrections)
-    return np.asarray(np.linalg.norm(off, axis=1))
+    distance = np.einsum("nca,na->nc", solved.rates, corrections - solved.corrections)
+    return np.asarray(np.linalg.norm(distance, axis=1))
 
 
 def _message(machine: Machine, before: float, left: float, error: float, missing: str) -> str:

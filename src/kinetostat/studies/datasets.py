@@ -194,7 +194,7 @@ class GridQuestion:
 
     Attributes:
         machine: gives all parameters that do not vary.
-        grid: where; one axis for each range.
+        grid: the points, with one axis for each range.
         fields: path of the field of each axis.
         names: names of quantities.
         labels: coordinates and attributes of the answer, without any variable.
@@ -228,12 +228,12 @@ def grid_question(machine: Machine | MachineState, ranges: Sequence[str], quanti
     machine = state.machine
     pairs = chosen_axes(machine, ranges)
     chosen = [parameter for _, parameter in pairs]
-    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
+    leaves = [leaf for parameter in chosen for leaf in parameter.leaves]
     grid = grid_of(pairs)
     names = resolve_quantities(quantities, machine.family.component_names, cable_count(machine))
     refuse_absent(state, names, chosen)
     varied = [(parameter, axis.values) for parameter, axis in zip(chosen, grid.axes, strict=True)]
-    about = origin_of(machine, taken, uncounted_loads(state, names, varied))
+    about = origin_of(machine, leaves, uncounted_loads(state, names, varied))
     labels = xr.Dataset({}, _coordinates(grid, pairs), about)
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
@@ -278,7 +278,7 @@ def answer(question: GridQuestion, progress: Progress = silent, compute: Compute
     Args:
         question: a question of at most `IN_MEMORY` points.
         progress: receives how far the work is.
-        compute: where chunks are computed; results are the same bit for bit.
+        compute: computes chunks, here or in other processes; results are the same bit for bit.
 
     Raises:
         InputError: too many points.
@@ -380,15 +380,15 @@ def coarser_ranges(ranges: Sequence[str], most: int) -> list[str]:
 
 def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float, float]:
     """Both ends of the range of a coordinate, SI: the farthest poses without a bad one before them."""
-    (path,), here = parameter.leaves, float(values(machine)[parameter.path])
+    (path,), value = parameter.leaves, float(values(machine)[parameter.path])
     steps = np.linspace(-reach, reach, 2 * PROBE_STEPS + 1)
-    answer = batch.evaluate(machine, PointTable({path: here + steps}), ["singularity_margin"])
+    answer = batch.evaluate(machine, PointTable({path: value + steps}), ["singularity_margin"])
     singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
     good = (answer.status == Status.OK) & (singularity_margin >= LEAST_MARGIN_SHARE * singularity_margin[PROBE_STEPS])
     bad = np.flatnonzero(~good)
-    first = bad[bad < PROBE_STEPS].max(initial=-1) + 1
-    last = bad[bad > PROBE_STEPS].min(initial=len(steps)) - 1
-    return _rounded_inwards(here + steps[[first, last]], ROUND_UNIT[parameter.quantity.kind])
+    lowest = bad[bad < PROBE_STEPS].max(initial=-1) + 1
+    highest = bad[bad > PROBE_STEPS].min(initial=len(steps)) - 1
+    return _rounded_inwards(value + steps[[lowest, highest]], ROUND_UNIT[parameter.quantity.kind])
 
 
 def _rounded_inwards(ends: Array, unit: float) -> tuple[float, float]:

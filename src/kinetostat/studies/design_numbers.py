@@ -180,12 +180,12 @@ def _at_pose(state: MachineState) -> dict[str, float | None]:
         return result
     point = point_of_file(machine)
     frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
-    wanted = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
+    names_by_row = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
     if platform_is_loaded(machine):
-        wanted["displacement under load"] = DISPLACEMENT
+        names_by_row["displacement under load"] = DISPLACEMENT
     if machine.tolerances:
-        wanted["error as built, 95 %"] = BUILT_ERROR
-    for row, name in wanted.items():
+        names_by_row["error as built, 95 %"] = BUILT_ERROR
+    for row, name in names_by_row.items():
         try:
             refuse_absent(state, _quantities_of(machine, name))
         except InputError:  # the file gives no masses or no cut: the row has a dash
@@ -235,10 +235,10 @@ def _numbers_of(
     machine: Machine, points: Points, names: Sequence[str], progress: Progress = silent
 ) -> tuple[dict[str, Array], Array]:
     """Numbers at points by name [points], NaN where there is none, and whether each point has a result [points]."""
-    wanted = [name for name in names if name not in (DISPLACEMENT, BUILT_ERROR)]
+    quantities = [name for name in names if name not in (DISPLACEMENT, BUILT_ERROR)]
     if DISPLACEMENT in names:
-        wanted += _quantities_of(machine, DISPLACEMENT)
-    evaluation = evaluate(machine, points, [*dict.fromkeys(wanted)] or ["singularity_margin"], progress)
+        quantities += _quantities_of(machine, DISPLACEMENT)
+    evaluation = evaluate(machine, points, [*dict.fromkeys(quantities)] or ["singularity_margin"], progress)
     answered, result = evaluation.status == Status.OK, dict[str, Array]()
     for name in names:
         if name == DISPLACEMENT:
@@ -287,8 +287,8 @@ def rows_over(
     for machine, (points, _), wanted in zip(machines, points_and_fields, names, strict=True):
         numbers, answered = _numbers_of(machine, points, wanted, partial(_progress_after, progress, done, total))
         counts.append((int(answered.sum()), points.size))
-        known = {name: row[answered & ~np.isnan(row)] for name, row in numbers.items()}
-        spreads.append({name: _spread(_unit_and_better(name)[1], row) for name, row in known.items() if row.size})
+        finite_rows = {name: row[answered & ~np.isnan(row)] for name, row in numbers.items()}
+        spreads.append({name: _spread(_unit_and_better(name)[1], row) for name, row in finite_rows.items() if row.size})
         done += points.size
         progress(done, total)
     rows = []

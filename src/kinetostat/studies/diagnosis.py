@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
 PACKAGE = "kinetostat"
+"""Name of the package, under which it is installed."""
 LOADED_MODULES = {
     "h5netcdf": "h5netcdf",
     "h5py": "h5py",
@@ -56,7 +57,7 @@ class InstallationCheck:
 
     Attributes:
         group: heading under which it is listed.
-        name: of the part that was checked.
+        name: name of the part that was checked.
         state: the result.
         detail: one sentence or number.
         fix: the remedy, where there is one.
@@ -157,12 +158,12 @@ def requirements(extra: str = "") -> "list[Requirement]":
     """Packages that kinetostat needs on this system; with an extra, those that the extra adds."""
     from packaging.requirements import Requirement
 
-    every = [Requirement(text) for text in requires(PACKAGE) or ()]
-    core = [needed for needed in every if needed.marker is None or needed.marker.evaluate({"extra": ""})]
+    listed = [Requirement(text) for text in requires(PACKAGE) or ()]
+    core = [needed for needed in listed if needed.marker is None or needed.marker.evaluate({"extra": ""})]
     if not extra:
         return core
     return [
-        needed for needed in every if needed not in core and needed.marker and needed.marker.evaluate({"extra": extra})
+        needed for needed in listed if needed not in core and needed.marker and needed.marker.evaluate({"extra": extra})
     ]
 
 
@@ -185,12 +186,12 @@ def _package_state(requirement: "Requirement") -> tuple[Soundness, str, str]:
 
 def _extra_check(extra: str) -> InstallationCheck:
     """Whether all that an extra adds is installed."""
-    known = {requirement.name: _installed_version(requirement) for requirement in requirements(extra)}
-    missing = [name for name, present in known.items() if present is None]
+    versions_by_name = {requirement.name: _installed_version(requirement) for requirement in requirements(extra)}
+    missing = [name for name, present in versions_by_name.items() if present is None]
     if missing:
         text = f"not installed ({', '.join(missing)})"
         return InstallationCheck("extras", extra, Soundness.ABSENT, text, extra_command(extra))
-    versions = ", ".join(f"{name} {present}" for name, present in known.items())
+    versions = ", ".join(f"{name} {present}" for name, present in versions_by_name.items())
     return InstallationCheck("extras", extra, Soundness.SOUND, versions)
 
 

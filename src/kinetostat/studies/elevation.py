@@ -93,7 +93,7 @@ class Elevation(AnswerInState):
         frequency: first natural frequency about the state at rest, Hz [n].
         actuators: names of what is driven.
         turning: whether each is rotary: N·m, otherwise N.
-        loads: what each actuator carries, positive where it is pulled open [n x actuators].
+        loads: load of each actuator, positive where it is pulled open [n x actuators].
         limit_use: the greatest share that any actuator uses of its limit [n]; NaN where the file limits none.
         reversals: reversals of the loads of drives and joints, by elevation.
         budget: the error by tolerances at each elevation; None where the file has no tolerances.
@@ -156,7 +156,7 @@ def elevation(
 
     Args:
         machine: the machine with its loads, gravity and masses among them, or its state, as `state_of` returns it.
-        over: from, to and number of elevations, "0 deg:90 deg:7"; gravity acts as the file says at 90 deg.
+        over: range of elevations, "0 deg:90 deg:7" for instance; gravity acts as the file says at 90 deg.
         about: axis of the base about which gravity turns in it as the elevation falls; `load.gravity_axis` if empty.
         tolerance: greatest error of the law of the corrections at the tool, m or text with a unit; a thousandth of the
             error without corrections if None.
@@ -166,10 +166,10 @@ def elevation(
         InputError: no gravity or nothing that weighs, a bad range or axis, or what `correction_table` and `budget`
             refuse.
     """
-    given = state_of(machine).machine
-    _check_gravity(given)
-    turned = {"load.gravity_axis": list(about)} if len(about) else {}
-    upright = replace(changed(given, {**turned, GRAVITY_ANGLE: 0.0}), loaded=True)
+    drawn = state_of(machine).machine
+    _check_gravity(drawn)
+    axis_of_gravity = {"load.gravity_axis": list(about)} if len(about) else {}
+    upright = replace(changed(drawn, {**axis_of_gravity, GRAVITY_ANGLE: 0.0}), loaded=True)
     elevations = _elevations(over)
     count, angles = len(elevations), UPRIGHT - elevations
     steps = ANSWERS_BEFORE_REQUIREMENTS + (count if upright.requirements else 0)

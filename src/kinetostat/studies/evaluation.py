@@ -114,7 +114,15 @@ def answers_at(
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
     computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
     uncounted = uncounted_loads(state, computed.values, zip(poses.fields, poses.values, strict=True))
-    return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status, uncounted)
+    return PoseAnswers(
+        machine=machine,
+        poses=poses,
+        names=names,
+        matrices=matrices,
+        values=computed.values,
+        status=computed.status,
+        loads_left_out=uncounted,
+    )
 
 
 def point_of_file(machine: Machine) -> PointTable:

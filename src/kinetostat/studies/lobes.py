@@ -235,12 +235,21 @@ def _lobes_of(
     ends: tuple[float | None, float | None],
 ) -> Lobes:
     """The widths that are stable at all poses with vibrations: at each speed the least of theirs."""
-    every = [(at_pose.borders(engagement), at_pose) for at_pose in vibrations]
-    pairs = [(border, at_pose) for border, at_pose in every if border is not None]
+    all_borders = [(at_pose.borders(engagement), at_pose) for at_pose in vibrations]
+    pairs = [(border, at_pose) for border, at_pose in all_borders if border is not None]
     if not pairs:
         first, nothing = vibrations[0].vibration, np.zeros(0)
         message = first.message if len(vibrations) == 1 else "At none of these poses does the machine have vibrations."
-        return Lobes(state, first.status, message, engagement.teeth, engagement.pressure, nothing, nothing, poses=0)
+        return Lobes(
+            state=state,
+            status=first.status,
+            message=message,
+            teeth=engagement.teeth,
+            pressure=engagement.pressure,
+            speeds=nothing,
+            widths=nothing,
+            poses=0,
+        )
     worst_border, worst = min(pairs, key=lambda pair: pair[0].least[0])
     least, frequency = worst_border.least
     chatter = frequency if math.isfinite(frequency) else float(worst_border.frequencies[-1])

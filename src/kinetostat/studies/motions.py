@@ -104,15 +104,17 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     Raises:
         InputError: no coordinate of the pose is x, y or z.
     """
-    here = {path.removeprefix(POSE): float(v) for path, v in values(form.machine).items() if path.startswith(POSE)}
-    moving = [name for name in here if name in POINT]
+    coordinates = {
+        path.removeprefix(POSE): float(v) for path, v in values(form.machine).items() if path.startswith(POSE)
+    }
+    moving = [name for name in coordinates if name in POINT]
     if not moving:
         raise InputError(f"no coordinate of the pose of {form.machine.name} is x, y or z; give a motion instead.")
     count = len(moving)
     units, zeros = np.eye(count), np.zeros((count, count))
     # Unit speeds at rest of all else, then unit accelerations: their numbers are the columns of J and of J^-T M.
     answer = forces_on_path(
-        form, _at_pose(here, moving, np.concatenate([units, zeros]), np.concatenate([zeros, units]))
+        form, _at_pose(coordinates, moving, np.concatenate([units, zeros]), np.concatenate([zeros, units]))
     ).drives
     fastest, hardest = answer[:, 0, :count], answer[:, NUMBERS_OF_DRIVE.index("inertia"), count:]
     speeds = np.concatenate([np.zeros((1, count)), *_both_ways(fastest), _spread(count)]) * speed
@@ -121,7 +123,7 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     return Motion(
         f"every direction at {speed:.4g} m/s and {acceleration:.4g} m/s²",
         np.zeros(len(pairs[0])),
-        _at_pose(here, moving, *pairs),
+        _at_pose(coordinates, moving, *pairs),
         timeless=True,
     )
 

@@ -165,7 +165,7 @@ class MotorFit:
 
     Attributes:
         name: name of the motor.
-        motor: its numbers.
+        motor: numbers of the motor.
         loads: the demands of the motion on drives with its rotor.
         drive: name of the drive that uses the greatest share of a limit.
         peak: share of the peak limit that is used, at the worst point of the worst drive; infinite if too fast.

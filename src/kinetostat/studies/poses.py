@@ -134,8 +134,8 @@ def _with_angles(machine: Machine, columns: Sequence[GivenColumn], where: Where)
         parts[form][part] = column_values(column, ANGLE if form == "tilt" else COMPONENT, where)
     if not parts:
         return columns
-    given = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
-    named = numbers_for(quantities(machine.family.tables["pose"]), given, angles_of)
+    entries = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
+    named = numbers_for(quantities(machine.family.tables["pose"]), entries, angles_of)
     return [*others, *(GivenColumn(name, named[name]) for name in ANGLES)]
 
 
@@ -435,13 +435,13 @@ def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Pa
             f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
             "give the others one value each with --set."
         )
-    wanted = [parse_range(text) for text in ranges]
-    chosen = [find(machine.family, span.field) for span in wanted]
-    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
-    for leaf in taken:
-        if taken.count(leaf) > 1:
+    spans = [parse_range(text) for text in ranges]
+    chosen = [find(machine.family, span.field) for span in spans]
+    leaves = [leaf for parameter in chosen for leaf in parameter.leaves]
+    for leaf in leaves:
+        if leaves.count(leaf) > 1:
             raise InputError(f"{leaf} is varied twice; give each field one range.")
-    return list(zip(wanted, chosen, strict=True))
+    return list(zip(spans, chosen, strict=True))
 
 
 def grid_of(axes: Sequence[tuple[Range, Parameter]]) -> Grid:

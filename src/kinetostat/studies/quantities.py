@@ -128,11 +128,11 @@ def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence
         names: names of quantities.
         varied: leaf paths of parameters that vary.
     """
-    known = [name for name in names if name in QUANTITIES]
-    for name in known:
+    names_of_quantities = [name for name in names if name in QUANTITIES]
+    for name in names_of_quantities:
         if QUANTITIES[name].cut or QUANTITIES[name].cables:
             return name
-    loaded = [name for name in known if rest_numbers(machine, [name], limited=False)]
+    loaded = [name for name in names_of_quantities if rest_numbers(machine, [name], limited=False)]
     machine_cut = cut_machine(machine, varied) if loaded else None
     return None if machine_cut is not None and not machine_cut.legs else next(iter(loaded), None)
 
@@ -204,13 +204,13 @@ LOST_MOTION = ("backlash", "angular_backlash", "rotor_friction", "guide_friction
 
 def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence[Parameter]) -> None:
     """Refuse a reversal error of a machine whose file gives neither play of drives nor friction."""
-    known = [
+    numbers_of_lost_motion = [
         (path, value)
         for path, value in values(state.machine).items()
         if path in FRICTION_OF_JOINTS or (path.startswith("drives.") and path.rpartition(".")[2] in LOST_MOTION)
     ]
     changed = {leaf for parameter in varied for leaf in parameter.leaves}
-    if not any(value or path in changed for path, value in known):
+    if not any(value or path in changed for path, value in numbers_of_lost_motion):
         raise InputError(
             f'"{name}" is not known: the file of {state.machine.name} gives no lost motion, neither play nor friction; '
             'write backlash = "5 um" (angular_backlash of rotary drives), say, in the table [drives].'

@@ -51,6 +51,7 @@ GUIDELINE_POINTS = 7
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 """Parts that take time and may be left out; an independent engine computes validation (`views.report.writing`)."""
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."
+"""The text in the place of maps where there is none."""
 
 Texts = tuple[tuple[str, str], ...]
 """Name and text of each file."""
@@ -130,7 +131,7 @@ class Answers:
         fit: the record of an identification of the machine as built, if one is given.
         result: the result of the study whose best design the machine is.
         motion: path of the motion that its drives make; None for none.
-        elevations: over which it tilts, "0 deg:90 deg:7"; empty for a machine that does not.
+        elevations: range of elevations, "0 deg:90 deg:7"; empty for a machine that does not.
         given: the answer to each question of `REPORT_QUESTIONS` that was asked, by its name.
     """
 
@@ -248,7 +249,7 @@ def gather(
         progress: receives the number of steps done, and `REPORT_STEPS`; the last two steps are not done here.
         fit: record of an identification of the machine, or the folder in which it lies.
         motion: path of the CSV file of a motion, as `drives` takes it; None for none.
-        elevations: over which the machine tilts, as `elevation` takes them; empty for none.
+        elevations: range of elevations over which the machine tilts, as `elevation` takes it; empty for none.
 
     Raises:
         InputError: a bad range, too many, an unknown part, elevations, loads, tolerances or a motion that `elevation`,
@@ -267,7 +268,16 @@ def gather(
         return Answers(machine, state, analysis, result=result)
     over = list(ranges) or usual_ranges(machine, MAP_POINTS)
     path = None if motion is None else Path(motion)
-    known = Answers(machine, state, analysis, tuple(over), record, result, path, elevations)
+    known = Answers(
+        machine=machine,
+        state=state,
+        analysis=analysis,
+        ranges=tuple(over),
+        fit=record,
+        result=result,
+        motion=path,
+        elevations=elevations,
+    )
     for step, question in enumerate(REPORT_QUESTIONS, 1):
         if question.part not in without and question.when(known):
             known.given[question.name] = question.ask(known)

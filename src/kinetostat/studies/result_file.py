@@ -109,11 +109,11 @@ def _try_space(path: Path, size: int) -> None:
 
 def _reserved_block() -> Any:
     """Storage in one block that exists from the start, and that HDF5 itself leaves alone."""
-    wanted = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    wanted.set_layout(h5py.h5d.CONTIGUOUS)
-    wanted.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    wanted.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    return wanted
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.CONTIGUOUS)
+    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    return properties
 
 
 def _fill_status(stream: BinaryIO, offset: int, points: int) -> None:

@@ -57,10 +57,11 @@ FIELDS_OF_LOST_MOTION = ("drives.", "servo.", "damping.")
 """Beginnings of the fields on which lost motion depends."""
 TENSION_BOUNDS = ("load.min_tension", "load.max_tension")
 """Fields on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
-FAR_AWAY = (
+NO_STATE_NEARBY = (
     "Newton's method does not lead from the unloaded pose to a stable state of rest nearby, so that there are no "
     "derivatives here. Look at the loaded state (analyze --loaded), and reduce the loads."
 )
+"""The answer where a machine has no state of rest near its pose."""
 MOST_NAMED = 12
 """Greatest number of parameters without influence that are named: two lines of a terminal."""
 
@@ -68,9 +69,11 @@ UNIT_OF_PERCENTS = "percent per percent, for an angle per 0.01 rad"
 """Unit of the percentages. A percent of an angle has no meaning, because the zero of an angle is a convention."""
 
 BECAUSE_RIGID = "because rigid (a relative change is undefined)"
+"""The reason why there is no derivative by an infinite stiffness."""
 BECAUSE_FREE = "because free (C is infinite, or does not depend on it)"
+"""The reason why there is none by a stiffness of zero."""
 BECAUSE_OPEN = "because the legs would no longer close if one of them changed alone"
-"""Reasons why there is no derivative by a parameter."""
+"""The reason why there is none by a length of a closed loop."""
 
 
 def greatest_of(percents: Array) -> float:
@@ -218,7 +221,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     answer = evaluate_gradient(machine, point_of_file(machine), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
-        why = FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal
+        why = NO_STATE_NEARBY if status is Status.NOT_CONVERGED else state.refusal
         return Sensitivity(machine, status, why, loads_left_out=uncounted)
     pairs = zip(names, answer.values[:, 0].tolist(), strict=True)
     indices = np.array([_without_round_off(machine, name, value, response) for name, value in pairs])

@@ -128,8 +128,8 @@ def answer_into(
     with study_folder(folder) as study:
         work, layout = _begin_or_continue(question, study, final)
         repaired = "" if layout is None else _repair(question, study, final, work, layout)
-        known = study.records()
-        missing = [number for number in range(work.count) if number not in known]
+        records_before = study.records()
+        missing = [number for number in range(work.count) if number not in records_before]
         if missing:
             if final.exists():
                 final.replace(partial_of(final))
@@ -138,7 +138,15 @@ def answer_into(
             partial_of(final).replace(final)
         records = study.records()
         summary = tally_of([records[number] for number in range(work.count)], question.names)
-        return StoredGrid(question, final, summary, work.count, len(missing), repaired, layout is None)
+        return StoredGrid(
+            question=question,
+            path=final,
+            tally=summary,
+            chunks=work.count,
+            computed=len(missing),
+            repaired=repaired,
+            unchecked=layout is None,
+        )
 
 
 def _check_size(question: GridQuestion) -> None:
@@ -189,8 +197,8 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
     records = study.records()
     lost = study.damaged
     damaged = damaged_chunks(path, layout, records, work.chunk)
-    whole = frame_is_whole(path, layout)
-    if not whole:
+    frame_is_sound = frame_is_whole(path, layout)
+    if not frame_is_sound:
         broken = final.with_suffix(f".damaged{final.suffix}")
         path.replace(broken)
         fresh = _create(question, final)  # of an earlier version's file, another layout
@@ -204,7 +212,7 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
         study.keep(record for number, record in records.items() if number not in damaged)
     chunks = len(damaged) + lost
     return " and ".join(
-        [f"{chunks:,} of {work.count:,} chunks"] * bool(chunks) + ["the structure of its file"] * (not whole)
+        [f"{chunks:,} of {work.count:,} chunks"] * bool(chunks) + ["the structure of its file"] * (not frame_is_sound)
     )
 
 
@@ -291,9 +299,9 @@ def tally(evaluation: Evaluation) -> dict[str, Any]:
     codes, counts = np.unique(evaluation.status, return_counts=True)
     quantities = {}
     for name, values in evaluation.values.items():
-        known = values[~np.isnan(values)]
-        least, largest = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
-        quantities[name] = {"count": len(known), "least": least, "sum": float(known.sum()), "largest": largest}
+        numbers = values[~np.isnan(values)]
+        least, largest = (float(numbers.min()), float(numbers.max())) if len(numbers) else (np.nan, np.nan)
+        quantities[name] = {"count": len(numbers), "least": least, "sum": float(numbers.sum()), "largest": largest}
     return {
         "status": {Status(int(code)).word: int(n) for code, n in zip(codes, counts, strict=True)},
         "quantities": quantities,
@@ -311,8 +319,8 @@ def tally_of(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
 
 
 def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:
-    known = [part for part in parts if part["count"]]
-    if not known:
+    filled = [part for part in parts if part["count"]]
+    if not filled:
         return Extremes(np.nan, np.nan, np.nan)
-    mean = sum(part["sum"] for part in known) / sum(part["count"] for part in known)
-    return Extremes(min(part["least"] for part in known), mean, max(part["largest"] for part in known))
+    mean = sum(part["sum"] for part in filled) / sum(part["count"] for part in filled)
+    return Extremes(min(part["least"] for part in filled), mean, max(part["largest"] for part in filled))

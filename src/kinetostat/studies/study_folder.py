@@ -69,8 +69,9 @@ def read_history(folder: Path, start: int = 0) -> tuple[list[Record], int]:
             text = stream.read()
     except FileNotFoundError:
         return [], start
-    whole = text[: text.rfind(b"\n") + 1]
-    return [record for record in map(_checked_record, whole.splitlines()) if record is not None], start + len(whole)
+    lines = text[: text.rfind(b"\n") + 1]
+    records = map(_checked_record, lines.splitlines())
+    return [record for record in records if record is not None], start + len(lines)
 
 
 def read_question(folder: Path) -> Record:
@@ -193,10 +194,10 @@ class StudyFolder:
         """Return the notes about the chunks that are done, by their number; a line cut short or damaged is dropped."""
         self._history.seek(0)
         text = self._history.read()
-        whole = text[: text.rfind(b"\n") + 1]
-        if len(whole) < len(text):
-            self._history.truncate(len(whole))
-        lines = [_checked_record(line) for line in whole.splitlines()]
+        whole_lines = text[: text.rfind(b"\n") + 1]
+        if len(whole_lines) < len(text):
+            self._history.truncate(len(whole_lines))
+        lines = [_checked_record(line) for line in whole_lines.splitlines()]
         records = [record for record in lines if record is not None]
         self.damaged = len(lines) - len(records)
         return {record["chunk"]: record for record in records}

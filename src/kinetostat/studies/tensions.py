@@ -197,7 +197,7 @@ class Carrying(ImmutableAnswer):
 
     Attributes:
         machine: the machine with its loads; gives all parameters that do not vary.
-        dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
+        dataset: the grid with `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
         legs: names of all legs.
         sets: names of the legs that carry together, the most frequent set first.
         points: number of points of the grid with each set.

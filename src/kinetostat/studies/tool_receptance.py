@@ -116,5 +116,11 @@ def _free_tool(frequencies: Array, entries: Mapping[Key, Complex]) -> FreeTool:
         rows = [[entries.get((moved, i, pushed, k), zeros) for k in places[pushed]] for i in places[moved]]
         return np.moveaxis(np.array(rows), 2, 0)
 
-    at_tip, across, at_flange = (matrix(*ends) for ends in (("tip", "tip"), ("tip", "flange"), ("flange", "flange")))
-    return FreeTool(frequencies, tuple(places["tip"]), tuple(places["flange"]), at_tip, across, at_flange)
+    return FreeTool(
+        frequencies=frequencies,
+        tip=tuple(places["tip"]),
+        flange=tuple(places["flange"]),
+        tip_tip=matrix("tip", "tip"),
+        tip_flange=matrix("tip", "flange"),
+        flange_flange=matrix("flange", "flange"),
+    )

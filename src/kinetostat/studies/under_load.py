@@ -423,15 +423,15 @@ def how_it_gives_way(limit: LoadLimit | None) -> str:
     """Say up to which share of its loads a machine stands, by which motion it gives way, and what is slack then.
 
     Args:
-        limit: of the machine; None if no share of its loads was found under which it stands.
+        limit: limit of the loads of the machine; None if no share of its loads was found under which it stands.
     """
     if limit is None:
         return "No share of it was found under which it stands."
     stability = limit.stability
     mode = describe((stability.mode * limit.balance.mechanism.twist_units[0]).tolist(), ("rad", "m"))
     slack, legs = _slack_legs(limit.balance), moving_legs(limit.balance, stability)
-    known = stability.mode.any()
-    by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
+    motion = f"a motion like {mode} at the tool, most of all in {', '.join(legs)}"
+    by = f", and then gives way by {motion}" if stability.mode.any() else ""
     what = f" Slack there: {', '.join(slack)}." if slack else ""
     least = "at least " if limit.is_lower_bound else ""
     return f"It stands up to {least}{limit.share:.3g} times this load{by}.{what}"

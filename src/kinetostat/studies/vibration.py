@@ -47,11 +47,13 @@ from kinetostat.vibration.shares import effective_masses, kinetic_shares, small_
 MOST_SHOWN = 12
 """Modes that are shown, two sets of the six of a rigid platform; higher ones add to the response all the same."""
 NOTHING_RINGS = "There are no natural frequencies: all that could move is rigid."
+"""The answer where no spring deflects."""
 TOO_DIFFERENT = (
     "Nothing can be said about vibrations at this pose: the softest motion is so much softer than the others, more "
     'than 1e12 times, that round-off hides it. Write "rigid" for springs that are meant to be, or make the softest '
     "one stiffer."
 )
+"""The answer where modes cannot be solved for."""
 DRAWN_MODES = 6
 """Modes of which shapes are drawn, and about which responses are: those of a rigid platform on springs."""
 CURVE_POINTS = 1500
@@ -328,7 +330,7 @@ def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibr
     ratio = ASSUMED_RATIO if assumed else table.ratio
     damping = damper(equations, solution, ratio, table.per_mass, table.per_stiffness)
     masses = moving_masses(machine, response.configuration)
-    known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
+    masses_known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
     uncounted = tuple(part.name for part in masses if part.mass is None)
     shown = tuple(_modes(machine, response, equations, solution, damping))
     return Vibration(
@@ -338,7 +340,7 @@ def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibr
         components=machine.family.component_names,
         loaded=machine.loaded,
         modes=shown,
-        moving_mass=sum(known),
+        moving_mass=sum(masses_known),
         uncounted=uncounted,
         assumed=assumed,
         solution=solution,
@@ -354,12 +356,12 @@ def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str
     if not shown:
         return "Nothing that has mass can move."
     lowest = shown[0].frequency
-    first = [mode for mode in shown if math.isclose(mode.frequency, lowest, rel_tol=EQUAL_FREQUENCIES)]
-    together = {name: sum(mode.strain[name] for mode in first) / len(first) for name in shown[0].strain}
+    lowest_modes = [mode for mode in shown if math.isclose(mode.frequency, lowest, rel_tol=EQUAL_FREQUENCIES)]
+    together = {name: sum(mode.strain[name] for mode in lowest_modes) / len(lowest_modes) for name in shown[0].strain}
     springs = largest_contributors(*parts_and_kinds(springs_of(response.configuration), together))
-    ways = _motions(_directions(machine, first, float(response.configuration.length)))
-    in_modes = f", in {len(first)} modes" if len(first) > 1 else ""
-    text = f"The first natural frequency is {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {ways}."
+    motions = _motions(_directions(machine, lowest_modes, float(response.configuration.length)))
+    in_modes = f", in {len(lowest_modes)} modes" if len(lowest_modes) > 1 else ""
+    text = f"The first natural frequency is {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {motions}."
     return f"{text} The strain energy is mainly in {springs}." if springs else text
 
 
@@ -437,5 +439,5 @@ def frequency_range(answer: Vibration, points: int = CURVE_POINTS, near: int = P
     widths = np.linspace(-REACH_ABOUT_A_MODE, REACH_ABOUT_A_MODE, near)
     about = [mode.frequency * (1.0 + max(mode.ratio, LEAST_DRAWN_RATIO) * widths) for mode in drawn]
     of_tool = [] if answer.tool is None else [answer.tool.search_frequencies]
-    every = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
-    return np.unique(every[(every >= ends[0]) & (every <= ends[1])])
+    frequencies = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
+    return np.unique(frequencies[(frequencies >= ends[0]) & (frequencies <= ends[1])])

@@ -120,7 +120,15 @@ def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: 
     value = cell * float(inside.sum()) / PER_CELL
     error = 0.5 * cell * math.sqrt(divided) if len(pairs) >= FEWEST_CELLS else math.nan
     unknown_cells = int(unknown.reshape(-1, PER_CELL).any(axis=1).sum())
-    return Volume(value, error, unit_product(units), box, len(pairs), divided, unknown_cells)
+    return Volume(
+        value=value,
+        standard_error=error,
+        unit=unit_product(units),
+        box=box,
+        cells=len(pairs),
+        divided=divided,
+        unknown_cells=unknown_cells,
+    )
 
 
 def unit_product(units: Sequence[str]) -> str:
@@ -135,7 +143,7 @@ class Workspace(ImmutableAnswer):
 
     Attributes:
         machine: the machine with its limits.
-        dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
+        dataset: the nodes of the grid with `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
             quantities of the conditions, and for each axis the share of the step to the next node at which the verdict
             ends.
@@ -285,16 +293,16 @@ def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress)
 
 def _nearest(question: GridQuestion) -> list[int]:
     """The node nearest to the file's pose, however far that is."""
-    here = values(question.machine)
-    return [int(np.abs(axis.values - float(here[axis.paths[0]])).argmin()) for axis in question.grid.axes]
+    pose_of_file = values(question.machine)
+    return [int(np.abs(axis.values - float(pose_of_file[axis.paths[0]])).argmin()) for axis in question.grid.axes]
 
 
 def _home(question: GridQuestion) -> tuple[int, ...] | None:
     """The node nearest to the file's pose; None where that is off the grid by more than half a step."""
-    here, node = values(question.machine), _nearest(question)
+    pose_of_file, node = values(question.machine), _nearest(question)
     for axis, place in zip(question.grid.axes, node, strict=True):
-        apart = abs(axis.values[place] - float(here[axis.paths[0]]))
-        if apart > HALF_STEP * float(axis.values[1] - axis.values[0]):
+        distance = abs(axis.values[place] - float(pose_of_file[axis.paths[0]]))
+        if distance > HALF_STEP * float(axis.values[1] - axis.values[0]):
             return None
     return tuple(node)
 
@@ -303,7 +311,7 @@ def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
     """Return the nodes of a region that are joined to one node by steps along the axes within the region.
 
     Args:
-        region: over a grid of any number of dimensions.
+        region: nodes of a grid of any number of dimensions.
         seed: index of the node; outside the region, nothing is joined to it.
     """
     from scipy import ndimage  # a third of a second to import, which maps need not wait for
@@ -340,11 +348,11 @@ def _dataset(
         "volume_unknown": volume.unknown,
         "volume_units": volume.unit,
     }
-    wanted = nodes.drop_vars("aspect").assign(
+    dataset = nodes.drop_vars("aspect").assign(
         verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
     )
     for dim, edge in zip(dims, edges, strict=False):
-        wanted[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
+        dataset[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
-    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})
+    return dataset.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})

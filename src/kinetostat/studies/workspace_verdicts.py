@@ -37,6 +37,7 @@ Poses = dict[str, Array]
 """Coordinates of poses by leaf path, SI."""
 
 INSIDE, BEYOND = "inside", "beyond a singularity"
+"""Verdicts of a pose within the workspace, and of one on the other side of a singularity."""
 STATUS_VERDICTS = {
     Status.OK: INSIDE,
     Status.OUT_OF_REACH: "out of reach",
@@ -251,7 +252,7 @@ def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
 
 def _demand(limit: Limit, ends: tuple[float, float]) -> Demand:
     (least, unit), (greatest, _) = (as_read(number, limit.unit) for number in sorted(map(limit.shown, ends)))
-    return Demand(limit.name, limit.title, least, greatest, unit)
+    return Demand(name=limit.name, title=limit.title, least=least, greatest=greatest, unit=unit)
 
 
 HALVINGS = 7
@@ -331,8 +332,8 @@ def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
     of the grid at the distances a and b from a node, its own distance d follows from 1/d^2 = 1/a^2 + 1/b^2.
 
     Args:
-        region: which nodes belong to the region, over the axes of the shares.
-        shares: what `borders` returns, one array for each axis.
+        region: whether each node belongs to the region, over the axes of the shares.
+        shares: the result of `borders`, one array for each axis.
     """
     inverse_square = np.zeros(region.shape)
     for k, share in enumerate(shares):
