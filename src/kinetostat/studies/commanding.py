@@ -158,37 +158,33 @@ def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int)
 def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> ActuatorTargets:
     """Solve poses at all of which the machine has a place; NaN where the state of rest is not stable."""
     mechanism, count = state.mechanism, state.count
-    actuators, stands, senses = _actuators(machine, columns, state.free, state.joints, count)
+    actuators, coordinates, senses = _actuators(machine, columns, state.free, state.joints, count)
     names = [actuator.name for actuator in actuators]
-    chosen = [names.index(name) for name in mechanism.actuators]
-    actuators, stands, senses = [actuators[i] for i in chosen], stands[:, chosen], senses[:, chosen]
+    places = [names.index(name) for name in mechanism.actuators]
+    actuators, unloaded, senses = [actuators[i] for i in places], coordinates[:, places], senses[:, places]
     status = np.broadcast_to(state.free.status, (count,))
     status = np.where(status == Status.SINGULAR, Status.SINGULAR, Status.NO_REST).astype(np.int64)
     if not actuators:
         return _empty_targets((), status)
     length = mechanism.length
+    # The mechanism has amounts of forward motion, in lengths of its own where an actuator slides.
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
     commanded = commanded_state(mechanism)
     equations = commanded.solution.balance
     stable = commanded.solution.settled & stabilities(equations).stable
-    missed_before, missed_after = (
-        np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (commanded.first_error, commanded.error)
-    )
-    missed_after = np.where(missed_after > ROUND_OFF_OF_ENTRY * length, missed_after, 0.0)
-    angle_after = np.linalg.norm(commanded.error[:, :3], axis=1)
-    rates = commanded.rates[:, 3:] * (length[:, None] / units)[:, None]
+    left = np.linalg.norm(commanded.error[:, 3:], axis=1) * length
 
     def where_stable(array: Array) -> Array:
         return np.where(stable.reshape(-1, *[1] * (array.ndim - 1)), array, np.nan)
 
     return ActuatorTargets(
         actuators=tuple(actuators),
-        coordinates=where_stable(stands + equations.state.amounts * units),
-        unloaded=where_stable(stands),
-        before=where_stable(missed_before),
-        left=where_stable(missed_after),
-        turned=where_stable(angle_after),
-        rates=where_stable(rates),
+        coordinates=where_stable(unloaded + equations.state.amounts * units),
+        unloaded=where_stable(unloaded),
+        before=where_stable(np.linalg.norm(commanded.first_error[:, 3:], axis=1) * length),
+        left=where_stable(np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)),
+        turned=where_stable(np.linalg.norm(commanded.error[:, :3], axis=1)),
+        rates=where_stable(commanded.rates[:, 3:] * (length[:, None] / units)[:, None]),
         status=np.where(stable, Status.OK, status).astype(np.int64),
     )
 

@@ -271,28 +271,28 @@ def _table_of(
 ) -> CorrectionTable:
     """The table with its errors and its law, of what is solved at points and at middles of cells."""
     nodes, cells = answers
-    axes, points = tuple(axis.values for axis in grid.axes), _points(grid)
     if not nodes.settled.any():
         raise InputError(f"{machine.name}: {without_command(machine, grid.columns(0, grid.size), nodes.status)}")
+    axes, points, points_of_cells = tuple(axis.values for axis in grid.axes), _points(grid), _points(middles)
     errors = _errors(cells, _at_middles(nodes.corrections, grid.shape))
+    largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
+    unknown = int((~np.isfinite(errors)).sum())
     before, left = (
         float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)]))) for name in ("before", "left")
     )
     tolerance = GOOD_ENOUGH * before if wanted is None else wanted
 
     def error(law: Law) -> float:
-        ends = [_errors(nodes, law.at(points)), _errors(cells, law.at(_points(middles)))]
+        ends = [_errors(nodes, law.at(points)), _errors(cells, law.at(points_of_cells))]
         return float(np.nanmax(np.concatenate(ends)))
 
     law, law_error = shortest_law([field.path for field in fields], axes, nodes.corrections, error, tolerance)
-    largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
-    unknown = int((~np.isfinite(errors)).sum())
-    command = command_of(machine, PoseColumns(fields, points, {}), nodes)
-    lost = tally(np.concatenate([nodes.status, cells.status]))
-    missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({lost})."
-    message = _message(machine, before, left, largest, missing if unknown else "")
+    missing = ""
+    if unknown:
+        reasons = tally(np.concatenate([nodes.status, cells.status]))
+        missing = f"{unknown} of {len(errors)} cells have a corner or a middle without a command ({reasons})."
     return CorrectionTable(
-        command=command,
+        command=command_of(machine, PoseColumns(fields, points, {}), nodes),
         fields=fields,
         axes=axes,
         before=before,
@@ -303,7 +303,7 @@ def _table_of(
         law_error=law_error,
         tolerance=tolerance,
         exact=law_error <= EXACT_LAW * before,
-        message=message,
+        message=_message(machine, before, left, largest, missing),
     )
 
 

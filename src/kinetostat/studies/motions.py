@@ -340,9 +340,8 @@ def _moves(
     times, rows, clock = [], [], 0.0
     loads_of_moves: dict[str, list[Array]] = {name: [] for name in loads}
     for move in moves:
-        jerk = float(amounts[JERK][move.end]) if JERK in amounts else np.inf
-        feed, acceleration = (float(amounts[name][move.end]) for name in (FEED, ACCELERATION))
-        phases = profile(move.curve.length, feed, acceleration, jerk)
+        limits = {name: float(column[move.end]) for name, column in amounts.items()}
+        phases = profile(move.curve.length, limits[FEED], limits[ACCELERATION], limits.get(JERK, np.inf))
         time, covered = along_profile(phases, points_of_phase)
         rows.append(move.curve.in_time(*covered))
         for name, column in loads.items():

@@ -353,26 +353,26 @@ def columns_of(
         what = "is empty" if not lines else "names columns, but has no poses below them"
         raise InputError(f'"{path}" {what}; write a line such as x [mm], y [mm], and below it a line for each pose.')
     separator = next((sign for sign in SEPARATORS if sign in lines[0][1]), ",")
-    wide = lines[0][1].count(separator) + 1
-    for count, bound, what in ((len(lines) - 1, most, "poses"), (wide, MOST_POSE_COLUMNS, "columns")):
+    width = lines[0][1].count(separator) + 1
+    for count, bound, what in ((len(lines) - 1, most, "poses"), (width, MOST_POSE_COLUMNS, "columns")):
         if count > bound:
             raise InputError(f'"{path}" has {count:,} {what}, and may have at most {bound:,}; leave some out.')
-    rows = [_cells(path, number, line, separator) for number, line in lines]
-    numbers = [number for number, _ in lines]
+    heads_row, *rows = (_cells(path, number, line, separator) for number, line in lines)
+    numbers = [number for number, _ in lines[1:]]
     for number, cells in zip(numbers, rows, strict=True):
-        if len(cells) != len(rows[0]):
+        if len(cells) != len(heads_row):
             raise InputError(
-                f'"{path}", line {number}: the number of values is {len(cells)}, not {len(rows[0])} as above.'
+                f'"{path}", line {number}: the number of values is {len(cells)}, not {len(heads_row)} as above.'
             )
-    heads = [_head(path, text) for text in rows[0]]
-    twice = next((name for name, times in Counter(name for name, _ in heads).items() if times > 1), None)
-    if twice is not None:
-        raise InputError(f'"{path}": several columns are called {shorten(twice)}; keep one of them.')
+    heads = [_head(path, text) for text in heads_row]
+    repeated = next((name for name, times in Counter(name for name, _ in heads).items() if times > 1), None)
+    if repeated is not None:
+        raise InputError(f'"{path}": several columns are called {shorten(repeated)}; keep one of them.')
     columns = [
         GivenColumn(name, [_decimal(cell, separator) for cell in cells], unit)
-        for (name, unit), cells in zip(heads, zip(*rows[1:], strict=True), strict=True)
+        for (name, unit), cells in zip(heads, zip(*rows, strict=True), strict=True)
     ]
-    return columns, numbers[1:]
+    return columns, numbers
 
 
 def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:

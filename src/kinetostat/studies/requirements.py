@@ -4,7 +4,7 @@ A pose that has no result fails its requirement: a machine that cannot get there
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -206,30 +206,50 @@ def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> li
     refuse_absent(state, names, varied)
     answer = evaluate(machine, points, names) if varied or needs_state(machine, names) else _at_the_pose(state, names)
 
-    def verdict(condition: PoseCondition) -> Verdict:
-        amounts = answer.values[condition.quantity]
-        i = _worst(condition, amounts)
-        pose = {path: float(column[0]) for path, column in points.columns(i, i + 1).items()} if varied else {}
-        worst = None if np.isnan(amounts[i]) else float(amounts[i])
-        holds = condition.holds(amounts)
-        return Verdict(
-            name=name,
-            condition=condition.text,
-            quantity=condition.quantity,
-            unit=QUANTITIES[condition.quantity].unit,
-            bound=condition.value,
-            poses=points.size,
-            where=where,
-            met=bool(holds.all()),
-            worst=worst,
-            margin=_margin(condition, worst),
-            worst_pose=pose,
-            place=", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied),
-            status=Status(int(answer.status[i])).word,
-            failed=int((~holds).sum()),
-        )
+    return [_verdict(name, condition, answer, points, varied, where, show) for condition in conditions]
 
-    return [verdict(condition) for condition in conditions]
+
+def _verdict(
+    name: str,
+    condition: PoseCondition,
+    answer: Evaluation,
+    points: Points,
+    varied: Sequence[Parameter],
+    where: str,
+    show: Callable[[float, str], str],
+) -> Verdict:
+    """Judge a condition at the worst of some poses.
+
+    Args:
+        name: name of the requirement.
+        condition: the condition.
+        answer: its quantity at the poses.
+        points: the poses.
+        varied: fields that vary over them.
+        where: the poses in words.
+        show: writes a value in the units of the machine.
+    """
+    amounts = answer.values[condition.quantity]
+    place = _worst(condition, amounts)
+    pose = {path: float(column[0]) for path, column in points.columns(place, place + 1).items()} if varied else {}
+    worst = None if np.isnan(amounts[place]) else float(amounts[place])
+    holds = condition.holds(amounts)
+    return Verdict(
+        name=name,
+        condition=condition.text,
+        quantity=condition.quantity,
+        unit=QUANTITIES[condition.quantity].unit,
+        bound=condition.value,
+        poses=points.size,
+        where=where,
+        met=bool(holds.all()),
+        worst=worst,
+        margin=_margin(condition, worst),
+        worst_pose=pose,
+        place=", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied),
+        status=Status(int(answer.status[place])).word,
+        failed=int((~holds).sum()),
+    )
 
 
 def _at_the_pose(state: MachineState, names: Sequence[str]) -> Evaluation:
