@@ -204,7 +204,7 @@ def mechanism_over_scalars(
 
 
 def masses_of_links(machine: Machine, configuration: Configuration) -> list[Scalar]:
-    """The mass of each link at a pose, kg: a telescopic leg with a mass per length keeps what it has there."""
+    """Return the mass of each link at a pose, kg: a telescopic leg with a mass per length keeps it in motion."""
     return [link.mass for link in located_members(machine, configuration, None)]
 
 
@@ -212,9 +212,9 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
     """Make the rigid machine of a mechanism.
 
     Args:
-        machine: with its tables.
-        mechanism: over scalars, see `mechanism_over_scalars`.
-        plan: which of its coordinates move.
+        machine: the machine with its tables.
+        mechanism: the mechanism over scalars, see `mechanism_over_scalars`.
+        plan: the motions that there are.
         origin: the tool point, base frame, m.
     """
     drives = tuple(_drive(spring, machine, mechanism.length[0]) for spring in mechanism.driven)
@@ -229,8 +229,8 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
         constraint_twists, ways, _ = right_inverse(independent)
     process = Wrench(*_vectors(mechanism.wrench[0]))
     for point, force in zip(mechanism.pushed[0], mechanism.forces[0], strict=True):
-        at, push = Vector(*point), Vector(*force)
-        process = process + Wrench(at.cross(push), push)
+        vector = Vector(*force)
+        process = process + Wrench(Vector(*point).cross(vector), vector)
     return RigidMachine(
         legs=legs,
         drives=drives,
@@ -284,7 +284,7 @@ def _mass_points(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
 
 
 def _passive_coordinates(leg: ElasticLeg) -> list[int]:
-    """Numbers of the coordinates that move without a drive: passive joints and flexure hinges."""
+    """Return numbers of the coordinates that move without a drive: passive joints and flexure hinges."""
     passive = []
     for number, spring in enumerate(leg.springs):
         before = leg.springs[number - 1] if number else None
@@ -318,7 +318,7 @@ def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: 
 
 
 def _friction(leg: ElasticLeg, number: int, screws: Sequence[Twist], machine: Machine, length: Scalar) -> Friction:
-    """Friction of the coordinate with this number, of which the leg has these screws."""
+    """Return the friction of the coordinate with this number of a leg with these screws."""
     damping = machine.tables["damping"]
     motions = [i for i, coordinate in enumerate(leg.chain.coordinate) if coordinate == number]
     slides = all(screws[i].slides for i in motions)
@@ -329,25 +329,31 @@ def _friction(leg: ElasticLeg, number: int, screws: Sequence[Twist], machine: Ma
 
 
 def _coordinates_of_motions(leg: ElasticLeg, moving: Sequence[int], drives: int) -> tuple[tuple[int, ...], list[int]]:
-    """The coordinate by which each motion of a leg moves, or -1, and the drives that its last coordinates are."""
-    driving = [given for given in leg.chain.given if 0 <= given < drives]
-    passive = {number: place for place, number in enumerate(moving)}
-    driven = {given: len(moving) + place for place, given in enumerate(driving)}
+    """Return the coordinate by which each motion of a leg moves, or -1, and the drives that its last coordinates are.
+
+    Args:
+        leg: the leg.
+        moving: numbers of its passive coordinates that move.
+        drives: number of drives of the machine; amounts beyond them are growth by warmth, which does not move.
+    """
+    drives_of_leg = [amount for amount in leg.chain.given if 0 <= amount < drives]
+    place_of_passive = {number: place for place, number in enumerate(moving)}
+    place_of_drive = {drive: len(moving) + place for place, drive in enumerate(drives_of_leg)}
     coordinates = [
-        driven.get(given, -1) if coordinate < 0 else passive.get(coordinate, -1)
-        for coordinate, given in zip(leg.chain.coordinate, leg.chain.given, strict=True)
+        place_of_drive.get(amount, -1) if coordinate < 0 else place_of_passive.get(coordinate, -1)
+        for coordinate, amount in zip(leg.chain.coordinate, leg.chain.given, strict=True)
     ]
-    return tuple(coordinates), driving
+    return tuple(coordinates), drives_of_leg
 
 
 def _jacobian_columns(screws: Sequence[Twist], coordinates: Sequence[int], size: int) -> list[Row]:
-    """The platform's twist per unit of each coordinate, the columns of J [size][6]."""
+    """Return the platform's twist per unit of each coordinate, the columns of J [size][6]."""
     rows = [[s.components() for s, c in zip(screws, coordinates, strict=True) if c == k] for k in range(size)]
     return [[total(list(parts)) for parts in zip(*row, strict=True)] for row in rows]
 
 
 def _rates_and_constraints(columns: Sequence[Row], redundant: bool) -> tuple[list[Row], list[Row]]:
-    """J+ and N of a leg: rates of its coordinates by the platform's twist, and the wrenches that hold the platform."""
+    """Return J+ and N: rates of a leg's coordinates by the platform's twist, and wrenches that hold the platform."""
     if redundant:
         solution, _, _ = right_inverse([list(row) for row in zip(*columns, strict=True)])
         return solution, []
@@ -358,7 +364,7 @@ def _rates_and_constraints(columns: Sequence[Row], redundant: bool) -> tuple[lis
 
 
 def plan_of(machine: Machine, configuration: Configuration, joints: Joints | None) -> MotionPlan:
-    """Decide, at a pose with numbers, which motions there are; arguments as of `mechanism_over_scalars`."""
+    """Find the motions that there are, at a pose with numbers; arguments as of `mechanism_over_scalars`."""
     with np.errstate(all="ignore"):
         mechanism = mechanism_over_scalars(machine, configuration, joints)
         legs, constraints = [], []
@@ -371,27 +377,28 @@ def plan_of(machine: Machine, configuration: Configuration, joints: Joints | Non
 
 
 def _freedoms_of(leg: ElasticLeg, drives: int) -> tuple[LegFreedoms, list[Row]]:
-    """The freedoms of a leg of a machine with so many drives, and the wrenches by which it holds the platform."""
+    """Return the freedoms of a leg of a machine with so many drives, and the wrenches that hold the platform."""
     passive = _passive_coordinates(leg)
     screws = [Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist()]
     while True:
-        coordinates, driving = _coordinates_of_motions(leg, passive, drives)
-        columns = _jacobian_columns(screws, coordinates, len(passive) + len(driving))
+        coordinates, drives_of_leg = _coordinates_of_motions(leg, passive, drives)
+        columns = _jacobian_columns(screws, coordinates, len(passive) + len(drives_of_leg))
         matrix = np.array(columns, dtype=float).reshape(-1, 6)
-        _, sizes, rows = np.linalg.svd(matrix.T)
+        _, sizes, dependences = np.linalg.svd(matrix.T)
         rank = int((sizes > DEPENDENT * max(sizes.max(initial=0.0), 1.0)).sum())
         if rank == len(columns) or rank == 6:
             break
-        # Of motions that depend on each other, the passive one that the rest replaces best stands still.
-        idle = np.abs(rows[rank:, : len(passive)]).max(axis=0)
-        passive.pop(len(passive) - 1 - int(np.argmax(idle[::-1] > idle.max() - DEPENDENT)))
+        # Of motions that depend on each other, the passive one that the others replace best stands still; of equal
+        # ones the last.
+        shares = np.abs(dependences[rank:, : len(passive)]).max(axis=0)
+        passive.pop(len(passive) - 1 - int(np.argmax(shares[::-1] > shares.max() - DEPENDENT)))
     redundant = len(columns) > rank
     freedoms = LegFreedoms(tuple(passive), redundant, _balls(screws, coordinates, len(passive)))
     return freedoms, _rates_and_constraints(columns, redundant)[1]
 
 
 def _independent_numbers(constraints: Sequence[Row]) -> tuple[int, ...]:
-    """Numbers of the wrenches that do not depend on those before them."""
+    """Return numbers of the wrenches that do not depend on those before them."""
     independent: list[int] = []
     basis = np.zeros((0, 6))
     for number, row in enumerate(constraints):
@@ -408,12 +415,11 @@ def _independent_numbers(constraints: Sequence[Row]) -> tuple[int, ...]:
 def _balls(screws: Sequence[Twist], coordinates: Sequence[int], passive: int) -> tuple[tuple[int, int, int], ...]:
     """Find the ball joints: three passive coordinates in a row whose axes meet in one point and span the space."""
     motions = [[i for i, coordinate in enumerate(coordinates) if coordinate == k] for k in range(passive)]
-    turns = [row[0] if len(row) == 1 and not screws[row[0]].slides else None for row in motions]
     result, first = [], 0
     while first + 3 <= passive:
-        row = turns[first : first + 3]
-        in_a_row = None not in row and [row[0] + k for k in range(3)] == row  # type: ignore[operator]
-        if in_a_row and _meet_in_a_point([screws[i] for i in row if i is not None]):
+        numbers = [number for row in motions[first : first + 3] for number in row]
+        is_row_of_turns = numbers == [numbers[0] + k for k in range(3)] and not any(screws[i].slides for i in numbers)
+        if is_row_of_turns and _meet_in_a_point([screws[i] for i in numbers]):
             result.append((first, first + 1, first + 2))
             first += 2
         first += 1
