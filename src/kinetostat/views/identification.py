@@ -123,9 +123,8 @@ def _residual_table(record: FitRecord, display: Display) -> FittedTable:
 
 
 def _number_table(record: FitRecord, display: Display) -> FittedTable:
-    table = text_table("Identified numbers (± half of the 95 % interval)", "error", "value", "±", "unit", "meaning")
-    for column in table.columns[1:3]:
-        column.justify = "right"
+    title, heads = "Identified numbers (± half of the 95 % interval)", ("error", "value", "±", "unit", "meaning")
+    table = text_table(title, *heads, numeric=("value", "±"))
     for unknown in record.unknowns:
         scale = _scale_of(display, unknown.unit, unknown.group)
         table.add_row(unknown.path, *_value_and_half(unknown.value, unknown.half, scale), scale.unit, unknown.words)
@@ -168,9 +167,8 @@ def _pose_table(proposed: NextPoses, machine: Machine) -> FittedTable:
 
 def _firmware_table(numbers: FirmwareNumbers) -> FittedTable:
     """Return the numbers of a printer's controller: words of Klipper, letters of M665 and M666, and values."""
-    table = text_table("In the words of firmware (mm, deg)", "Klipper", "Marlin", "RepRapFirmware", "value", "±")
-    for column in table.columns[3:]:
-        column.justify = "right"
+    heads = ("Klipper", "Marlin", "RepRapFirmware", "value", "±")
+    table = text_table("In the words of firmware (mm, deg)", *heads, numeric=("value", "±"))
     halves, words_of_scale = numbers.halves, ("rotation_distance, factor", "1 / M92", "1 / M92")
     (marlin, height), (reprap, homed) = numbers.marlin_endstops, numbers.reprap_endstops
     angles = zip("abc", "XYZ", USUAL_TOWER_ANGLES, strict=True)

@@ -10,7 +10,7 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -265,11 +265,17 @@ def words_on_omitted(count: int) -> str:
     return f"{count} {noun} with less effect {verb} omitted"
 
 
-def text_table(title: str, *columns: str) -> FittedTable:
-    """Return a table of texts, which are broken between words where the terminal is narrow."""
+def text_table(title: str, *columns: str, numeric: Collection[str] = ()) -> FittedTable:
+    """Return a table of texts, which are broken between words where the terminal is narrow.
+
+    Args:
+        title: the title of the table.
+        columns: the heads of the columns.
+        numeric: those of the columns that hold numbers, which are aligned to the right.
+    """
     table = FittedTable(title)
     for column in columns:
-        table.add_column(column)
+        table.add_column(column, justify="right" if column in numeric else "left")
     return table
 
 

@@ -160,9 +160,8 @@ def measured_table(answer: "MeasuredComparison") -> FittedTable:
     table = text_table(
         "Measured and computed at the tool point, base axes (± one standard uncertainty)",
         "line", "entry", "measured", "computed", "difference", "unit", "model",
+        numeric=("measured", "computed", "difference"),
     )  # fmt: skip
-    for column in table.columns[2:5]:
-        column.justify = "right"
     display = answer.machine.display
     for row in answer.rows:
         table.add_row(

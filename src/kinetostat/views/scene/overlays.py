@@ -29,7 +29,7 @@ from kinetostat.views.scene.solids import Solid, Swept, Turned, solid_data, unit
 
 LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
 """Longest semi-axis of an ellipsoid as a share of the machine's diagonal: it stands out and hides no leg."""
-DIRECTION_LENGTH, DIRECTION_RADIUS, TURN_RADIUS = 0.45, 0.006, 0.1
+DIRECTION_LENGTH, DIRECTION_RADIUS, TURN_RADIUS = 0.45, 0.006, 0.102
 """Length and thickness of the arrow along a direction, and radius of the one around it, as shares of the machine's
 diagonal: they end beside the legs."""
 THINNEST = 0.012
