@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from kinetostat.accuracy.toleranced_parts import PossibleErrors, is_about, possible_errors
+from kinetostat.accuracy.tool_error import ExactSample
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
+from kinetostat.studies.allocation import Allocation
 from kinetostat.studies.budget import (
     ALLOCATION_RULES,
     DRAWN_DIGITS,
@@ -52,15 +54,13 @@ def _lines(answer: Budget) -> Lines:
     drawn = f"{answer.samples:,} machines drawn, to first order; the worst case is at the limits of all tolerances."
     yield "Percentiles", drawn
     if answer.exact is not None:
-        yield "Exact", _exact_sentence(answer)
+        yield "Exact", _exact_sentence(answer, answer.exact)
     if answer.allocation is not None:
-        yield "Allocation", _allocation_sentence(answer)
+        yield "Allocation", _allocation_sentence(answer, answer.allocation)
 
 
-def _exact_sentence(answer: Budget) -> str:
-    exact, show, place = answer.exact, answer.machine.display.show_deflection, answer.measures.index(answer.leading)
-    if exact is None:
-        return ""
+def _exact_sentence(answer: Budget, exact: ExactSample) -> str:
+    show, place = answer.machine.display.show_deflection, answer.measures.index(answer.leading)
     lost = f" {exact.failed:,} of them cannot be assembled." if exact.failed else ""
     return (
         f"{exact.machines:,} machines solved exactly: 95 % keep within {show(float(exact.usual[place]), 'm')}; the "
@@ -69,10 +69,7 @@ def _exact_sentence(answer: Budget) -> str:
     )
 
 
-def _allocation_sentence(answer: Budget) -> str:
-    allocation = answer.allocation
-    if allocation is None:
-        return ""
+def _allocation_sentence(answer: Budget, allocation: Allocation) -> str:
     times, evenly = (number(cost / allocation.before, digits=3) for cost in (allocation.cost, allocation.evenly))
     return (
         f"The present tolerances give {answer.machine.display.show_deflection(allocation.present, 'm')}. The new ones "
@@ -82,7 +79,7 @@ def _allocation_sentence(answer: Budget) -> str:
 
 
 def _tables(answer: Budget, full: bool) -> Iterator[FittedTable]:
-    yield sizes_table(answer, full)
+    yield _sizes_table(answer, full)
     if answer.shares.any():
         texts = {line.about: line.text for line in answer.tolerances}
         counts = {line: str(sum(part.line == line for part in answer.parts)) for line in texts}
@@ -90,15 +87,13 @@ def _tables(answer: Budget, full: bool) -> Iterator[FittedTable]:
         yield _sums_table(answer, "leg", "legs", {})
         yield _parts_table(answer, full)
     if answer.allocation is not None:
-        yield _allocation_table(answer)
+        yield _allocation_table(answer, answer.allocation)
 
 
-def shown_measures(answer: Budget, full: bool = False) -> list[str]:
-    """Return the names of the measures that are worth a row: parasitic parts where they are not simply a component.
+def _shown_measures(answer: Budget, full: bool) -> list[str]:
+    """Return the names of the measures that have a row: of parasitic ones their sizes, and if `full` each component.
 
-    Args:
-        answer: an answer with measures.
-        full: whether parasitic components are shown one by one.
+    Parasitic measures that are round-off beside the others have none.
     """
     units = dict(zip(answer.measures, answer.units, strict=True))
     greatest = {name: float(np.nanmax(answer.size("worst", name))) for name in units}
@@ -111,20 +106,15 @@ def shown_measures(answer: Budget, full: bool = False) -> list[str]:
     return shown
 
 
-def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
-    """Return a row for each measure: at the pose, or the largest over all poses with the number of its pose.
-
-    Args:
-        answer: an answer with sizes.
-        full: whether parasitic components are shown one by one.
-    """
+def _sizes_table(answer: Budget, full: bool) -> FittedTable:
+    """Return a row for each measure: at the pose, or the largest over all poses with the number of its pose."""
     display, many = answer.machine.display, len(answer.status) > 1
     statistics = [s for s in STATISTICS if s != "mean" or answer.pressed]
     title = f"Error of the tool at the {answer.machine.reference}, base axes"
     heads = ["unit", *(STATISTICS[s].replace(" ", "\n", 1) for s in statistics)]
     heads += ["95 %:\nat pose", "95 %\neverywhere"] if many else []
     table = numeric_table(title + (": largest over all poses" if many else ""), "error", heads)
-    for name in shown_measures(answer, full):
+    for name in _shown_measures(answer, full):
         place = answer.measures.index(name)
         scale = display.deflection(answer.units[place])
         sizes = [float(np.nanmax(answer.size(s, name))) for s in statistics]
@@ -163,7 +153,7 @@ def _parts_table(answer: Budget, full: bool) -> FittedTable:
     for place in shown:
         part = answer.parts[place]
         table.add_row(
-            part.words, limit_of(part.kind, part.limit, answer.machine.display), *map(_percent, rows[:, place])
+            part.words, _tolerance_text(part.kind, part.limit, answer.machine.display), *map(_percent, rows[:, place])
         )
     if len(shown) < len(order):
         remainders = rows[:, order[len(shown) :]].sum(axis=1)
@@ -175,17 +165,14 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.1f}"
 
 
-def limit_of(kind: str, limit: float, display: Display) -> str:
+def _tolerance_text(kind: str, limit: float, display: Display) -> str:
     """Return a tolerance with its unit, "0.05 mm"."""
     if kind == "share":
         return f"{number(limit / PER_METRE, digits=display.digits)} µm/m"
     return display.show(limit, "m" if kind == "length" else "rad")
 
 
-def _allocation_table(answer: Budget) -> FittedTable:
-    allocation = answer.allocation
-    if allocation is None:
-        raise ValueError("no allocation was asked for")
+def _allocation_table(answer: Budget, allocation: Allocation) -> FittedTable:
     rule = "root of the sum of squares" if allocation.by == "rss" else "worst case"
     where = "along the direction" if allocation.measure == "along" else "at the tool point"
     wanted = answer.machine.display.show_deflection(allocation.wanted, "m")
@@ -213,10 +200,10 @@ def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
         return "any"
     texts = []
     for kind in ("length", "angle", "share"):
-        limits = sorted(part.limit for part in answer.parts if part.line == line and part.kind == kind)
-        ends = dict.fromkeys(limit_of(kind, limit * factor, answer.machine.display) for limit in limits)
-        if ends:
-            texts.append("±" + " to ".join([*ends][:: max(1, len(ends) - 1)]))
+        limits = [part.limit * factor for part in answer.parts if part.line == line and part.kind == kind]
+        if limits:
+            ends = (_tolerance_text(kind, end, answer.machine.display) for end in (min(limits), max(limits)))
+            texts.append("±" + " to ".join(dict.fromkeys(ends)))
     return ", ".join(texts)
 
 
