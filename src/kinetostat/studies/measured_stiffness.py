@@ -373,7 +373,6 @@ class _Entry:
 
     @property
     def value(self) -> float:
-        """The computed number."""
         if self.matrix == "deflection":
             return float(self.compliance[self.i] @ self.load)
         if self.matrix == "stiffness":

@@ -164,13 +164,14 @@ class PaperNumber:
 
 def compare(place: str, component: str, printed: str, computed: float, unit: str) -> PaperNumber:
     """Judge a computed value by the digits that are printed; a misprint must round to its correction instead."""
+    erratum, verdict, reason = ERRATA.get((place, component)), PrintVerdict.DIFFERS, ""
     if rounds_to(computed, printed):
-        return PaperNumber(place, component, printed, computed, unit, PrintVerdict.EQUAL)
-    erratum = ERRATA.get((place, component))
-    if erratum is not None and rounds_to(computed, erratum.corrected):
-        reason = f"should be {erratum.corrected}: {erratum.reason}"
-        return PaperNumber(place, component, printed, computed, unit, PrintVerdict.MISPRINT, reason)
-    return PaperNumber(place, component, printed, computed, unit, PrintVerdict.DIFFERS)
+        verdict = PrintVerdict.EQUAL
+    elif erratum is not None and rounds_to(computed, erratum.corrected):
+        verdict, reason = PrintVerdict.MISPRINT, f"should be {erratum.corrected}: {erratum.reason}"
+    return PaperNumber(
+        place=place, component=component, printed=printed, computed=computed, unit=unit, verdict=verdict, reason=reason
+    )
 
 
 def rounds_to(computed: float, printed: str) -> bool:

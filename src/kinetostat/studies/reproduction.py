@@ -8,7 +8,7 @@ what a statement holds and for what it fails. Where the paper leaves a threshold
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from enum import StrEnum
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -152,27 +152,30 @@ class Reproduction(Immutable):
 def reproduce(progress: Progress = silent) -> Reproduction:
     """Reproduce the whole paper; `progress` gets the number of steps done and of all steps, after each."""
     machine = load(printed_numbers.MACHINE)
-    parts: dict[str, Callable[[], Iterable[Any]]] = {
-        "table_3": table_3,
-        "table_4": table_4,
-        "equations": equations_33_38,
-        "designs": section_4_3,
-        "checks": derivation,
-        "claims": claims,
-    }
-    results: dict[str, tuple[Any, ...]] = {}
+    parts: tuple[Callable[[], Iterable[Any]], ...]
+    parts = (table_3, table_4, equations_33_38, section_4_3, derivation, claims)
+    results: list[tuple[Any, ...]] = []
     steps = len(parts) + LATER_STEPS
-    for name, part in parts.items():
-        results[name] = tuple(part())
+    for part in parts:
+        results.append(tuple(part()))
         progress(len(results), steps)
+    *numbers, checks, tested_claims = results
     curves = evaluate_grid(machine, FIGURE_4_RANGES, ["stiffness"])
     progress(steps - 2, steps)
     maps = evaluate_grid(machine, FIGURE_5_RANGES, ["compliance"])
     progress(steps - 1, steps)
     search, search_claims = search_again()
     progress(steps, steps)
-    numbers = results["table_3"] + results["table_4"] + results["equations"] + results["designs"]
-    return Reproduction(machine, numbers, results["checks"], results["claims"], curves, maps, search, search_claims)
+    return Reproduction(
+        machine=machine,
+        comparisons=tuple(chain.from_iterable(numbers)),
+        checks=checks,
+        claims=tested_claims,
+        curves=curves,
+        maps=maps,
+        search=search,
+        search_claims=search_claims,
+    )
 
 
 def claims() -> Iterator[Claim]:

@@ -146,16 +146,22 @@ def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
     state = state_of(request.machine)
     analysis = analyze(state)
-    unplaced = analysis.status in PLACELESS
-    placed = () if unplaced else state.configuration.legs
-    legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
+    placed_legs = () if analysis.status in PLACELESS else state.configuration.legs
+    legs = {str(spring.of): leg.name for leg in placed_legs for spring in leg.springs}
     loaded, refused = _at_rest(state) if request.machine.loaded else (None, "")
     if loaded is None:
         solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
     else:
         solids, factor = loaded_overlays(loaded, request.sizes, request.exaggeration)
-    data = [solid_data(solid) for solid in solids]
-    return Report(analysis, legs, request.sizes, data, factor, loaded, refused)
+    return Report(
+        analysis=analysis,
+        legs=legs,
+        sizes=request.sizes,
+        solids=[solid_data(solid) for solid in solids],
+        exaggeration=factor,
+        loaded=loaded,
+        refused=refused,
+    )
 
 
 def _at_rest(state: MachineState) -> tuple[LoadedState | None, str]:

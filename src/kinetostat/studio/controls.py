@@ -176,11 +176,11 @@ def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator
 
     Of an inertia the three moments move together: no body has a moment about one axis alone.
     """
-    for given in parameters(machine.family):
-        if given.path.startswith("cables.") and not cable_signs(machine):
+    for every in parameters(machine.family):
+        if every.path.startswith("cables.") and not cable_signs(machine):
             continue
-        inertia = given.quantity.kind == "inertia" and len(given.leaves) > 1
-        parameter = replace(given, leaves=given.leaves[: len(AXES)]) if inertia else given
+        is_inertia = every.quantity.kind == "inertia" and len(every.leaves) > 1
+        parameter = replace(every, leaves=every.leaves[: len(AXES)]) if is_inertia else every
         several = len(parameter.leaves) > 1
         alike = len({present[leaf] for leaf in parameter.leaves}) == 1
         vector = parameter.path.split(".")[-1] in VECTORS
@@ -189,30 +189,38 @@ def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator
 
 
 def _control(parameter: Parameter, present: dict[str, float], length: float) -> Control:
-    table = parameter.path.split(".")[0]
-    value, quantity = present[parameter.leaves[0]], parameter.quantity
-    panel = "Stiffness" if quantity.stiff else "Pose" if table == "pose" else "Geometry"
-    loads = table in ("load", "tool", "limits", "cables") or parameter.path.startswith(OF_LOADED_STATES)
-    panel = "Load" if loads else panel
-    panel = "Mass" if parameter.path.startswith(OF_MASSES) or KINDS[quantity.kind].heavy else panel
-    group = table_of(parameter)
-    if quantity.unset is not None:
-        return Control(parameter, panel, group, 0.0, 0.0, False)
+    panel, quantity, value = _panel_of(parameter), parameter.quantity, present[parameter.leaves[0]]
     usual = _usual(parameter, length) if panel == "Mass" else None
-    if usual is not None:
-        most = HEADROOM * abs(value) or usual
-        product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS_OF_INERTIA)
-        least = LEAST_SHARE * most if quantity.positive else 0.0
-        return Control(parameter, panel, group, -most if product else least, most, False)
-    low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
-    if quantity.positive and not quantity.stiff:
-        low = max(low, LEAST_SHARE * high, quantity.least)
-    return Control(parameter, panel, group, low, min(high, quantity.most), logarithmic)
+    logarithmic = False
+    if quantity.unset is not None:
+        low = high = 0.0  # a limit that may be missing has no range
+    elif usual is not None:
+        high = HEADROOM * abs(value) or usual
+        is_product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS_OF_INERTIA)
+        low = -high if is_product else LEAST_SHARE * high if quantity.positive else 0.0
+    else:
+        low, high, logarithmic = _range(parameter, value, length)
+        if quantity.positive and not quantity.stiff:
+            low = max(low, LEAST_SHARE * high, quantity.least)
+        high = min(high, quantity.most)
+    return Control(
+        parameter=parameter, panel=panel, group=table_of(parameter), low=low, high=high, logarithmic=logarithmic
+    )
 
 
-def _range(kind: str, stiff: bool, value: float, table: str, length: float) -> tuple[float, float, bool]:
+def _panel_of(parameter: Parameter) -> str:
+    table = parameter.path.split(".")[0]
+    if parameter.path.startswith(OF_MASSES) or KINDS[parameter.quantity.kind].heavy:
+        return "Mass"
+    if table in ("load", "tool", "limits", "cables") or parameter.path.startswith(OF_LOADED_STATES):
+        return "Load"
+    return "Stiffness" if parameter.quantity.stiff else "Pose" if table == "pose" else "Geometry"
+
+
+def _range(parameter: Parameter, value: float, length: float) -> tuple[float, float, bool]:
     """Return the ends of a slider and whether it is logarithmic."""
-    if stiff:
+    kind, table = parameter.quantity.kind, parameter.path.split(".")[0]
+    if parameter.quantity.stiff:
         middle = value if 0.0 < value < math.inf else USUAL_STIFFNESS
         return middle / STIFFNESS_FACTOR, middle * STIFFNESS_FACTOR, True
     if kind == "angle":

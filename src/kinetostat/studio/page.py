@@ -216,7 +216,6 @@ class StudioPage:
             self._leave_front()
 
     def _other_front(self) -> None:
-        """Bring another linked view to the front."""
         self._leave_front()
         self._show_front()
 

@@ -146,7 +146,6 @@ class Playback:
         self._show()
 
     async def _open(self, event: events.UploadEventArguments) -> None:
-        """Take the poses of a CSV file."""
         data, name = await event.file.read(), event.file.name
         self.upload.reset()
         try:
@@ -174,7 +173,6 @@ class Playback:
         self.about.set_text(f"{kept}A path of {self.count} poses." if self.count > 1 else kept + NO_PATH)
 
     def _go(self) -> None:
-        """Move the machine to the pose under the slider."""
         if self.count < 2:  # `begin_again` puts the slider back to 0, which also arrives here
             return
         at = min(int(self._player.slider.value), self.count - 1)
@@ -258,7 +256,6 @@ class DrivesPanel(Panel):
         self._lane.close()
 
     def _ask(self) -> None:
-        """Compute what the motion asks of the machine as it is now."""
         if self._session is None:
             return
         self._player.pause()
@@ -266,7 +263,6 @@ class DrivesPanel(Panel):
         self._lane.ask(MotionRequest(self._session.machine, self._text))
 
     async def _open(self, event: events.UploadEventArguments) -> None:
-        """Take the motion of a CSV file."""
         data, name = await event.file.read(), event.file.name
         self.upload.reset()
         try:
@@ -290,12 +286,10 @@ class DrivesPanel(Panel):
         self._draw()
 
     def _show_content(self, shown: bool) -> None:
-        """Show the curves with what chooses them, where there is a motion."""
         self.content.set_visibility(shown)
         self.kind.set_visibility(shown)
 
     def _draw(self) -> None:
-        """Draw the curves that are chosen, and mark the time."""
         answer = self._answer
         if answer is None or answer.curves is None:
             return
@@ -315,7 +309,6 @@ class DrivesPanel(Panel):
         return float(times[0] + (times[-1] - times[0]) * float(self._player.slider.value) / FRAMES)
 
     def _go(self) -> None:
-        """Move the machine to where it is at the time under the slider."""
         if self._answer is None or self._session is None or self._asked is None:
             return
         motion, moment = self._answer.motion, self._time_shown

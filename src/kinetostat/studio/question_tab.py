@@ -162,7 +162,6 @@ class AskTab:
             form.fields[name].set_value(value)
 
     def _row(self, form: QuestionForm, option: Option) -> None:
-        """Build the field of an option."""
         label, meaning = label_of(option), in_words_of_the_page(form.question, option.meaning)
         if option.kind == "file":
             self._file_row(form, option, meaning)
@@ -299,7 +298,6 @@ class AskTab:
         self._folder = None
 
     def _send(self, form: str) -> None:
-        """Send the answer to the browser in one of its forms."""
         if self._folder is not None:
             ui.download.file(Path(self._folder.name) / f"{ANSWER}.{form}", f"{self.choice.value}.{form}")
 

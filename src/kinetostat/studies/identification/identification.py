@@ -202,9 +202,14 @@ def identification_of(
         resolution=float((ROUND_OFF_OF_MEASUREMENT * units / observed.sigma).min(initial=np.inf)),
     )
     result = best_fit(observed, observed.row_poses, options, tell)
-    unseen = tuple(unseen_of(observed, result, sizes))
-    proposed = next_poses(model.machine, observed, result, sizes, more) if more else None
-    return Identification(model.machine, observed, result, sizes, unseen, proposed)
+    return Identification(
+        machine=model.machine,
+        observed=observed,
+        fit=result,
+        sizes=sizes,
+        unseen=tuple(unseen_of(observed, result, sizes)),
+        next=next_poses(model.machine, observed, result, sizes, more) if more else None,
+    )
 
 
 def _place_paths(data: Measurements, frame: bool, target: bool) -> list[str]:

@@ -199,7 +199,16 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     labels = [item.term.label for item in objectives]
     if len(set(labels)) < len(labels):
         raise InputError("two objectives are the same; leave one out, or change its `over`.")
-    problem = Problem(study, machine, space, poses, objectives, constraints, _robust(study, space), _method(study))
+    problem = Problem(
+        study=study,
+        machine=machine,
+        space=space,
+        poses=poses,
+        objectives=objectives,
+        constraints=constraints,
+        robust=_robust(study, space),
+        method=study.optimizer.method or ("nsga2" if len(objectives) > 1 else "genetic"),
+    )
     _check(problem)
     return problem
 
@@ -249,10 +258,6 @@ def _robust(study: StudyFile, space: Space) -> Aggregate | None:
     if not any(variable.tolerance for variable in space.variables):
         raise InputError("robustness.objective needs tolerances; add tolerance = ... to at least one variable.")
     return parse_aggregate(text, "robustness.objective")
-
-
-def _method(study: StudyFile) -> str:
-    return study.optimizer.method or ("nsga2" if len(study.objectives) > 1 else "genetic")
 
 
 def _check(problem: Problem) -> None:

@@ -107,7 +107,6 @@ class Result(Immutable):
 
     @property
     def best(self) -> int:
-        """Number of the best design."""
         return int(self.front[self.knee])
 
     @cached_property
@@ -126,7 +125,6 @@ class Result(Immutable):
 
     @property
     def machine(self) -> Machine:
-        """The best design as a machine."""
         return machine_of_design(self.problem, self.genes)
 
     @property

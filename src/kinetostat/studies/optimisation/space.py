@@ -104,7 +104,6 @@ class Space:
 
     @property
     def size(self) -> int:
-        """Number of variables that are searched."""
         return len(self.searched_variables)
 
     @cached_property
@@ -167,9 +166,9 @@ def read_space(machine: Machine, tables: Sequence[VariableTable]) -> Space:
         InputError: a field is not known or set twice, does not allow a bound, or no variable is left to search.
     """
     variables = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
-    taken = [leaf for variable in variables for field in variable.fields for leaf in field.leaves]
-    for leaf in taken:
-        if taken.count(leaf) > 1:
+    leaves = [leaf for variable in variables for field in variable.fields for leaf in field.leaves]
+    for leaf in leaves:
+        if leaves.count(leaf) > 1:
             raise InputError(f"{leaf} is set by two variables; give each field to one.")
     if all(variable.fixed for variable in variables):
         raise InputError("all variables are fixed; leave at least one free to be searched.")
@@ -192,7 +191,17 @@ def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
         low, high = (_bound(end, fields[0].quantity, f"{name}.{key}") for key, end in _ends(table, name))
         if low >= high:
             raise InputError(f"{name}: from is {table.start} and must be less than to, {table.end}; exchange them.")
-    return Variable(fields, ratios, low, high, None, (), table.fixed, _tolerance(table, fields[0], name), initial)
+    return Variable(
+        fields=fields,
+        ratios=ratios,
+        low=low,
+        high=high,
+        choices=None,
+        labels=(),
+        fixed=table.fixed,
+        tolerance=_tolerance(table, fields[0], name),
+        initial=initial,
+    )
 
 
 def _ends(table: VariableTable, name: str) -> list[tuple[str, float | str]]:
@@ -230,15 +239,26 @@ def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, 
     same = [k for k, row in enumerate(read) if all({v} == set(leaves) for v, leaves in zip(row, present, strict=True))]
     if table.fixed and not same:
         raise InputError(f"{name} is fixed, but the machine has none of its choices; set it to one of them.")
-    initial = float(same[0]) if same else -1.0
-    choices, ratios = np.array(read, dtype=float), (1.0,) * len(fields)
-    return Variable(fields, ratios, 0.0, len(rows) - 1.0, choices, tuple(labels), table.fixed, 0.0, initial)
+    return Variable(
+        fields=fields,
+        ratios=(1.0,) * len(fields),
+        low=0.0,
+        high=len(rows) - 1.0,
+        choices=np.array(read, dtype=float),
+        labels=tuple(labels),
+        fixed=table.fixed,
+        tolerance=0.0,
+        initial=float(same[0]) if same else -1.0,
+    )
 
 
 def _tolerance(table: VariableTable, field: Parameter, name: str) -> float:
     if table.tolerance is None:
         return 0.0
-    read = _parse(table.tolerance, field.quantity, f"{name}.tolerance")
+    try:
+        read = parse(table.tolerance, field.quantity.kind)  # a tolerance need not be in the range of its field
+    except UnitError as error:
+        raise InputError(f"{name}.tolerance is {shorten(table.tolerance)}: {error}.") from None
     if not 0.0 <= read < math.inf:
         raise InputError(f"{name}.tolerance is {shorten(table.tolerance)}; it must not be negative.")
     return read
@@ -254,13 +274,6 @@ def _bound(written: float | str, quantity: Quantity, name: str) -> float:
 def _value(written: float | str, quantity: Quantity, name: str) -> float:
     try:
         return quantity.number(written)
-    except UnitError as error:
-        raise InputError(f"{name} is {shorten(written)}: {error}.") from None
-
-
-def _parse(written: float | str, quantity: Quantity, name: str) -> float:
-    try:
-        return parse(written, quantity.kind)
     except UnitError as error:
         raise InputError(f"{name} is {shorten(written)}: {error}.") from None
 
@@ -283,7 +296,6 @@ class PoseSet(Immutable):
 
     @property
     def count(self) -> int:
-        """Number of poses."""
         return len(next(iter(self.columns.values()), (0.0,)))
 
 
@@ -319,11 +331,7 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
     row_values = {}
     for name, written in row.items():
         field = find(machine.family, name)
-        try:
-            value = field.quantity.number(written)
-        except UnitError as error:
-            raise InputError(f"{where}.{name} is {shorten(written)}: {error}.") from None
-        row_values.update(dict.fromkeys(field.leaves, value))
+        row_values.update(dict.fromkeys(field.leaves, _value(written, field.quantity, f"{where}.{name}")))
     return row_values
 
 

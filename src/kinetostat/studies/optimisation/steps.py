@@ -70,7 +70,6 @@ class Genetic:
 
     @property
     def problem(self) -> Problem:
-        """The problem that is searched."""
         return self.assess.problem
 
     @property
@@ -217,7 +216,6 @@ class Gradient:
 
     @property
     def problem(self) -> Problem:
-        """The problem that is searched."""
         return self.assess.problem
 
     @property

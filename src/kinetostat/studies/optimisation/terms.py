@@ -303,17 +303,25 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
     if name == STROKE:
         refuse_absent(state_of(machine), StrokeTerm.names)
         return StrokeTerm()
-    over = parse_aggregate(table.over, f"{where}.over")
-    label = name if poses.count == 1 else f"{name} ({over.text})"
+    aggregate = parse_aggregate(table.over, f"{where}.over")
+    weights: Mapping[str, float] = {name: 1.0}
+    inverse = False
     if name in SUMS:
-        weights = _sum_weights(machine, name, table.weights, where)
-        return PoseTerm(label, "SI", tuple(weights.items()), False, over, high_is_bad)
-    if name in ALONG:
+        unit, weights = "SI", _sum_weights(machine, name, table.weights, where)
+    elif name in ALONG:
         letter, inverse, unit = ALONG[name]
         weights = _direction_weights(machine, letter, table.direction, where)
-        return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
-    refuse_absent(state_of(machine), [name])
-    return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
+    else:
+        refuse_absent(state_of(machine), [name])
+        unit = QUANTITIES[name].unit
+    return PoseTerm(
+        label=name if poses.count == 1 else f"{name} ({aggregate.text})",
+        unit=unit,
+        weights=tuple(weights.items()),
+        inverse=inverse,
+        aggregate=aggregate,
+        high_is_bad=high_is_bad,
+    )
 
 
 def _known_name(machine: Machine, name: str, where: str) -> str:

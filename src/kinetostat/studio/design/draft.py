@@ -118,14 +118,14 @@ def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
     shown_parts = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
     search = {key: getattr(study.optimizer, key) for key in ("population", "generations", "seed")}
     return Draft(
-        study.name,
-        machine,
-        tables["variables"],
-        tables["objectives"],
-        tables.get("constraints", []),
-        tables.get("poses", {}),
-        {**search, **tables.get("optimizer", {})},
-        {key: value for key, value in tables.items() if key not in shown_parts},
+        name=study.name,
+        machine=machine,
+        variables=tables["variables"],
+        objectives=tables["objectives"],
+        constraints=tables.get("constraints", []),
+        poses=tables.get("poses", {}),
+        optimizer={**search, **tables.get("optimizer", {})},
+        rest={key: value for key, value in tables.items() if key not in shown_parts},
     )
 
 

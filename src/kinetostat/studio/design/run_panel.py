@@ -191,7 +191,6 @@ class RunPanel:
             self._load_design(self._progress.knee)
 
     def _load_design(self, place: int) -> None:
-        """Load a design of the front into the session."""
         if self._progress is not None and 0 <= place < len(self._progress.objectives):
             self._place = place
             self._load(self._progress.design(place))

@@ -133,7 +133,6 @@ class StudyForm:
         self.problem.set_text(message)
 
     def _fill(self) -> None:
-        """Build all rows from the draft."""
         self._refuse("")
         self._body.clear()
         with self._body:

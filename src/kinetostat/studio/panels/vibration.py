@@ -165,7 +165,6 @@ class VibrationPanel(Panel):
                 field.set_options(options, value=field.value if field.value in options else first)
 
     def _show_chosen_kind(self) -> None:
-        """Bring the modes or the response to the front."""
         self.modes.set_visibility(self.kind.value == MODES)
         self.response.set_visibility(self.kind.value == RESPONSE)
 
