@@ -35,7 +35,7 @@ from kinetostat.studies.analysis_parts import clean_screw
 from kinetostat.studies.identification.fitted_values import identified_machine
 from kinetostat.studies.identification.identification import Identification
 
-LONGEST_PART_NAME = 30
+LONGEST_NEW_NAME = 30
 """Characters of the name of a joint or link that is made here: a number may follow it within what a file allows."""
 
 
@@ -300,7 +300,7 @@ class _Chain:
     def _name(self, title: str) -> str:
         """Return the name of a part without that of its leg and without dots."""
         title = title.kind if isinstance(title, PartName) else title.removeprefix(f"{self.leg.name} ")
-        return title.replace(".", " ").strip()[:LONGEST_PART_NAME]
+        return title.replace(".", " ").strip()[:LONGEST_NEW_NAME]
 
     def _free_name(self, name: str) -> str:
         used = {joint["name"] for joint in self.joints} | self.links.keys()

@@ -56,8 +56,8 @@ FREEDOM_ORDER = {
 BEARINGS_TRAVEL = dict.fromkeys(("prismatic", "cylindrical", "planar", "helical"), True) | dict.fromkeys(
     ("revolute", "universal", "spherical", "parallelogram", "fixed"), False
 )
-"""Whether the bearings of a joint go with the body that it moves, by type. A type that is not here is taken from its
-row in `JOINT_TYPES`."""
+"""Whether the bearings of a joint go with the body that it moves, by the types that are written a second time here. Any
+other type is taken from its row in `JOINT_TYPES`."""
 X, Y, Z = np.eye(3)
 BENDING_OF_TIP = 3.0
 """Stiffness k of a cantilever against turning of its chord under a force on its tip: k = 3 E I / length."""
@@ -160,8 +160,8 @@ def written_legs(machine: Machine) -> list[MovingLeg]:
     legs = []
     for name, parts in _by_leg(document).items():
         for title, place in _copies(name, document.get(f"legs.{name}", {})):
-            joints = [_put(entry, place) for entry in parts.values() if "type" in entry]
-            links = {key: _put(entry, place) for key, entry in parts.items() if "model" in entry}
+            joints = [_entry_of_copy(entry, place) for entry in parts.values() if "type" in entry]
+            links = {key: _entry_of_copy(entry, place) for key, entry in parts.items() if "model" in entry}
             legs.append(_leg(title, joints, links, document))
     return legs
 
@@ -191,7 +191,7 @@ def _by_leg(document: Mapping[str, Entry]) -> dict[str, dict[str, dict[str, Any]
 
 
 def _copies(name: str, entry: Entry) -> Iterator[tuple[str, Array]]:
-    """Give the names of the legs that a written leg stands for, and what turns (and mirrors) it into each [3 x 3]."""
+    """Give the names of the legs that a written leg stands for, and the rotation or reflection into each [3 x 3]."""
     if "copies" not in entry:
         yield name, np.eye(3)
         return
@@ -203,7 +203,7 @@ def _copies(name: str, entry: Entry) -> Iterator[tuple[str, Array]]:
     yield from ((f"{name} {i}", place) for i, place in enumerate(places, 1))
 
 
-def _put(entry: Entry, place: Array) -> dict[str, Any]:
+def _entry_of_copy(entry: Entry, place: Array) -> dict[str, Any]:
     """Return a joint or link with its points, directions and matrices where a copy of its leg has them.
 
     Args:
