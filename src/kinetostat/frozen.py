@@ -61,25 +61,25 @@ def _frozen_class(cls: type, eq: bool) -> type:
     cls.__doc__ = cls.__doc__ or " "  # the standard library would ask for the signature, and so compile the constructor
     # A class below a frozen one must be declared frozen; others are spared the two methods that this compiles.
     below = any(dataclasses.is_dataclass(base) for base in cls.__mro__[1:])
-    made: Any = dataclasses.dataclass(init=False, repr=False, eq=False, frozen=below)(cls)
-    fields = dataclasses.fields(made)
-    _check_order(made.__name__, _parameters(fields)[0])
+    new_class: Any = dataclasses.dataclass(init=False, repr=False, eq=False, frozen=below)(cls)
+    fields = dataclasses.fields(new_class)
+    _check_order(new_class.__name__, _parameters(fields)[0])
     if not content["__doc__"]:
-        made.__doc__ = f"{made.__name__}({', '.join(field.name for field in fields)})"
+        new_class.__doc__ = f"{new_class.__name__}({', '.join(field.name for field in fields)})"
     for name in ("init", "repr", "frozen"):
-        setattr(made.__dataclass_params__, name, True)
-    made.__dataclass_params__.eq = eq
+        setattr(new_class.__dataclass_params__, name, True)
+    new_class.__dataclass_params__.eq = eq
     names = tuple(field.name for field in fields)
-    made.__setattr__, made.__delattr__ = _refusals(made, names)
+    new_class.__setattr__, new_class.__delattr__ = _refusals(new_class, names)
     if "__repr__" not in content:
-        made.__repr__ = _text
+        new_class.__repr__ = _text
     if "__init__" not in content:
-        made.__init__ = _Late(made, "__init__", _constructor)
+        new_class.__init__ = _Late(new_class, "__init__", _constructor)
     if eq and "__eq__" not in content:
-        made.__eq__ = _Late(made, "__eq__", _equality)
+        new_class.__eq__ = _Late(new_class, "__eq__", _equality)
     if eq and (content.get("__hash__") is None and ("__hash__" not in content or "__eq__" in content)):
-        made.__hash__ = _Late(made, "__hash__", _hashing)
-    return made
+        new_class.__hash__ = _Late(new_class, "__hash__", _hashing)
+    return new_class
 
 
 Fields = Sequence["dataclasses.Field[Any]"]
@@ -142,7 +142,7 @@ def _method(name: str, parameters: Iterable[str], body: Iterable[str], constants
 def _constructor(cls: type) -> Callable[..., None]:
     """Compile the `__init__` of a class: it sets each field, past the refusal of changes."""
     fields: Fields = dataclasses.fields(cls)
-    ordered, named = _parameters(fields)
+    ordered, by_name = _parameters(fields)
     constants: dict[str, Any] = {"_set": object.__setattr__, "_factory": FACTORY}
     body = []
     instance = "_self" if any(field.name == "self" for field in fields) else "self"
@@ -155,11 +155,16 @@ def _constructor(cls: type) -> Callable[..., None]:
             body.append(f"_set({instance}, {field.name!r}, {value})")
     if hasattr(cls, "__post_init__"):
         body.append(f"{instance}.__post_init__()")
-    names = [instance, *(field.name for field in ordered), *(["*"] if named else []), *(field.name for field in named)]
+    names = [
+        instance,
+        *(field.name for field in ordered),
+        *(["*"] if by_name else []),
+        *(field.name for field in by_name),
+    ]
     method = _method("__init__", names, body or ["pass"], constants, cls)
     method.__defaults__ = tuple(_default(field) for field in ordered if _is_optional(field))
-    method.__kwdefaults__ = {field.name: _default(field) for field in named if _is_optional(field)} or None
-    method.__annotations__ = {field.name: field.type for field in [*ordered, *named]} | {"return": None}
+    method.__kwdefaults__ = {field.name: _default(field) for field in by_name if _is_optional(field)} or None
+    method.__annotations__ = {field.name: field.type for field in [*ordered, *by_name]} | {"return": None}
     return method
 
 
@@ -181,6 +186,6 @@ def _hashing(cls: type) -> Callable[..., int]:
     return _method("__hash__", ["self"], [f"return hash({_row('self', entering)})"], {}, cls)
 
 
-def _row(of: str, names: Sequence[str]) -> str:
-    """Return the text of a tuple of attributes."""
-    return "(" + "".join(f"{of}.{name}, " for name in names) + ")"
+def _row(instance: str, names: Sequence[str]) -> str:
+    """Return the text of a tuple of attributes of an instance."""
+    return "(" + "".join(f"{instance}.{name}, " for name in names) + ")"

@@ -87,14 +87,14 @@ def is_bounded(a: Scalar) -> bool:
 
 def finite(a: Scalar) -> Scalar:
     """The number itself, which traced comparisons with infinity take for finite, as the caller knows it to be."""
-    known = _function_of_trace(a, "finite")
-    return known(a) if known else a
+    mark = _function_of_trace(a, "finite")
+    return mark(a) if mark else a
 
 
 def ordinary(a: Scalar) -> Scalar:
     """The number itself, which traced code takes for positive, and far from 0 and infinity, as the caller knows."""
-    known = _function_of_trace(a, "ordinary")
-    return known(a) if known else a
+    mark = _function_of_trace(a, "ordinary")
+    return mark(a) if mark else a
 
 
 def _function_of_trace(a: Scalar, name: str) -> Any:

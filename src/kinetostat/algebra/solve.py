@@ -123,15 +123,15 @@ def _singularity_margin(
 ) -> Scalar:
     """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent.
 
-    Vectors whose square is given are divided by their size, and the rows of the inverse multiplied by it.
+    Vectors whose square is known are divided by their size, and the rows of the inverse multiplied by it.
     """
-    given = squares or [None] * len(vectors)
+    known_squares = squares or [None] * len(vectors)
     sizes = [
         [
             _square(vector) if square is None else 1.0,
             _square(row) if square is None else square * _square(row),
         ]
-        for vector, row, square in zip(vectors, inverse, given, strict=True)
+        for vector, row, square in zip(vectors, inverse, known_squares, strict=True)
     ]
     of_vectors, of_inverse = (total(list(column)) for column in zip(*sizes, strict=True))
     margin = float(len(vectors)) * reciprocal(sqrt(of_vectors * of_inverse))

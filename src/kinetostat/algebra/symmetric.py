@@ -107,8 +107,8 @@ def _rayleigh_quotient(rows: Sequence[Sequence[Scalar]], vector: Sequence[Scalar
     """The quotient v^T A v / v^T v; only the upper triangle of A is read."""
     size = range(len(rows))
     diagonal = total([rows[i][i] * (vector[i] * vector[i]) for i in size])
-    beside = total([rows[i][j] * (vector[i] * vector[j]) for i in size for j in range(i + 1, len(rows))])
-    return (diagonal + 2.0 * beside) / total([part * part for part in vector])
+    off_diagonal = total([rows[i][j] * (vector[i] * vector[j]) for i in size for j in range(i + 1, len(rows))])
+    return (diagonal + 2.0 * off_diagonal) / total([part * part for part in vector])
 
 
 def _rotate(entries: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[int]) -> tuple[Scalar, Scalar]:

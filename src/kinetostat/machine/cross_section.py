@@ -256,8 +256,8 @@ def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin:
     """The numbers of one table of each kind of links whose cross-section is known, SI."""
     numbers: dict[str, float | list[float]] = {}
     for kind in family.links:
-        given = {name: resolved.get(name, {}).get(table, 0.0) for name in kind.rigidities}
-        known = {name: number for name, number in given.items() if np.any(number)}
+        numbers_of_fields = {name: resolved.get(name, {}).get(table, 0.0) for name in kind.rigidities}
+        known = {name: number for name, number in numbers_of_fields.items() if np.any(number)}
         for number in known.values():
             if not np.allclose(number, numbers.setdefault(kind.name, number), rtol=SAME_MATTER, atol=0.0):
                 raise InputError(

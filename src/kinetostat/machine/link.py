@@ -211,8 +211,8 @@ class Parallelogram:
     @property
     def bars(self) -> tuple[tuple[Vector, Vector], ...]:
         """Near and far end of each bar, base frame, m."""
-        half = self.side * (0.5 * self.width)
-        return (self.near + half, self.far + half), (self.near - half, self.far - half)
+        offset = self.side * (0.5 * self.width)
+        return (self.near + offset, self.far + offset), (self.near - offset, self.far - offset)
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:

@@ -59,8 +59,8 @@ def link_tables(kinds: Sequence[LinkKind]) -> dict[str, type]:
     for name, (quantity, meaning) in LINK_TABLES.items() if kinds else ():
         fields = {}
         for kind in kinds:
-            what = Quantity(quantity, meaning.format(kind.name.replace("_", " ")), count=kind.count)
-            fields[kind.name] = Field(what, 0.0 if kind.count is None else (0.0,) * kind.count)
+            field = Quantity(quantity, meaning.format(kind.name.replace("_", " ")), count=kind.count)
+            fields[kind.name] = Field(field, 0.0 if kind.count is None else (0.0,) * kind.count)
         tables[name] = made_table(name.title().replace("_", ""), fields)
     return tables
 

@@ -322,9 +322,9 @@ class Machine(Immutable):
             InputError: an unknown field, a value of another kind or out of bounds, an array of the wrong length, or
                 numbers that contradict each other.
         """
-        given = {**(values or {}), **fields}
-        machine = self.with_drafted_values(given)
-        return machine if self.whole_check is None else self.whole_check(machine, given)
+        changes = {**(values or {}), **fields}
+        machine = self.with_drafted_values(changes)
+        return machine if self.whole_check is None else self.whole_check(machine, changes)
 
     def with_drafted_values(self, values: Mapping[str, Given]) -> "Machine":
         """The machine with other numbers as `with_values` takes them, of which each is only checked by itself.
@@ -334,8 +334,8 @@ class Machine(Immutable):
         Raises:
             InputError: as for `with_values`, but for contradictions.
         """
-        given = numbers_for(quantities(self.family.tables["pose"]), values, single_angles)
-        machine = with_values(self, read_numbers(self.family, given))
+        changes = numbers_for(quantities(self.family.tables["pose"]), values, single_angles)
+        machine = with_values(self, read_numbers(self.family, changes))
         check_contrast(machine, self.name)
         check_inertia(machine.tables, self.name)
         return machine

@@ -140,8 +140,8 @@ def _of_matrices(value: object, where: str) -> Array:
 def _of_tilts(value: object, where: str) -> Array:
     if not isinstance(value, Mapping) or not {"azimuth", "angle"} <= value.keys() <= set(TILT):
         raise InputError(f"{where} is {shorten(value)}; give {FORMS['tilt']} (torsion may be left out: 0).")
-    given = {"torsion": 0.0, **value}
-    azimuth, angle, torsion = _of_one_length([_angle_values(given[name], f"{where}.{name}") for name in TILT], where)
+    parts = {"torsion": 0.0, **value}
+    azimuth, angle, torsion = _of_one_length([_angle_values(parts[name], f"{where}.{name}") for name in TILT], where)
     return _about_z(azimuth) @ _about_y(angle) @ _about_z(torsion - azimuth)
 
 
@@ -230,14 +230,16 @@ def with_angles(document: Document, coordinates: Sequence[str], origin: str) -> 
         InputError: two orientations in one pose, one that cannot be read, or a pose without these angles.
     """
     pose: Any = document.get("pose")
-    given = [name for name in (*FORMS, *ANGLES) if isinstance(pose, dict) and name in pose]
-    form = next((name for name in given if name in FORMS), "")
+    orientation_keys = [name for name in (*FORMS, *ANGLES) if isinstance(pose, dict) and name in pose]
+    form = next((name for name in orientation_keys if name in FORMS), "")
     if not form:
         return document
     where = f'"{origin}": pose.{form}'
     check_form(coordinates, where)
-    if len(given) > 1:
-        raise InputError(f"{where} and pose.{given[1]} both say how the platform is turned; leave one of them out.")
+    if len(orientation_keys) > 1:
+        raise InputError(
+            f"{where} and pose.{orientation_keys[1]} both say how the platform is turned; leave one of them out."
+        )
     rest = {name: value for name, value in pose.items() if name != form}
     return {**document, "pose": {**rest, **single_angles(form, pose[form], where)}}
 
@@ -281,27 +283,27 @@ def remove_replaced_form(document: Any, settings: Iterable[str], coordinates: Se
 
 
 def numbers_for(
-    coordinates: Iterable[str], given: Mapping[str, Any], read: Callable[[str, object, str], Mapping[str, Any]]
+    coordinates: Iterable[str], numbers: Mapping[str, Any], angles_from: Callable[[str, object, str], Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Return values from Python with roll, pitch and yaw in the place of another form; see `with_values`.
 
     Args:
         coordinates: the coordinates of the machine's pose.
-        given: values by name of the field.
-        read: `single_angles`, or `angles_of` where there may be several poses.
+        numbers: values by name of the field.
+        angles_from: `single_angles`, or `angles_of` where there may be several poses.
 
     Raises:
         InputError: as for files.
     """
-    forms = [name for name in given if isinstance(name, str) and "." not in _bare(name) and form_of(name)]
+    forms = [name for name in numbers if isinstance(name, str) and "." not in _bare(name) and form_of(name)]
     if not forms:
-        return dict(given)
+        return dict(numbers)
     check_form(coordinates, forms[0])
-    clash = [name for name in given if name in forms[1:] or _bare(str(name)) in ANGLES]
+    clash = [name for name in numbers if name in forms[1:] or _bare(str(name)) in ANGLES]
     if clash:
         raise InputError(f"{forms[0]} and {clash[0]} both say how the platform is turned; leave one of them out.")
-    rest = {name: value for name, value in given.items() if name != forms[0]}
-    return {**rest, **read(form_of(forms[0]), given[forms[0]], forms[0])}
+    rest = {name: value for name, value in numbers.items() if name != forms[0]}
+    return {**rest, **angles_from(form_of(forms[0]), numbers[forms[0]], forms[0])}
 
 
 def _bare(name: str) -> str:

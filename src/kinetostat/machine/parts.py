@@ -177,5 +177,5 @@ class BarPair:
     @property
     def lines(self) -> tuple[Line, Line]:
         """The lines of both bars. The bars carry forces along these lines and nothing else."""
-        half = self.side * (0.5 * self.spacing)
-        return Line(self.far + half, self.along), Line(self.far - half, self.along)
+        offset = self.side * (0.5 * self.spacing)
+        return Line(self.far + offset, self.along), Line(self.far - offset, self.along)

@@ -205,9 +205,9 @@ class Field:
     default: Any = None
 
 
-def made_table(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
+def made_table(name: str, content: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
     """Make the class of a table from its fields, optional ones last, and from the tables that it extends."""
-    ordered = dict(sorted(given.items(), key=lambda item: item[1].default is not None))
+    ordered = dict(sorted(content.items(), key=lambda item: item[1].default is not None))
     kinds = {key: float if single.quantity.count is None else tuple[float, ...] for key, single in ordered.items()}
     hints = {key: Annotated[kinds[key], single.quantity] for key, single in ordered.items()}
     defaults = {key: single.default for key, single in ordered.items() if single.default is not None}

@@ -304,9 +304,9 @@ def _deviation(written: object, place: str) -> Deviation:
     for name in (UNIFORM, NORMAL):
         if words.lower().endswith(f" {name}"):
             words, spread = words[: -len(name) - 1], name
-    name, at, size = words.partition(" at ")
+    name, has_size, size = words.partition(" at ")
     grade, general = _GRADE.fullmatch(name.strip()), _CLASS.fullmatch(name.strip())
-    nominal = _size(size, place) if at and (grade or general) else 0.0
+    nominal = _size(size, place) if has_size and (grade or general) else 0.0
     if grade and int(grade[1]) not in GRADES:
         raise InputError(f"{place} is {shorten(written)}; grades IT{min(GRADES)} to IT{max(GRADES)} are known.")
     if grade:
@@ -368,5 +368,5 @@ def tolerance_lines(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
     for about, line in tolerances.items():
         texts = [deviation.text for deviation in line.deviations]
         value = texts if len(texts) > 1 else texts[0]
-        whole = value if line.cost == 1.0 else {"tolerance": value, "cost": line.cost}
-        yield f"{toml_key(about)} = {toml_value(whole)}"
+        entry = value if line.cost == 1.0 else {"tolerance": value, "cost": line.cost}
+        yield f"{toml_key(about)} = {toml_value(entry)}"

@@ -66,12 +66,12 @@ def by_name(document: Document, origin: str) -> Document:
     legs = result.get("legs")
     if isinstance(legs, list):
         result["legs"] = legs = _entries_by_name(legs, f'"{origin}"', "leg")
-    named = _checked_legs(legs, origin)
-    for name, leg in named.items():
+    by_leg = _checked_legs(legs, origin)
+    for name, leg in by_leg.items():
         if "type" in leg:
-            named[name] = leg = _cable(leg, f'"{origin}": leg "{name}"', result.get("space") == "planar")
+            by_leg[name] = leg = _cable(leg, f'"{origin}": leg "{name}"', result.get("space") == "planar")
         if "joints" in leg:
-            named[name] = _parts_by_name(leg, f'"{origin}": leg "{name}"')
+            by_leg[name] = _parts_by_name(leg, f'"{origin}": leg "{name}"')
     return with_parts(result, origin)
 
 

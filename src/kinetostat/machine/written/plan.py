@@ -305,9 +305,9 @@ def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
     per_angle = 2 if mirrored else 1
     count = count if count is not None else per_angle * max(1, len(angles))
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LEGS or count % per_angle:
-        even = ", and even, as mirrored legs come in pairs" if mirrored else ""
+        evenness = ", and even, as mirrored legs come in pairs" if mirrored else ""
         raise InputError(
-            f"{where}: copies is {shorten(count)}; it must be the number of legs, {per_angle} to {MOST_LEGS}{even}."
+            f"{where}: copies is {shorten(count)}; it must be the number of legs, {per_angle} to {MOST_LEGS}{evenness}."
         )
     if angles and len(angles) * per_angle != count:
         raise InputError(

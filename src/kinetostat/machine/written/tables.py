@@ -82,8 +82,9 @@ def _shape_fields(shape: str, material: str) -> dict[str, Field]:
         for name in SHAPES[shape]
     }
     # Of a known material the file may leave out what the catalogue says.
-    known = MATERIALS.get(material)
+    material_data = MATERIALS.get(material)
     fields |= {
-        name: Field(field.quantity, getattr(known, name, field.default)) for name, field in MATERIAL_FIELDS.items()
+        name: Field(field.quantity, getattr(material_data, name, field.default))
+        for name, field in MATERIAL_FIELDS.items()
     }
     return fields
