@@ -29,7 +29,7 @@ PIN = 1.2, 1.8
 SLEEVE = 1.4, 4.0
 """Radius and half length of a slide, in radii of a link: a sleeve around the link, longer than a pin."""
 TOOL_RADIUS = 0.6
-"""Radius of the line from the platform to the tool point, in radii of a link: thinner, as it is not a part of the machine."""
+"""Radius of the line from the platform to the tool point, in radii of a link: thinner than a link."""
 SHORTEST_ROD = 0.1
 """Length, in radii of a link, below which nothing is drawn: bodies with one origin have no rod between them."""
 LIGHT_HEIGHT = 2.0
