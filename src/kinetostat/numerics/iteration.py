@@ -245,8 +245,8 @@ def least_squares(
         trial_residuals, trial_rates = equations(trial, rows)
         nearer = (trial_residuals**2).sum(axis=1) < (residuals[rows] ** 2).sum(axis=1)
         nearer &= np.isfinite(trial_rates).all(axis=(1, 2))
-        taken = rows[nearer]
-        value[taken], residuals[taken], rates[taken] = trial[nearer], trial_residuals[nearer], trial_rates[nearer]
+        better = rows[nearer]
+        value[better], residuals[better], rates[better] = trial[nearer], trial_residuals[nearer], trial_rates[nearer]
         steps[rows] += 1
         change = np.where(nearer, 1.0 / DAMPING_CHANGE, DAMPING_CHANGE)
         damping[rows] = np.clip(damping[rows] * change, LEAST_DAMPING, MOST_DAMPING)

@@ -69,20 +69,20 @@ class DesignRow:
     @property
     def percents(self) -> tuple[float | None, ...]:
         """Change against the first design, percent; None if the change is undefined."""
-        first = self.values[0]
-        if first is None or first == 0.0 or not math.isfinite(first):
+        reference = self.values[0]
+        if reference is None or reference == 0.0 or not math.isfinite(reference):
             return (None,) * len(self.values)
-        return tuple(None if v is None or not math.isfinite(v) else 100.0 * (v / first - 1.0) for v in self.values)
+        return tuple(None if v is None or not math.isfinite(v) else 100.0 * (v / reference - 1.0) for v in self.values)
 
     @property
     def best(self) -> tuple[int, ...]:
         """Indices of the best designs; empty if all are equal, or if neither less nor more is better."""
-        known = {i: v for i, v in enumerate(self.values) if v is not None}
-        if len(known) < 2 or self.better is None:
+        numbers = {i: v for i, v in enumerate(self.values) if v is not None}
+        if len(numbers) < 2 or self.better is None:
             return ()
-        top = (min if self.better is Better.LESS else max)(known.values())
-        best = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
-        return best if len(best) < len(known) else ()
+        top = (min if self.better is Better.LESS else max)(numbers.values())
+        best = tuple(i for i, v in numbers.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
+        return best if len(best) < len(numbers) else ()
 
 
 def rows_at_poses(analyses: Sequence[Analysis], quantities: Sequence[str] = ()) -> tuple[DesignRow, ...]:

@@ -276,12 +276,12 @@ def roles_over(
     """
     response = responses(machine, grid)
     progress(1, 2)
-    good = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
+    has_answer = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
     roles = roles_at(response, elements, kept)
     progress(2, 2)
     shape = (len(elements), len(kept), grid.size)
-    part = [np.broadcast_to(rows, shape)[:, :, good] for rows in (roles.shares, roles.rigid, roles.gains)]
-    return Roles(*part), (int(good.sum()), grid.size)
+    part = [np.broadcast_to(rows, shape)[:, :, has_answer] for rows in (roles.shares, roles.rigid, roles.gains)]
+    return Roles(*part), (int(has_answer.sum()), grid.size)
 
 
 def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
@@ -320,19 +320,19 @@ def effects_of_parameters(sensitivities: Sensitivity, compliant: Mask) -> list[P
         sensitivities: sensitivities of the diagonal of C.
         compliant: whether each direction is neither rigid nor free.
     """
-    machine, known = sensitivities.machine, parameters_by_path(sensitivities.machine)
+    machine, by_path = sensitivities.machine, parameters_by_path(sensitivities.machine)
     entries: dict[str, list[Array]] = {}
     for influence in sensitivities.parameters:
-        if designed(known[influence.path]):
+        if designed(by_path[influence.path]):
             row = np.where(compliant, -influence.percents, math.nan)
             entries.setdefault(_path_of_element(machine, influence.path), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
     zero = np.where(compliant, 0.0, math.nan)
     for path in sensitivities.without_influence:
-        if designed(known[path]):
+        if designed(by_path[path]):
             rows.setdefault(_path_of_element(machine, path), zero)
     return strongest_first(
-        [ParameterEffect(path, row, turning=known[path].quantity.kind == "angle") for path, row in rows.items()]
+        [ParameterEffect(path, row, turning=by_path[path].quantity.kind == "angle") for path, row in rows.items()]
     )
 
 
@@ -366,22 +366,22 @@ def with_signs_over_grid(
     state: MachineState, grid: Points, effects: Sequence[ParameterEffect]
 ) -> list[ParameterEffect]:
     """Add to each effect at which share of the poses of a grid it stiffens a direction, and at which it softens it."""
-    machine, known = state.machine, parameters_by_path(state.machine)
-    paths = [leaf for effect in effects for leaf in known[effect.path].leaves]
+    machine, by_path = state.machine, parameters_by_path(state.machine)
+    paths = [leaf for effect in effects for leaf in by_path[effect.path].leaves]
     names = [f"compliance_{name}" for name in machine.family.component_names]
     answer = evaluate_gradient(machine, grid, names, paths)
-    good = answer.status == Status.OK
-    if not good.any():
+    has_answer = answer.status == Status.OK
+    if not has_answer.any():
         return list(effects)
-    length, here = float(state.configuration.length), values(machine)
+    length, numbers = float(state.configuration.length), values(machine)
     signed = []
     for effect in effects:
-        leaves = known[effect.path].leaves
+        leaves = by_path[effect.path].leaves
         rows = [paths.index(leaf) for leaf in leaves]
-        sizes = np.array([measure_of(known[leaf].quantity.kind, here[leaf], length)[0] for leaf in leaves])
+        sizes = np.array([measure_of(by_path[leaf].quantity.kind, numbers[leaf], length)[0] for leaf in leaves])
         percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
         change = -np.nansum(percents, axis=1)
-        sign = np.where(np.abs(change) > LEAST_INFLUENCE, np.sign(change), 0.0)[:, good]
-        stiffer, softer = (tuple((sign == wanted).mean(axis=1).tolist()) for wanted in (1.0, -1.0))
+        sign = np.where(np.abs(change) > LEAST_INFLUENCE, np.sign(change), 0.0)[:, has_answer]
+        stiffer, softer = (tuple((sign == direction).mean(axis=1).tolist()) for direction in (1.0, -1.0))
         signed.append(replace(effect, stiffer=stiffer, softer=softer))
     return signed

@@ -147,8 +147,8 @@ def moves_between(table: Array, shapes: Sequence[str], places: Sequence[int], si
 def _curve(first: Array, last: Array, places: Sequence[int], size: float, arc: Arc | None) -> Curve:
     """The line from a pose to another one, or the arc if there is one; arguments as of `moves_between`."""
     length = float(np.linalg.norm(last[places] - first[places])) if arc is None else arc.radius * arc.angle
-    turned = float(np.linalg.norm(np.delete(last - first, places)))
-    return Curve(first, last, length or turned * size, tuple(places), arc)
+    turn = float(np.linalg.norm(np.delete(last - first, places)))
+    return Curve(first, last, length or turn * size, tuple(places), arc)
 
 
 def _arc(start: Array, middle: Array, end: Array) -> Arc | None:

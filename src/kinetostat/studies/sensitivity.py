@@ -94,8 +94,8 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
     """
     with np.errstate(all="ignore"):
         ratio = np.multiply(size, slope) / index
-        known = np.isfinite(index) & (np.abs(index) > 0.0) & (np.abs(size) > 0.0)
-    return np.where(known, ratio, math.nan)
+        is_defined = np.isfinite(index) & (np.abs(index) > 0.0) & (np.abs(size) > 0.0)
+    return np.where(is_defined, ratio, math.nan)
 
 
 def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
@@ -215,20 +215,20 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     response = state.response
     if state.status in (Status.JOINT_LIMIT, Status.NO_REST):
         return Sensitivity(machine, state.status, state.refusal, loads_left_out=uncounted)
-    here = values(machine)
-    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
-    by = [p.path for p in candidates if not math.isinf(here[p.path])]
-    answer = evaluate_gradient(machine, point_of_file(machine), names, by)
+    numbers = values(machine)
+    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, numbers)]
+    varied = [p.path for p in candidates if not math.isinf(numbers[p.path])]
+    answer = evaluate_gradient(machine, point_of_file(machine), names, varied)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         why = NO_STATE_NEARBY if status is Status.NOT_CONVERGED else state.refusal
         return Sensitivity(machine, status, why, loads_left_out=uncounted)
     pairs = zip(names, answer.values[:, 0].tolist(), strict=True)
     indices = np.array([_without_round_off(machine, name, value, response) for name, value in pairs])
-    slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
-    reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
+    slopes = dict(zip(varied, answer.gradients[:, :, 0].T.tolist(), strict=True))
+    reasons = {p.path: _no_derivative(p, numbers, slopes) for p in candidates}
     length = float(response.configuration.length)
-    influences = [_influence(p, here, indices, slopes[p.path], length) for p in candidates if not reasons[p.path]]
+    influences = [_influence(p, numbers, indices, slopes[p.path], length) for p in candidates if not reasons[p.path]]
     return Sensitivity(
         machine=machine,
         status=status,
@@ -261,9 +261,9 @@ def _without_round_off(machine: Machine, name: str, value: float, response: Resp
 
 def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
     """Whether any of the quantities may depend on a parameter."""
-    path, wanted = parameter.path, [QUANTITIES[name] for name in names]
-    inertial = any(quantity.modal for quantity in wanted) or needs_masses(names)
-    if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in wanted):
+    path, quantities = parameter.path, [QUANTITIES[name] for name in names]
+    inertial = any(quantity.modal for quantity in quantities) or needs_masses(names)
+    if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in quantities):
         return here[path] != 0.0
     if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(VIBRATION_FIELDS) and not inertial):
         return False

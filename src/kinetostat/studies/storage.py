@@ -170,9 +170,9 @@ def _digests_of(folder: Path, names: Iterable[str]) -> Digests:
 
 def differing(folder: Path) -> list[str]:
     """Return the names of the listed files that are missing, or are not as they were written, in order."""
-    wanted = read_list(folder) or {}
-    present = _digests_of(folder, wanted)
-    return sorted(name for name in wanted if present.get(name) != wanted[name])
+    listed = read_list(folder) or {}
+    present = _digests_of(folder, listed)
+    return sorted(name for name in listed if present.get(name) != listed[name])
 
 
 def _list_head(lines: bytes) -> bytes:

@@ -172,11 +172,11 @@ def partial_of(final: Path) -> Path:
 def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[Work, Layout | None]:
     """Begin the study, or take its work from the folder; the layout is None in a folder from before layouts."""
     work = in_chunks(question.machine, question.grid, question.names)
-    wanted = _as_record(question, final.name)
-    stored = study.question(wanted, _in_this_version)
+    question_now = _as_record(question, final.name)
+    stored = study.question(question_now, _in_this_version)
     if stored is None:
         layout = _create(question, final)
-        study.begin({**wanted, "chunk": work.chunk, LAYOUT: layout})
+        study.begin({**question_now, "chunk": work.chunk, LAYOUT: layout})
         return work, layout
     if not final.exists() and not partial_of(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')

@@ -155,9 +155,9 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
 def _required_loads(machine: Machine, wrenches: Any) -> Array:
     """Loads that must be held, in the units of `Cables.load` [k x d]."""
     columns = given_poses(machine, Path(wrenches) if isinstance(wrenches, str) else wrenches)
-    moved = [field.path for field in columns.fields if field.path.startswith((POSE, "geometry.", "legs."))]
-    if moved:
-        raise InputError(f"wrenches has {moved[0]}, which moves the machine; it takes loads at a single pose.")
+    moving_fields = [field.path for field in columns.fields if field.path.startswith((POSE, "geometry.", "legs."))]
+    if moving_fields:
+        raise InputError(f"wrenches has {moving_fields[0]}, which moves the machine; it takes loads at a single pose.")
     placed = with_values(machine, columns.leaves)
     return cables_of(placed, cable_signs(machine), columns.count).load
 

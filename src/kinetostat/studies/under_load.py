@@ -158,11 +158,11 @@ class LoadedState(AnswerInState):
             return {}
         free = self.state.free
         if int(free.status) not in REGULAR:
-            known, statics = [], replace(free.statics, flexibility=(), compliance=())
+            known_springs, statics = [], replace(free.statics, flexibility=(), compliance=())
         else:
-            known, statics = springs(free.configuration), clean_statics(free.statics)
+            known_springs, statics = springs(free.configuration), clean_statics(free.statics)
         blocks = free_stiffnesses(self.tangent, self.compliance, self.machine.family.components) or {}
-        weakest = {name: softest(block, name, known, statics) for name, block in blocks.items()}
+        weakest = {name: softest(block, name, known_springs, statics) for name, block in blocks.items()}
         return {name: _with_shares_of_springs(way) for name, way in weakest.items() if way is not None}
 
     def __repr__(self) -> str:

@@ -280,7 +280,7 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
         An array over the nodes for each of the first three axes. Where the next node along the axis has another
         verdict, the entry is the share of the step to it at which the verdict changes; elsewhere it is NaN.
     """
-    axes, ends = question.grid.axes, []
+    axes, nodes_by_axis = question.grid.axes, []
     drawn = tuple(slice(None) if k < DRAWN_COORDINATES else slice(home[k], home[k] + 1) for k in range(verdict.ndim))
     for k in range(min(DRAWN_COORDINATES, verdict.ndim)):
         changes = np.zeros(verdict.shape, dtype=bool)
@@ -288,14 +288,14 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
         changes[_all_but(k, slice(None, -1))] = lower != upper
         searched = np.zeros_like(changes)
         searched[drawn] = True
-        ends.append(np.argwhere(changes & searched))
-    nodes = np.concatenate(ends)
-    axis = np.repeat(np.arange(len(ends)), [len(places) for places in ends])
+        nodes_by_axis.append(np.argwhere(changes & searched))
+    nodes = np.concatenate(nodes_by_axis)
+    axis = np.repeat(np.arange(len(nodes_by_axis)), [len(places) for places in nodes_by_axis])
     shares = _border_shares(judge, axes, nodes, axis, verdict) if len(nodes) else np.zeros(0)
     results = []
-    for k in range(len(ends)):
+    for k, places in enumerate(nodes_by_axis):
         result = np.full(verdict.shape, np.nan, dtype=np.float32)
-        result[tuple(ends[k].T)] = shares[axis == k]
+        result[tuple(places.T)] = shares[axis == k]
         results.append(result)
     return results
 
@@ -308,7 +308,7 @@ def _border_shares(judge: Judge, axes: Sequence[Axis], nodes: Integers, axis: In
         for k, a in enumerate(axes)
         for path in a.paths
     }
-    before = verdict[tuple(nodes.T)]
+    verdict_at_node = verdict[tuple(nodes.T)]
     low, high = np.zeros(len(nodes)), np.ones(len(nodes))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -316,8 +316,8 @@ def _border_shares(judge: Judge, axes: Sequence[Axis], nodes: Integers, axis: In
         answer = evaluate(
             judge.machine, PointTable(poses), judge.quantities, repeated=HALVINGS * len(nodes) >= NATIVE_FROM
         )
-        same = judge.verdicts(answer.status, answer.values, partial(_poses_at, poses)) == before
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        is_same = judge.verdicts(answer.status, answer.values, partial(_poses_at, poses)) == verdict_at_node
+        low, high = np.where(is_same, middle, low), np.where(is_same, high, middle)
     return 0.5 * (low + high)
 
 
@@ -339,11 +339,11 @@ def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
     for k, share in enumerate(shares):
         nearest = np.full(region.shape, np.inf)
         lower, upper = _neighbours(region, k)
-        first, second = _all_but(k, slice(None, -1)), _all_but(k, slice(1, None))
+        before_border, behind_border = _all_but(k, slice(None, -1)), _all_but(k, slice(1, None))
         has_border = lower != upper
-        nearest[first] = np.where(has_border, share[first], np.inf)
-        from_second = np.where(has_border, 1.0 - share[first], np.inf)
-        nearest[second] = np.minimum(nearest[second], from_second)
+        nearest[before_border] = np.where(has_border, share[before_border], np.inf)
+        from_second = np.where(has_border, 1.0 - share[before_border], np.inf)
+        nearest[behind_border] = np.minimum(nearest[behind_border], from_second)
         known = np.nan_to_num(nearest, nan=DEPTH_UNSEARCHED, posinf=np.inf)
         inverse_square += np.maximum(known, LEAST_DEPTH) ** -2.0
     distance = np.minimum(np.where(inverse_square > 0.0, inverse_square, 1.0) ** -0.5, 1.0)
