@@ -69,9 +69,9 @@ def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
 
 def _plain(path: str) -> str:
     """Return a path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
-    section, _, field = named_entry(path).partition(".")
+    table, _, field = named_entry(path).partition(".")
     words = field.replace(".", " ").replace("_", " ")
-    return words if section == "pose" else f"{section}: {words}"
+    return words if table == "pose" else f"{table}: {words}"
 
 
 def machine_of(dataset: xr.Dataset) -> Machine:

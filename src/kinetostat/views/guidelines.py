@@ -101,12 +101,13 @@ def _left_out(answer: Guidelines) -> Iterator[str]:
     if hidden > 0:
         yield f"{words_on_omitted(hidden)} (--full shows them)."
     if answer.without_influence:
-        yield f"No direction depends on {_few(answer.without_influence)}."
+        yield f"No direction depends on {_few_paths(answer.without_influence)}."
     for reason in dict.fromkeys(why for _, why in answer.left_out):
-        yield f"Omitted {reason}: {_few([path for path, why in answer.left_out if why == reason])}."
+        yield f"Omitted {reason}: {_few_paths([path for path, why in answer.left_out if why == reason])}."
 
 
-def _few(paths: Sequence[str]) -> str:
+def _few_paths(paths: Sequence[str]) -> str:
+    """List the first paths, and count the others."""
     others = len(paths) - MOST_NAMED_PATHS
     return ", ".join(paths[:MOST_NAMED_PATHS]) + (f" and {others} more" if others > 0 else "")
 
@@ -136,11 +137,11 @@ def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
     """Return the share of each element in the compliance of each direction."""
     table = numeric_table("Attribution: share of each element in the diagonal of C", "element", answer.components)
     for element, row in zip(answer.elements, _at_pose(here.shares).tolist(), strict=True):
-        table.add_row(element.name, *(_share(part) for part in row))
+        table.add_row(element.name, *(_share_text(part) for part in row))
     return table
 
 
-def _share(part: float) -> Text:
+def _share_text(part: float) -> Text:
     if math.isnan(part) or part == 0.0:
         return Text(NO_EFFECT if part == 0.0 else DASH)
     return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= DECIDING_SHARE else "dim")
@@ -157,19 +158,19 @@ def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
     )
     table = numeric_table(title, "element", ["now", *answer.components])
     for k, element in enumerate(answer.elements):
-        row = _at_pose(here.rigid)[k].tolist()
-        scale = answer.machine.display.scale(element.unit)
+        factors, scale = _at_pose(here.rigid)[k].tolist(), answer.machine.display.scale(element.unit)
         if element.stiffness is None:
-            table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
+            present, now = 1.0, "1 × now"
+        elif element.stiffness == math.inf:  # the limits of a rigid element are stiffnesses themselves
+            present, now = scale.factor, f"rigid ({scale.unit})"
         else:
-            rigid = element.stiffness == math.inf
-            present = 1.0 if rigid else element.stiffness
-            now = f"rigid ({scale.unit})" if rigid else f"{_limit(element.stiffness * scale.factor)} {scale.unit}"
-            table.add_row(element.name, now, *(_limit(factor * present * scale.factor) for factor in row))
+            present = element.stiffness * scale.factor
+            now = f"{_limit_text(present)} {scale.unit}"
+        table.add_row(element.name, now, *(_limit_text(factor * present) for factor in factors))
     return table
 
 
-def _limit(value: float) -> str:
+def _limit_text(value: float) -> str:
     """Return a limit in at most five characters."""
     if math.isnan(value):
         return DASH
@@ -190,11 +191,11 @@ def _effect_table(answer: Guidelines, count: int) -> FittedTable:
         share = share_with_same_signs(effect)
         poses = "all" if share is None or share == 1.0 else f"{100.0 * share:.0f} %"
         name = with_leg(answer.machine, effect.path)
-        table.add_row(name, *(_arrow(p) for p in effect.percents), *([poses] if grid else []))
+        table.add_row(name, *(_effect_text(p) for p in effect.percents), *([poses] if grid else []))
     return table
 
 
-def _arrow(percent: float) -> Text:
+def _effect_text(percent: float) -> Text:
     if not abs(percent) >= LEAST_EFFECT:
         return Text(DASH if math.isnan(percent) else NO_EFFECT)
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
@@ -304,7 +305,7 @@ def _elements(answer: Guidelines) -> list[dict[str, Any]]:
             "compliance_share": by_direction(shares[k]),
             "rigid_from_factor": by_direction(rigid[k]),
             "rigid_from": by_direction(limits),
-            "rigid_from_per_actuator": by_direction([_per_actuator(limit, answer.actuator) for limit in limits]),
+            "rigid_from_per_actuator": by_direction([_in_actuators(limit, answer.actuator) for limit in limits]),
             "doubling_lowers_compliance": by_direction(gains[k]),
         }
         if over is not None:
@@ -322,7 +323,7 @@ def _at_pose(roles: Array) -> Array:
     return roles[:, :, 0]
 
 
-def _per_actuator(limit: float | None, actuator: Element | None) -> float | None:
+def _in_actuators(limit: float | None, actuator: Element | None) -> float | None:
     """A limit as a multiple of an actuator's stiffness; 0 stays 0, also where there is nothing to compare with."""
     if limit is None or limit == 0.0:
         return limit

@@ -174,38 +174,43 @@ def _page(name: str, content: object) -> str:
 
 def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     """Return the programs of a page, by name."""
-    kind, form, closed = functions.specimen, functions.form, functions.closed
     placement = functions.placement.formula
-    bodies = {
-        # What is free of loads takes no state; limits of loads judge the program of the state of rest.
-        "answers": objectives_of(kind, form, each_alone(ENTRIES), TraceOptions(closed=closed, limited=False)).body,
-        "places": placement.body,
-        "shares": functions.shares.formula.body,
-    }
-    counts = functions.mode_counts or ModeCounts()
+    # What is free of loads takes no state; limits of loads judge the program of the state of rest.
+    options = TraceOptions(closed=functions.closed, limited=False)
+    answers = objectives_of(functions.specimen, functions.form, each_alone(ENTRIES), options)
+    bodies = {"answers": answers.body, "places": placement.body, "shares": functions.shares.formula.body}
     plan = plan_for(functions.machine, functions.quantities, functions.inputs)
     if free := [name for name in functions.quantities if not functions.at_rest(name)]:
-        modes = ModeCounts(free=counts.free) if counts.free else None
-        wanted = each_alone(free)
-        options = TraceOptions(closed=closed, limited=False, plan=plan, mode_counts=modes)
-        formula = objectives_of(kind, form, wanted, options)
-        bodies["quantities"] = formula.body
-        if modes:
-            bodies["springs"] = spring_parts_of(kind, form, closed, at_rest=False).body
+        bodies |= _quantity_bodies(functions, free, plan)
     if functions.square:
         driven = placement.body.results[: len(functions.actuators)]
         body = Body(placement.body.fixed, placement.body.columns, driven, placement.body.code)
         bodies["slopes"] = with_gradients(body, placement.inputs)
-    if functions.rests:
-        wanted = each_alone([*DISPLACEMENTS, *filter(functions.at_rest, functions.quantities)])
-        bodies["first"] = step_of(kind, form, closed, "first").body
-        bodies["step"] = step_of(kind, form, closed).body
-        modes = replace(counts, free=0) if counts.at_rest else None
-        formula = objectives_of(kind, form, wanted, TraceOptions(closed=closed, plan=plan, mode_counts=modes))
-        bodies["loaded"] = formula.body
-        if modes:
-            bodies["springsAtRest"] = spring_parts_of(kind, form, closed, at_rest=True).body
-    return bodies
+    return bodies | _bodies_at_rest(functions, plan) if functions.rests else bodies
+
+
+def _quantity_bodies(functions: MachineFunctions, names: Sequence[str], plan: Any) -> dict[str, Body]:
+    """Return the programs of quantities of the free machine, and that of its modes if they need it."""
+    counts = functions.mode_counts or ModeCounts()
+    modes = ModeCounts(free=counts.free) if counts.free else None
+    options = TraceOptions(closed=functions.closed, limited=False, plan=plan, mode_counts=modes)
+    quantities = objectives_of(functions.specimen, functions.form, each_alone(names), options)
+    if modes is None:
+        return {"quantities": quantities.body}
+    springs = spring_parts_of(functions.specimen, functions.form, functions.closed, at_rest=False)
+    return {"quantities": quantities.body, "springs": springs.body}
+
+
+def _bodies_at_rest(functions: MachineFunctions, plan: Any) -> dict[str, Body]:
+    """Return the programs of states of rest: the first step, every later one, what holds there, and its modes."""
+    parts = functions.specimen, functions.form, functions.closed
+    counts = functions.mode_counts or ModeCounts()
+    modes = replace(counts, free=0) if counts.at_rest else None
+    names = [*DISPLACEMENTS, *filter(functions.at_rest, functions.quantities)]
+    options = TraceOptions(closed=functions.closed, plan=plan, mode_counts=modes)
+    loaded = objectives_of(functions.specimen, functions.form, each_alone(names), options)
+    bodies = {"first": step_of(*parts, "first").body, "step": step_of(*parts).body, "loaded": loaded.body}
+    return {**bodies, "springsAtRest": spring_parts_of(*parts, at_rest=True).body} if modes else bodies
 
 
 def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
