@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from operator import attrgetter
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, where
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.algebra.symmetric import POSITIONS, Symmetric6
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
@@ -87,12 +87,9 @@ class MapQuantity:
     driven: str = ""
 
 
-def _compliance(response: Response, i: int, j: int) -> Scalar:
-    return response.compliance.entry(i, j)
-
-
-def _stiffness(response: Response, i: int, j: int) -> Scalar:
-    return response.stiffness.entry(i, j)
+def _entry(response: Response, matrix: str, i: int, j: int) -> Scalar:
+    symmetric: Symmetric6 = getattr(response, matrix)
+    return symmetric.entry(i, j)
 
 
 def _compliance_unit(i: int, j: int) -> str:
@@ -106,26 +103,27 @@ def _stiffness_unit(i: int, j: int) -> str:
     return "N/rad" if i in ROTATIONS else "N/m"
 
 
-def _entries(
-    matrix: str, letter: str, unit: Callable[[int, int], str], value: Callable[..., Scalar], better: Better
-) -> list[MapQuantity]:
+def _symbol(letter: str, *index: str) -> str:
+    return rf"${letter}_{{\mathrm{{{','.join(index)}}}}}$"
+
+
+def _entries(matrix: str, letter: str, unit: Callable[[int, int], str], better: Better) -> list[MapQuantity]:
     entries = []
     for i, j in POSITIONS:
-        names = [COMPONENTS[i]] if i == j else [COMPONENTS[i], COMPONENTS[j]]
-        symbol = rf"${letter}_{{\mathrm{{{','.join(names)}}}}}$"
-        name = "_".join([matrix, *names])
+        names = (COMPONENTS[i],) if i == j else (COMPONENTS[i], COMPONENTS[j])
         # An entry that couples two components may have either sign: neither more nor less of it is better.
-        wanted = better if i == j else None
-        entries.append(MapQuantity(name, unit(i, j), symbol, partial(value, i=i, j=j), tuple(names), wanted))
+        wanted, value = better if i == j else None, partial(_entry, matrix=matrix, i=i, j=j)
+        name, symbol = "_".join([matrix, *names]), _symbol(letter, *names)
+        entries.append(MapQuantity(name, unit(i, j), symbol, value, components=names, better=wanted))
     return entries
 
 
 def _free_stiffnesses() -> list[MapQuantity]:
     entries = []
-    for i, name in enumerate(COMPONENTS):
-        symbol = rf"$1/C_{{\mathrm{{{name}}}}}$"
+    for i, component in enumerate(COMPONENTS):
+        name, symbol = f"free_stiffness_{component}", rf"$1/C_{{\mathrm{{{component}}}}}$"
         value = partial(free_stiffness, row=i)
-        entries.append(MapQuantity(f"free_stiffness_{name}", _stiffness_unit(i, i), symbol, value, (name,), "more"))
+        entries.append(MapQuantity(name, _stiffness_unit(i, i), symbol, value, components=(component,), better="more"))
     return entries
 
 
@@ -133,13 +131,9 @@ def _extremes() -> list[MapQuantity]:
     blocks = (("translational", "N/m", "t", TRANSLATIONS), ("rotational", "N·m/rad", "r", ROTATIONS))
     entries = []
     for word, unit, letter, block in blocks:
-        least, greatest = partial(least_stiffness, block=block), partial(greatest_stiffness, block=block)
-        entries.append(
-            MapQuantity(f"least_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},min}}}}$", least, (), "more")
-        )
-        entries.append(
-            MapQuantity(f"greatest_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},max}}}}$", greatest, (), "more")
-        )
+        for end, index, value in (("least", "min", least_stiffness), ("greatest", "max", greatest_stiffness)):
+            name, symbol = f"{end}_{word}_stiffness", _symbol("k", letter, index)
+            entries.append(MapQuantity(name, unit, symbol, partial(value, block=block), better="more"))
     return entries
 
 
@@ -172,7 +166,7 @@ def _frequencies(prefix: str, loaded: str = "") -> list[MapQuantity]:
         value = partial(_under_load, what=loaded, row=row) if loaded else partial(_free_frequency, row=row)
         index = rf"\mathrm{{t}},{row + 1}" if loaded else str(row + 1)
         name, symbol = f"{prefix}_{row + 1}", f"$f_{{{index}}}$"
-        entries.append(MapQuantity(name, "Hz", symbol, value, (), "more", loaded=loaded, modal=True))
+        entries.append(MapQuantity(name, "Hz", symbol, value, better="more", loaded=loaded, modal=True))
     return entries
 
 
@@ -204,75 +198,27 @@ def _of_cable(response: Response, name: str) -> Scalar:
 
 
 def _of_cables() -> list[MapQuantity]:
-    tensions = [(f"tension_{number}", rf"$\tau_{{{number}}}$", None) for number in range(1, MOST_CABLES + 1)]
-    others: list[tuple[str, str, Better]] = [
-        ("least_tension", "least tension", "more"),
-        ("greatest_tension", "greatest tension", "less"),
-        ("tension_reserve", "reserve of the tensions", "more"),
-        ("capacity", "capacity", "more"),
+    rows: list[tuple[str, str, str, Better]] = [
+        *((f"tension_{number}", "N", rf"$\tau_{{{number}}}$", None) for number in range(1, MOST_CABLES + 1)),
+        ("least_tension", "N", "least tension", "more"),
+        ("greatest_tension", "N", "greatest tension", "less"),
+        ("tension_reserve", "N", "reserve of the tensions", "more"),
+        ("capacity", "N", "capacity", "more"),
+        ("wrench_closure", "1", "wrench closure", "more"),
     ]
     return [
-        *(
-            MapQuantity(name, "N", symbol, partial(_of_cable, name=name), better=better, needs=CABLES, cables=True)
-            for name, symbol, better in (*tensions, *others)
-        ),
-        MapQuantity(
-            "wrench_closure",
-            "1",
-            "wrench closure",
-            partial(_of_cable, name="wrench_closure"),
-            better="more",
-            needs=CABLES,
-            cables=True,
-        ),
+        MapQuantity(name, unit, symbol, partial(_of_cable, name=name), better=better, needs=CABLES, cables=True)
+        for name, unit, symbol, better in rows
     ]
 
 
-def _of_drives() -> list[MapQuantity]:
-    """Loads that the drives hold and speeds that they allow: in all directions, and along each component."""
-    words = {
-        "translation": ("force", "N", "speed", "m/s", ""),
-        "rotation": ("moment", "N·m", "rate", "rad/s", "angular_"),
-    }
+def _of_actuators() -> list[MapQuantity]:
     entries = []
-    for block, (load, unit, motion, rate, turning) in words.items():
-        ball = partial(_wrench_number, measure=greatest_ball, row=BLOCKS[block])
-        quick = partial(_speed_number, measure=greatest_speed, row=BLOCKS[block])
-        strong = partial(_acceleration_number, measure=greatest_acceleration, row=BLOCKS[block])
-        pairs = (("w", load), ("t", motion), ("a", "turn" if block == "rotation" else "move"))
-        symbols = [rf"${letter}_{{\mathrm{{{word},min}}}}$" for letter, word in pairs]
-        entries += [
-            MapQuantity(f"least_wrench_{load}", unit, symbols[0], ball, better="more", driven="load"),
-            MapQuantity(f"least_twist_{motion}", rate, symbols[1], quick, better="more", driven="speed"),
-            MapQuantity(
-                f"least_{turning}acceleration", f"{rate}**2", symbols[2], strong, better="more", driven="acceleration"
-            ),
-        ]
-    of_wrenches, of_speeds = (
-        partial(_wrench_number, measure=greatest_along),
-        partial(_speed_number, measure=greatest_speed_along),
-    )
-    of_accelerations = partial(_acceleration_number, measure=greatest_acceleration_along)
-    for row, name in enumerate(COMPONENTS):
-        _, unit, _, rate, *_ = words["rotation" if row in ROTATIONS else "translation"]
-        for word, value, shown, about in (
-            ("wrench", of_wrenches, unit, "load"),
-            ("twist", of_speeds, rate, "speed"),
-            ("acceleration", of_accelerations, f"{rate}**2", "acceleration"),
-        ):
-            symbol = rf"${word[0]}_{{\mathrm{{{name},max}}}}$"
-            entries.append(
-                MapQuantity(
-                    f"greatest_{word}_{name}",
-                    shown,
-                    symbol,
-                    partial(value, row=row),
-                    (name,),
-                    "more",
-                    driven=about,
-                )
-            )
-    return sorted(entries, key=lambda entry: entry.name.rpartition("_")[0])
+    for word, unit, sliding in (("force", "N", True), ("moment", "N·m", False)):
+        name, value = f"actuator_{word}", partial(actuator_load, sliding=sliding)
+        label, needs = f"greatest actuator {word}", LIMITS[f"actuator_{word}"].needs
+        entries.append(MapQuantity(name, unit, label, value, better="less", needs=needs))
+    return entries
 
 
 def _wrench_number(response: Response, measure: Callable[..., Scalar], row: slice | int) -> Scalar:
@@ -292,20 +238,85 @@ def _acceleration_number(response: Response, measure: Callable[..., Scalar], row
     return measure(response.acceleration_faces, response.transmission, row)
 
 
+class _NumberOfDrives(NamedTuple):
+    """Numbers that follow from what drives can do: of wrenches, twists or accelerations.
+
+    Attributes:
+        driven: as in `MapQuantity`.
+        number: function of a response, a measure, and a block or a component.
+        least, greatest: measures: the least in all directions of a block, the greatest along a component.
+        units, names, words: unit, end of the name and index of the symbol of the least one, of translations and of
+            rotations.
+    """
+
+    driven: str
+    number: Callable[..., Scalar]
+    least: Callable[..., Scalar]
+    greatest: Callable[..., Scalar]
+    units: tuple[str, str]
+    names: tuple[str, str]
+    words: tuple[str, str]
+
+
+NUMBERS_OF_DRIVES = {
+    "acceleration": _NumberOfDrives(
+        driven="acceleration",
+        number=_acceleration_number,
+        least=greatest_acceleration,
+        greatest=greatest_acceleration_along,
+        units=("m/s**2", "rad/s**2"),
+        names=("acceleration", "angular_acceleration"),
+        words=("move", "turn"),
+    ),
+    "twist": _NumberOfDrives(
+        driven="speed",
+        number=_speed_number,
+        least=greatest_speed,
+        greatest=greatest_speed_along,
+        units=("m/s", "rad/s"),
+        names=("twist_speed", "twist_rate"),
+        words=("speed", "rate"),
+    ),
+    "wrench": _NumberOfDrives(
+        driven="load",
+        number=_wrench_number,
+        least=greatest_ball,
+        greatest=greatest_along,
+        units=("N", "N·m"),
+        names=("wrench_force", "wrench_moment"),
+        words=("force", "moment"),
+    ),
+}
+
+
+def _of_drives() -> list[MapQuantity]:
+    """Numbers of drives along each component, and then in all directions of a block."""
+    entries = []
+    for word, kind in NUMBERS_OF_DRIVES.items():
+        for row, name in enumerate(COMPONENTS):
+            unit, symbol = kind.units[row in ROTATIONS], _symbol(word[0], name, "max")
+            value, full_name = partial(kind.number, measure=kind.greatest, row=row), f"greatest_{word}_{name}"
+            entries.append(
+                MapQuantity(full_name, unit, symbol, value, components=(name,), better="more", driven=kind.driven)
+            )
+    for word, kind in NUMBERS_OF_DRIVES.items():
+        for place, block in enumerate(("translation", "rotation")):
+            name, unit, symbol = kind.names[place], kind.units[place], _symbol(word[0], kind.words[place], "min")
+            value = partial(kind.number, measure=kind.least, row=BLOCKS[block])
+            entries.append(MapQuantity(f"least_{name}", unit, symbol, value, better="more", driven=kind.driven))
+    return entries
+
+
 def _of_reversal() -> list[MapQuantity]:
     """Lost motion of the tool where all drives reverse, by component."""
-    return [
-        MapQuantity(
-            f"reversal_error_{name}",
-            "rad" if row in ROTATIONS else "m",
-            rf"$e_{{\mathrm{{{name}}}}}$",
-            partial(reversal_error, row=row),
-            (name,),
-            "less",
-            driven="reversal",
+    entries = []
+    for row, name in enumerate(COMPONENTS):
+        unit, symbol, value = "rad" if row in ROTATIONS else "m", _symbol("e", name), partial(reversal_error, row=row)
+        full_name = f"reversal_error_{name}"
+        entries.append(
+            MapQuantity(full_name, unit, symbol, value, components=(name,), better="less", driven="reversal")
         )
-        for row, name in enumerate(COMPONENTS)
-    ]
+    return entries
 
 
 def _of_loaded_state() -> list[MapQuantity]:
@@ -314,14 +325,15 @@ def _of_loaded_state() -> list[MapQuantity]:
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
         motion = partial(_displacement, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
-        stiff, soft = _stiffness_unit(i, i), rf"$1/C_{{t,{shown}}}$"
-        entries += [
-            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", motion, (name,), loaded="displacement"),
-            MapQuantity(
-                f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded="stiffness"
-            ),
-            MapQuantity(f"tangent_free_stiffness_{name}", stiff, soft, free, (name,), "more", loaded="compliance"),
-        ]
+        stiff = _stiffness_unit(i, i)
+        for start, label, symbol, value, better, loaded in (
+            ("displacement", unit, rf"$u_{{{shown}}}$", motion, None, "displacement"),
+            ("tangent_stiffness", stiff, rf"$K_{{t,{shown}}}$", tangent, "more", "stiffness"),
+            ("tangent_free_stiffness", stiff, rf"$1/C_{{t,{shown}}}$", free, "more", "compliance"),
+        ):
+            entries.append(
+                MapQuantity(f"{start}_{name}", label, symbol, value, components=(name,), better=better, loaded=loaded)
+            )
     entries += _frequencies("loaded_frequency", "frequency")
     factor, slack, snapped = (partial(_under_load, what=what) for what in ("factor", "slack", "snapped"))
     return [
@@ -335,8 +347,8 @@ def _of_loaded_state() -> list[MapQuantity]:
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        *_entries("compliance", "C", _compliance_unit, _compliance, "less"),
-        *_entries("stiffness", "K", _stiffness_unit, _stiffness, "more"),
+        *_entries("compliance", "C", _compliance_unit, "less"),
+        *_entries("stiffness", "K", _stiffness_unit, "more"),
         *_free_stiffnesses(),
         MapQuantity("singularity_margin", "1", "singularity margin", attrgetter("singularity_margin"), better="more"),
         MapQuantity("mass", "kg", "moving mass", attrgetter("mass"), better="less"),
@@ -345,22 +357,7 @@ QUANTITIES = {
         MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition, better="less"),
         MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg, needs=LIMITS["shortest_leg"].needs),
         MapQuantity("longest_leg", "m", "longest leg", longest_leg, better="less", needs=LIMITS["longest_leg"].needs),
-        MapQuantity(
-            "actuator_force",
-            "N",
-            "greatest actuator force",
-            partial(actuator_load, sliding=True),
-            better="less",
-            needs=LIMITS["actuator_force"].needs,
-        ),
-        MapQuantity(
-            "actuator_moment",
-            "N·m",
-            "greatest actuator moment",
-            partial(actuator_load, sliding=False),
-            better="less",
-            needs=LIMITS["actuator_moment"].needs,
-        ),
+        *_of_actuators(),
         *_of_drives(),
         *_of_reversal(),
         *_frequencies("frequency"),
@@ -419,20 +416,16 @@ def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) ->
     return beyond or bool(rest_numbers(machine, [quantity.name for quantity in wanted], limited))
 
 
+INDICES: dict[str, Iterable[object]] = {
+    group: range(1, count + 1) for group, count in (("tension", MOST_CABLES), ("frequency", MODES))
+}
 GROUPS = {
-    "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
-    "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
-    "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
-    "greatest_wrench": tuple(f"greatest_wrench_{name}" for name in COMPONENTS),
-    "greatest_twist": tuple(f"greatest_twist_{name}" for name in COMPONENTS),
-    "greatest_acceleration": tuple(f"greatest_acceleration_{name}" for name in COMPONENTS),
-    "reversal_error": tuple(f"reversal_error_{name}" for name in COMPONENTS),
-    "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
-    "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),
-    "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),
-    "tension": tuple(f"tension_{number}" for number in range(1, MOST_CABLES + 1)),
-    "tangent_stiffness": tuple(f"tangent_stiffness_{name}" for name in COMPONENTS),
-    "tangent_free_stiffness": tuple(f"tangent_free_stiffness_{name}" for name in COMPONENTS),
+    group: tuple(f"{group}_{index}" for index in INDICES.get(group.removeprefix("loaded_"), COMPONENTS))
+    for group in (
+        *("compliance", "stiffness", "free_stiffness", "greatest_wrench", "greatest_twist", "greatest_acceleration"),
+        *("reversal_error", "frequency", "loaded_frequency", "displacement", "tension"),
+        *("tangent_stiffness", "tangent_free_stiffness"),
+    )
 }
 """Names that stand for several quantities: diagonals of C and of K, 1/C_ii, frequencies, and those under load."""
 
