@@ -5,8 +5,8 @@ import pytest
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.machine.leg import two_force_leg
 from kinetostat.machine.loading import load
+from kinetostat.machine.parts import two_force_leg
 
 EXTRA = (
     (Vector(0.3, 0.1, 0.0), Vector(0.02, 0.05, 0.13)),

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import AXES, X_AXIS, Y_AXIS, Z_AXIS, Vector, rotation_x
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_leg
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.link import Beam, Rigidity
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.parameters import values, with_values
+from kinetostat.machine.parts import two_force_leg
 from kinetostat.validation import comparison
 from kinetostat.validation.comparison import KNOWN, block_differences, engines, validate
 from kinetostat.validation.pieces import StrutPiece, end_compliance, pieces

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.leg import two_force_legs
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration
+from kinetostat.machine.parts import two_force_legs
 from kinetostat.studies.analysis import analyze
 from numeric import answer, array
 

@@ -12,9 +12,10 @@ from geometry import displacements, rotations, vectors
 from kinetostat.algebra.screw import force_along
 from kinetostat.algebra.vector import AXES, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinetostatics.leg import free_springs_as_joints
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_leg
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
 from kinetostat.machine.leg_screws import reciprocal_wrenches
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
+from kinetostat.machine.parts import two_force_leg
 from numeric import U, screw
 
 FEW = 1e3 * U

@@ -16,10 +16,11 @@ from kinetostat.kinetostatics.loading import (
     sum_of,
 )
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_leg
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration, springs
+from kinetostat.machine.parts import two_force_leg
 from numeric import answer, screw, vector
 
 LOAD = Wrench(Vector(3.0, -7.0, 5.0), Vector(40.0, 25.0, -90.0))

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, cos, is_infinite, is_zero, reciprocal, sin
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
-from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
+from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg_screws import LegScrews, TwoCentres, reciprocal_wrenches, two_centres, work_on_free
 from kinetostat.tolerances import SAME_CENTRE
@@ -392,44 +392,6 @@ def _loads(spring: Spring, twist: Twist, wrenches: Sequence[Wrench], lines: Sequ
     if is_zero(spring.stiffness):
         return tuple(work_on_free(wrench, twist) for wrench in wrenches)
     return tuple(wrench.work(twist) for wrench in wrenches)
-
-
-def two_force_leg(
-    name: str, base_joint: Vector, platform_joint: Vector, stiffness: Scalar, axial: Scalar = RIGID
-) -> Leg:
-    """U-P-S with the prismatic joint actuated: it carries a force along its line and nothing else.
-
-    Source: theory (2); row a_i of A over rho_i in eqs. 1-4.
-
-    Args:
-        name: the name of the leg.
-        base_joint, platform_joint: centres of the universal and of the spherical joint, base frame, m.
-        stiffness: the stiffness of the actuator, N/m.
-        axial: EA of the leg's cross-section, N: the leg is stretched over its whole length.
-    """
-    span = platform_joint - base_joint
-    size = span.norm()
-    along = span * reciprocal(size)
-    springs = [Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True)]
-    if not is_infinite(axial):
-        springs.append(Spring(PartName(name, "rod"), Joint(along), axial * reciprocal(size)))
-    chain: tuple[Element, ...] = (
-        *revolutes(base_joint, AXES, f"{name} base joint"),
-        *springs,
-        *revolutes(platform_joint, AXES, f"{name} platform joint"),
-    )
-    return Leg(name, chain, (Line(platform_joint, along),))
-
-
-def two_force_legs(
-    base_joints: Sequence[Vector],
-    platform_joints: Sequence[Vector],
-    stiffness: Sequence[Scalar],
-    axial: Scalar = RIGID,
-) -> list[Leg]:
-    """Actuated U-P-S legs "leg 1", "leg 2", ... between joint centres (base frame, m) with their actuators (N/m)."""
-    pairs = zip(base_joints, platform_joints, stiffness, strict=True)
-    return with_numbers(two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1))
 
 
 def with_numbers(legs: Iterable[Leg]) -> list[Leg]:

@@ -1,4 +1,4 @@
-"""Parts from which families are built: joints with a servo, links that may be flexible, pairs of bars.
+"""Parts from which families are built: joints with a servo, links that may be flexible, struts, pairs of bars.
 
 This file knows no family. A stiffness is "rigid by form" if it is the Python float infinity, as many defaults are, and
 "zero by form" if it is the float 0.0. A part that is rigid by form has no spring, and a joint whose stiffness is zero
@@ -12,9 +12,20 @@ from dataclasses import replace
 from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, reciprocal
-from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
+from kinetostat.algebra.vector import AXES, Z_AXIS, Displacement, Vector
 from kinetostat.frozen import dataclass
-from kinetostat.machine.leg import RIGID, Element, Joint, Line, PartName, Spring, series
+from kinetostat.machine.leg import (
+    RIGID,
+    Element,
+    Joint,
+    Leg,
+    Line,
+    PartName,
+    Spring,
+    revolutes,
+    series,
+    with_numbers,
+)
 from kinetostat.machine.link import Parallelogram, link_axes
 from kinetostat.spec.fields import Quantity, table
 
@@ -79,6 +90,50 @@ def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:
     The driven joint has the name of its actuator, so that its coordinate and its load stand under one name.
     """
     return joint if is_zero(stiffness) else Spring(name, replace(joint, name=name), stiffness, actuated=True)
+
+
+def two_force_leg(
+    name: str,
+    base_joint: Vector,
+    platform_joint: Vector,
+    stiffness: Scalar,
+    axial: Scalar = RIGID,
+    axes: Sequence[Vector] = AXES,
+) -> Leg:
+    """Return a leg with an actuated slide between two joints: it carries a force along their line and nothing else.
+
+    Source: theory (2); row a_i of A over rho_i in eqs. 1-4.
+
+    Args:
+        name: the name of the leg.
+        base_joint, platform_joint: centres of the two joints, base frame, m.
+        stiffness: the stiffness of the actuator, N/m.
+        axial: EA of the leg's cross-section, N: the leg is stretched over its whole length.
+        axes: axes of each of the two joints: all three for U-P-S, whose spin about itself changes nothing, and z alone
+            for R-P-R in the x-y plane.
+    """
+    span = platform_joint - base_joint
+    length = span.norm()
+    along = span * reciprocal(length)
+    chain: tuple[Element, ...] = (
+        *revolutes(base_joint, axes, f"{name} base joint"),
+        Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True),
+        *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(axial, length))),
+        *revolutes(platform_joint, axes, f"{name} platform joint"),
+    )
+    return Leg(name, chain, (Line(platform_joint, along),))
+
+
+def two_force_legs(
+    base_joints: Sequence[Vector],
+    platform_joints: Sequence[Vector],
+    stiffness: Sequence[Scalar],
+    axial: Scalar = RIGID,
+    axes: Sequence[Vector] = AXES,
+) -> list[Leg]:
+    """Two-force legs "leg 1", "leg 2", ... between joint centres, base frame, m; arguments as for `two_force_leg`."""
+    rows = enumerate(zip(base_joints, platform_joints, stiffness, strict=True), 1)
+    return with_numbers(two_force_leg(f"leg {i}", base, top, k, axial, axes) for i, (base, top, k) in rows)
 
 
 @dataclass(frozen=True)

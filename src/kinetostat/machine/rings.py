@@ -24,12 +24,11 @@ from kinetostat.machine.leg import (
     PartName,
     Spring,
     revolutes,
-    two_force_legs,
     with_numbers,
 )
 from kinetostat.machine.links import LinkKind, in_each_leg, straight_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.machine.parts import Arm, if_elastic, per_length
+from kinetostat.machine.parts import Arm, if_elastic, per_length, two_force_legs
 from kinetostat.spec.fields import Field, Quantity, made_table, quantities, table
 
 Three = tuple[float, float, float]

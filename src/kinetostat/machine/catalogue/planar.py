@@ -11,10 +11,10 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector, rotation_z
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, with_numbers
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring
 from kinetostat.machine.links import LinkKind, in_each_leg, straight_legs
 from kinetostat.machine.machine import Configuration, Family, Plane
-from kinetostat.machine.parts import Arm, if_elastic, per_length
+from kinetostat.machine.parts import Arm, if_elastic, per_length, two_force_legs
 from kinetostat.machine.rings import (
     CrankLinks,
     PlacedLeg,
@@ -59,32 +59,8 @@ class SlideStiffness:
 def planar_3rpr(geometry: SlideGeometry, stiffness: SlideStiffness, pose: Pose) -> Configuration:
     """The 3-RPR at a pose, in closed form; every pose can be reached while no leg limits are given (SI, base frame)."""
     platform, joints = platform_and_joints(geometry, pose)
-    legs = [
-        planar_leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
-        for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
-    ]
-    return Configuration(platform, tuple(with_numbers(legs)), (), geometry.size, Plane())
-
-
-def planar_leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar) -> Leg:
-    """Return a leg R-P-R with an actuated slide: it carries a force along the line of its joints.
-
-    Args:
-        name: the name of the leg.
-        base, tip: its joints on the base and on the platform, base frame, m.
-        stiffness: the stiffness of the actuator, N/m.
-        axial: axial rigidity EA, N.
-    """
-    span = tip - base
-    length = span.norm()
-    along = span * reciprocal(length)
-    chain: tuple[Element, ...] = (
-        Joint(Z_AXIS, base, f"{name} base joint"),
-        Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True),
-        *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(axial, length))),
-        Joint(Z_AXIS, tip, f"{name} platform joint"),
-    )
-    return Leg(name, chain, (Line(tip, along),))
+    legs = two_force_legs(*joints, stiffness.actuator, stiffness.leg_axial, [Z_AXIS])
+    return Configuration(platform, tuple(legs), (), geometry.size, Plane())
 
 
 @table
