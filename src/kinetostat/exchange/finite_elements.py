@@ -174,29 +174,17 @@ def _constants(matrix: Array) -> Iterator[str]:
 
 
 def write_nastran(analysis: Analysis, path: Path) -> list[Path]:
-    """Write K as Nastran bulk data.
-
-    Raises:
-        InputError: if K is not finite.
-    """
+    """Write K as Nastran bulk data; errors are those of `tool_stiffness`."""
     return _write(nastran_text, analysis, path)
 
 
 def write_abaqus(analysis: Analysis, path: Path) -> list[Path]:
-    """Write K as a user element for Abaqus.
-
-    Raises:
-        InputError: if K is not finite.
-    """
+    """Write K as a user element for Abaqus; errors are those of `tool_stiffness`."""
     return _write(abaqus_text, analysis, path)
 
 
 def write_ansys(analysis: Analysis, path: Path) -> list[Path]:
-    """Write K as commands for Ansys.
-
-    Raises:
-        InputError: if K is not finite.
-    """
+    """Write K as commands for Ansys; errors are those of `tool_stiffness`."""
     return _write(ansys_text, analysis, path)
 
 

@@ -74,21 +74,13 @@ COLOURS = {
 
 
 def write(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the model.
-
-    Raises:
-        InputError: if the machine has a part that MuJoCo has no counterpart for.
-    """
+    """Write the model; errors are those of `text_of`."""
     write_text(path, text_of(analysis))
     return [path]
 
 
 def write_vibrating(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the model with the machine's own masses and without damping.
-
-    Raises:
-        InputError: if the machine has a part that MuJoCo has no counterpart for, or no mass that could vibrate.
-    """
+    """Write the model with the machine's own masses and without damping; errors are those of `text_of`."""
     write_text(path, text_of(analysis, vibrating=True))
     return [path]
 

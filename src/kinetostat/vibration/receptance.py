@@ -188,10 +188,12 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     with_mass = modes.ringing
     kept = with_mass if count is None else min(count, with_mass)
     friction = damping.friction
-    least = UNRESISTED * float(np.abs(friction).max())
-    creeping, turns = _principal_friction(friction[with_mass:, with_mass:], least)
-    without_mass = with_mass + np.arange(turns.shape[1])
-    creep, free = turns[:, : len(creeping)], turns[:, len(creeping) :]
+    # Along the principal directions of the friction among motions without mass, some creep, and the others are free.
+    sizes, directions = np.linalg.eigh(friction[with_mass:, with_mass:])
+    sizes, directions = sizes[::-1], directions[:, ::-1]
+    creeping = sizes[sizes > UNRESISTED * float(np.abs(friction).max())]
+    creep, free = np.split(directions, [len(creeping)], axis=1)
+    without_mass = with_mass + np.arange(len(sizes))
     # What follows at once: modes with mass that are no states, and motions without mass that no friction slows.
     direct_inputs, direct_outputs = (
         np.concatenate([rows[:, kept:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
@@ -222,19 +224,3 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
         d=direct_outputs @ direct_inputs.T,
         states=tuple(states),
     )
-
-
-def _principal_friction(friction: Array, least: float) -> tuple[Array, Array]:
-    """Return the principal frictions of the motions without mass, of which those with friction creep.
-
-    Args:
-        friction: friction between these motions, s [n x n].
-        least: friction up to which it is round-off, s.
-
-    Returns:
-        The frictions beyond round-off, the greatest first [k]; all principal directions as columns [n x n], in the same
-        order.
-    """
-    sizes, directions = np.linalg.eigh(friction)
-    sizes, directions = sizes[::-1], directions[:, ::-1]
-    return sizes[sizes > least], directions

@@ -39,14 +39,7 @@ from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
 from kinetostat.vibration.inertia import energies, energy_of, leg_rates, platform_inertia, platform_rates
-from kinetostat.vibration.modes import (
-    frequencies,
-    hertz,
-    mass_matrix,
-    motions_left_out,
-    solved_modes,
-    stiffness_matrix,
-)
+from kinetostat.vibration.modes import frequencies, hertz, mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
 EQUAL_SQUARES = 1e-9
 """Relative difference of the squares of two frequencies up to which they count as equal: far above round-off, and far
