@@ -85,7 +85,11 @@ class Observation:
         return self._over_sigma(self._values(target.in_frame, deflection))
 
     def linearisation(self, values: Array) -> tuple[Array, Array]:
-        """The residuals, and how each falls per unit of each unknown [rows x unknowns]."""
+        """The residuals, and how each falls per unit of each unknown [rows x unknowns], theory (64).
+
+        Errors of geometry displace the tool of the drawn machine, and springs with their errors of compliance deflect
+        it; the target on it is then seen from the measuring frame.
+        """
         model, errors, per_spring = self.model, self.errors(values), self._deflections_per_spring
         deflection = per_spring @ (1.0 + errors[self._first_spring :])
         wanted = set(np.flatnonzero(self.error_mix.any(axis=1)).tolist())
@@ -217,7 +221,7 @@ class _Target:
         shifts = twists[:, 3:] + np.swapaxes(cross(np.swapaxes(turns, 1, 2), self.arm[:, None]), 1, 2)
         from_frame = self.tool + self.arm - self.origin
         for column, path in enumerate(paths):
-            # What the frame does, the target does the other way in it.
+            # A motion of the frame moves the target the other way in it.
             if path in FRAME_UNKNOWNS[:3]:
                 axis = _turn_axis(self.frame, FRAME_UNKNOWNS.index(path))
                 turns[:, :, column], shifts[:, :, column] = -axis, -np.cross(axis, from_frame)

@@ -133,7 +133,7 @@ def _common_combinations(observed: Observation, sizes: Array, basis: Array) -> I
         sizes: plausible size of each unknown, SI [unknowns].
         basis: the combinations that are not seen, as columns [unknowns x k].
     """
-    base, platform = _common_motions(observed, sizes, False), _common_motions(observed, sizes, True)
+    base, platform = (_common_motions(observed, sizes, at_end=end) for end in (False, True))
     frame, target = _place_motions(observed, sizes, FRAME_UNKNOWNS), _place_motions(observed, sizes, TARGET_UNKNOWNS)
     for number, (motion, preposition, axis) in enumerate(COMMON_MOTIONS):
         of_base = f"A common {motion} of all base joints {preposition} {axis}"
@@ -177,9 +177,10 @@ def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[i
         twist = unit + np.concatenate([np.zeros(3), np.cross(centre, unit[:3])])
         legs = range(len(observed.model.rows.legs))
         by_leg = [_values_of_leg(observed, leg, -twist if at_end else twist, at_end) for leg in legs]
-        values = sum((of_leg for of_leg in by_leg if of_leg is not None), np.zeros(len(sizes)))
-        if values.any() and not any(of_leg is None for of_leg in by_leg):
-            result[number] = values / sizes
+        feasible = [values for values in by_leg if values is not None]
+        together = sum(feasible, np.zeros(len(sizes)))
+        if together.any() and len(feasible) == len(by_leg):
+            result[number] = together / sizes
     return result
 
 
@@ -204,9 +205,8 @@ def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) 
     goal = effects(row, rows, [motion], coordinates)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
         return values
-    numbers = [n for n, error in enumerate(observed.error_numbers) if 0 <= error < len(sources)]
-    of_leg = {n: sources[observed.error_numbers[n]] for n in numbers}
-    of_leg = {n: source for n, source in of_leg.items() if {insertion.leg for insertion in source[1]} == {leg}}
+    errors = {n: sources[number] for n, number in enumerate(observed.error_numbers) if 0 <= number < len(sources)}
+    of_leg = {n: source for n, source in errors.items() if {insertion.leg for insertion in source[1]} == {leg}}
     if not of_leg:
         return None
     columns = effects(row, rows, [*of_leg.values()], coordinates)
@@ -252,7 +252,7 @@ def _unseen_combination(words: str, combination: Array, observed: Observation, t
     motions = twists @ values
     remaining = motions - _made_by_frames(motions, observed)
     tool, inside = (float(np.linalg.norm(each[:, 3:], axis=1).max()) for each in (motions, remaining))
-    return Unseen(words, parts, tool, inside if inside > ROUND_OFF_OF_MOTION * tool else 0.0)
+    return Unseen(words=words, parts=parts, tool=tool, inside=inside if inside > ROUND_OFF_OF_MOTION * tool else 0.0)
 
 
 def _made_by_frames(motions: Array, observed: Observation) -> Array:
