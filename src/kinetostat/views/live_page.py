@@ -15,7 +15,7 @@ from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,6 +51,9 @@ from kinetostat.views.page import whole_page
 from kinetostat.views.scene.anatomy import Anatomy, Proportions, anatomy, proportions_of
 from kinetostat.views.scene.leg_solids import rail_ends
 from kinetostat.views.scene.machine_scene import has_open_frame, plates
+
+if TYPE_CHECKING:
+    from kinetostat.motion.rigid import MotionPlan
 
 TEMPLATES = Path(__file__).with_name("live")
 LENGTH_RANGE, ANGLE_RANGE, SHARE_RANGE = 0.4, math.radians(30.0), 0.5
@@ -189,7 +192,7 @@ def _bodies(functions: MachineFunctions) -> dict[str, Body]:
     return bodies | _bodies_at_rest(functions, plan) if functions.rests else bodies
 
 
-def _quantity_bodies(functions: MachineFunctions, names: Sequence[str], plan: Any) -> dict[str, Body]:
+def _quantity_bodies(functions: MachineFunctions, names: Sequence[str], plan: "MotionPlan | None") -> dict[str, Body]:
     """Return the programs of quantities of the free machine, and that of its modes if they need it."""
     counts = functions.mode_counts or ModeCounts()
     modes = ModeCounts(free=counts.free) if counts.free else None
@@ -201,7 +204,7 @@ def _quantity_bodies(functions: MachineFunctions, names: Sequence[str], plan: An
     return {"quantities": quantities.body, "springs": springs.body}
 
 
-def _bodies_at_rest(functions: MachineFunctions, plan: Any) -> dict[str, Body]:
+def _bodies_at_rest(functions: MachineFunctions, plan: "MotionPlan | None") -> dict[str, Body]:
     """Return the programs of states of rest: the first step, every later one, what holds there, and its modes."""
     parts = functions.specimen, functions.form, functions.closed
     counts = functions.mode_counts or ModeCounts()

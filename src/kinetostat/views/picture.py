@@ -6,6 +6,7 @@ The parts of the renderer (camera, visibility, light, ground) join here; it need
 import io
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -126,16 +127,10 @@ def picture(
     """
     _check_size(size)
     paper = PAPERS[choice(theme, PAPERS, "theme")]
-    hidden = several(hidden)
-    for layer in hidden:
-        choice(layer, LAYERS, "hidden")
-    solids = [solid for solid in scene.solids if solid.layer not in hidden]
-    if not solids:
-        raise InputError(f"hidden leaves nothing to draw; hide fewer of {', '.join(LAYERS)}.")
-    opaque_solids = [solid for solid in solids if LOOKS[solid.material].opacity == 1.0]
-    bodies = _bodies_of(solids, opaque_solids)
-    points = np.concatenate([body.points for body in bodies])
-    camera = camera_on(points, _direction(view), *size)
+    scene = _without_layers(scene, several(hidden))
+    opaque_solids = [solid for solid in scene.solids if LOOKS[solid.material].opacity == 1.0]
+    bodies = _bodies_of(scene.solids, opaque_solids)
+    camera = camera_on(np.concatenate([body.points for body in bodies]), _direction(view), *size)
     hits = [hits_of(body, camera, SAMPLES_PER_SIDE) for body in bodies]
     foot = np.array([*scene.centre.components()[:2], scene.floor], dtype=float)
     ground = Ground(foot, scene.size, min(LARGEST_GROUND_MAP, max(size) // 2))
@@ -143,10 +138,24 @@ def picture(
     *lights, on_ground = _lights(hits, ground, casters, max(size))
     machine = _solids_seen(hits, lights, camera, paper.brightness)
     image = Image.fromarray(_pixels(machine, *veil_over(ground, on_ground, camera), paper, transparent))
-    _draw_labels(image, [label for label in scene.labels if label.layer not in hidden], camera)
+    _draw_labels(image, scene.labels, camera)
     stream = io.BytesIO()
     (image if transparent else image.convert("RGB")).save(stream, "PNG")
     return Picture(stream.getvalue())
+
+
+def _without_layers(scene: Scene, hidden: Collection[str]) -> Scene:
+    """Return a scene without some layers.
+
+    Raises:
+        InputError: one of them is unknown, or nothing is left to draw.
+    """
+    for layer in hidden:
+        choice(layer, LAYERS, "hidden")
+    solids = tuple(solid for solid in scene.solids if solid.layer not in hidden)
+    if not solids:
+        raise InputError(f"hidden leaves nothing to draw; hide fewer of {', '.join(LAYERS)}.")
+    return replace(scene, solids=solids, labels=tuple(label for label in scene.labels if label.layer not in hidden))
 
 
 def _bodies_of(solids: Sequence[Solid], opaque: Sequence[Solid]) -> list[Triangles]:
@@ -171,7 +180,7 @@ def _direction(view: str | Sequence[float]) -> Sequence[float]:
 
 
 def _lights(hits: Sequence[Hits], ground: Ground, casters: Triangles, detail: int) -> list[Light]:
-    """The light on the samples of each body, and on the ground; computed together, so that lamps are set up once."""
+    """Return the light on the samples of each body and on the ground: together, so that lamps are set up once."""
     ends = np.cumsum([len(body.points) for body in hits])
     points = np.concatenate([*(body.points for body in hits), ground.points])
     up = np.broadcast_to((0.0, 0.0, 1.0), (len(points) - ends[-1], 3))
