@@ -9,7 +9,6 @@ pose by pose, and a make file. Nothing but libm is needed.
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from string import Template
@@ -35,7 +34,7 @@ from kinetostat.engine.modes import spring_parts_of
 from kinetostat.engine.points import PointTable
 from kinetostat.engine.printed import literal, print_graph
 from kinetostat.engine.rest import MOST_NEWTON_STEPS, step_of
-from kinetostat.engine.trace import Body
+from kinetostat.engine.trace import Body, Operand
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.formats import ascii_line
@@ -150,36 +149,62 @@ class PrintedProgram:
 
 def _programs(functions: MachineFunctions) -> Iterator[PrintedProgram]:
     """Print the formulas that the functions of a machine need."""
-    kind, form, closed = functions.specimen, functions.form, functions.closed
-    # Limits of loads need a state of rest, which only functions of what is under load are given.
-    entries = objectives_of(kind, form, each_alone(ENTRIES), TraceOptions(closed=closed, limited=False))
-    yield _program(functions, "entries_at", entries.body)
-    placement, count = functions.placement, len(functions.actuators)
-    body, inputs = placement.formula.body, placement.formula.inputs
-    driven = Body(body.fixed, body.columns, body.results[:count], body.code)
-    yield _program(functions, "actuators_at", driven)
-    yield _program(functions, "actuator_slopes_at", with_gradients(driven, inputs))
+    bodies = _bodies_of_poses(functions)
     if functions.rests:
-        yield _program(functions, "first_steps_at", step_of(kind, form, closed, "first").body)
-        yield _program(functions, "step_at", step_of(kind, form, closed).body)
-        displacements = objectives_of(kind, form, each_alone(DISPLACEMENTS), TraceOptions(closed=closed))
-        yield _program(functions, "displacement_at", displacements.body)
-        places = Body(body.fixed, body.columns, body.results[count : count + PLACE], body.code)
-        sloped = with_gradients(places, inputs).results
-        yield _program(functions, "placement_at", Body(body.fixed, body.columns, [*driven.results, *sloped], body.code))
+        bodies |= _bodies_at_rest(functions)
     if functions.quantities:
-        plan = plan_for(functions.machine, functions.quantities, functions.inputs)
-        counts = functions.mode_counts
-        if counts and counts.free:
-            yield _program(functions, "springs_at", spring_parts_of(kind, form, closed, at_rest=False).body)
-        if counts and counts.at_rest:
-            yield _program(functions, "springs_at_rest_at", spring_parts_of(kind, form, closed, at_rest=True).body)
-        options = TraceOptions(closed=closed, limited=functions.needs_state, plan=plan, mode_counts=counts)
-        traced = partial(objectives_of, kind, form, each_alone(functions.quantities), options)
-        yield _program(functions, "quantities_at", traced().body)
-        formula = traced(functions.inputs)
-        inputs = formula.inputs[: len(functions.inputs)]
-        yield _program(functions, "quantity_slopes_at", with_gradients(formula.body, inputs))
+        bodies |= _bodies_of_quantities(functions)
+    for name, body in bodies.items():
+        yield _program(functions, name, body)
+
+
+def _bodies_of_poses(functions: MachineFunctions) -> dict[str, Body]:
+    """Return the bodies of programs of K, C and the actuators at a pose."""
+    placement = functions.placement.formula
+    actuators = _part_of(placement.body, placement.body.results[: len(functions.actuators)])
+    # Limits of loads need a state of rest, which only functions of what is under load are given.
+    options = TraceOptions(closed=functions.closed, limited=False)
+    return {
+        "entries_at": objectives_of(functions.specimen, functions.form, each_alone(ENTRIES), options).body,
+        "actuators_at": actuators,
+        "actuator_slopes_at": with_gradients(actuators, placement.inputs),
+    }
+
+
+def _bodies_at_rest(functions: MachineFunctions) -> dict[str, Body]:
+    """Return the bodies of programs of Newton's steps to rest, of the displacement there, and of the tool's rates."""
+    kind, form, closed = functions.specimen, functions.form, functions.closed
+    placement, count = functions.placement.formula, len(functions.actuators)
+    actuators, tool = placement.body.results[:count], placement.body.results[count : count + PLACE]
+    tool_with_gradients = with_gradients(_part_of(placement.body, tool), placement.inputs).results
+    return {
+        "first_steps_at": step_of(kind, form, closed, "first").body,
+        "step_at": step_of(kind, form, closed).body,
+        "displacement_at": objectives_of(kind, form, each_alone(DISPLACEMENTS), TraceOptions(closed=closed)).body,
+        "placement_at": _part_of(placement.body, [*actuators, *tool_with_gradients]),
+    }
+
+
+def _bodies_of_quantities(functions: MachineFunctions) -> dict[str, Body]:
+    """Return the bodies of programs of quantities with their derivatives, and of the springs of which modes are."""
+    kind, form, closed, counts = functions.specimen, functions.form, functions.closed, functions.mode_counts
+    bodies = {}
+    if counts and counts.free:
+        bodies["springs_at"] = spring_parts_of(kind, form, closed, at_rest=False).body
+    if counts and counts.at_rest:
+        bodies["springs_at_rest_at"] = spring_parts_of(kind, form, closed, at_rest=True).body
+    plan = plan_for(functions.machine, functions.quantities, functions.inputs)
+    options = TraceOptions(closed=closed, limited=functions.needs_state, plan=plan, mode_counts=counts)
+    objectives = each_alone(functions.quantities)
+    bodies["quantities_at"] = objectives_of(kind, form, objectives, options).body
+    formula = objectives_of(kind, form, objectives, options, functions.inputs)
+    bodies["quantity_slopes_at"] = with_gradients(formula.body, formula.inputs[: len(functions.inputs)])
+    return bodies
+
+
+def _part_of(body: Body, results: Sequence[Operand]) -> Body:
+    """Return the body that gives only some results, or others that are made of them."""
+    return Body(body.fixed, body.columns, results, body.code)
 
 
 def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgram:
