@@ -13,10 +13,10 @@ from kinetostat.kinematics.limits import Check, why_beyond
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status, respond
 from kinetostat.machine.limits import LIMITS
+from kinetostat.machine.links import rods
 from kinetostat.machine.loading import as_toml, build, bundled
 from kinetostat.machine.loading import load as load_bundled
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.machine.rods import rods
 from kinetostat.spec import document
 from kinetostat.studies.analysis import analyze
 from kinetostat.tolerances import LIMIT_SLACK

@@ -26,9 +26,9 @@ from kinetostat.kinematics.closing import platform_placement
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Leg
+from kinetostat.machine.links import Rod, rods
 from kinetostat.machine.loads import gravity_of, load_on_platform, platform_masses
 from kinetostat.machine.machine import Chains, Machine
-from kinetostat.machine.rods import Rod, rods
 from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.numerics.polytopes import capacity, wrench_closure

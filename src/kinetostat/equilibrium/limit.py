@@ -27,8 +27,8 @@ from kinetostat.equilibrium.tangent import Stability, stabilities, stability
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.links import rods
 from kinetostat.machine.machine import Member
-from kinetostat.machine.rods import rods
 from kinetostat.tolerances import ACCURACY_OF_SHARE
 
 STEP_RATIO = 2.0

@@ -21,10 +21,10 @@ from kinetostat.machine.common_tables import COMMON, Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import LIMITS, OF_DRIVES, is_set, limits_set, unloaded_parts
 from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.links import driven_slides, rods
 from kinetostat.machine.loading import load
 from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.machine.rods import driven_slides, rods
 from kinetostat.machine.saving import as_file
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key, toml_pairs, toml_value

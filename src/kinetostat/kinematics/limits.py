@@ -13,8 +13,8 @@ from kinetostat.display import Display
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import About, Limit, Parts, limits_set
+from kinetostat.machine.links import driven_slides
 from kinetostat.machine.machine import Chains, Configuration, Machine
-from kinetostat.machine.rods import driven_slides
 from kinetostat.tolerances import LIMIT_SLACK
 
 DIGITS_OF_LIMIT = 6

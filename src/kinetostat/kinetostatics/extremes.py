@@ -16,8 +16,8 @@ from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.leg_screws import comparable
+from kinetostat.machine.links import rods
 from kinetostat.machine.machine import springs
-from kinetostat.machine.rods import rods
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
 SPACE = 3

@@ -15,8 +15,8 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.column import plain
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
+from kinetostat.machine.links import rods
 from kinetostat.machine.machine import Chains, Configuration
-from kinetostat.machine.rods import rods
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
 TRIAL_MOTION = 1e-4

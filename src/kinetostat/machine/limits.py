@@ -17,7 +17,7 @@ from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.display import ENGINEERING
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Leg, Spring
-from kinetostat.machine.rods import Rod, rods
+from kinetostat.machine.links import Rod, rods
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.units import KINDS

@@ -20,11 +20,11 @@ from kinetostat.machine.cross_section import resolve
 from kinetostat.machine.drives import check_own_drives, family_with_own_drives
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
+from kinetostat.machine.links import driven_slides
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import form_of, remove_replaced_form, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find_field, numbered_entry, with_values
-from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY, Plan
 from kinetostat.spec import document as documents
