@@ -183,14 +183,8 @@ def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
         return _catalogue(machine, table, fields, where)
     name = f"{where} ({fields[0].path})"
     ratios = _ratios(table, fields, name)
-    numbers = values(machine)
-    initial = float(numbers[fields[0].leaves[0]]) / ratios[0]
-    if table.fixed:
-        low = high = initial
-    else:
-        low, high = (_bound(end, fields[0].quantity, f"{name}.{key}") for key, end in _ends(table, name))
-        if low >= high:
-            raise InputError(f"{name}: from is {table.start} and must be less than to, {table.end}; exchange them.")
+    initial = float(values(machine)[fields[0].leaves[0]]) / ratios[0]
+    low, high = (initial, initial) if table.fixed else _bounds(table, fields[0].quantity, name)
     return Variable(
         fields=fields,
         ratios=ratios,
@@ -204,10 +198,18 @@ def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
     )
 
 
-def _ends(table: VariableTable, name: str) -> list[tuple[str, float | str]]:
+def _bounds(table: VariableTable, quantity: Quantity, name: str) -> tuple[float, float]:
+    """The bounds of a variable that is searched, SI.
+
+    Raises:
+        InputError: a bound is missing, cannot be read or is infinite, or the lower one is not below the upper one.
+    """
     if table.start is None or table.end is None:
         raise InputError(f'{name} needs from and to, e.g. from = "10 cm", to = "14 cm"; or choices, or fixed = true.')
-    return [("from", table.start), ("to", table.end)]
+    low, high = _bound(table.start, quantity, f"{name}.from"), _bound(table.end, quantity, f"{name}.to")
+    if low >= high:
+        raise InputError(f"{name}: from is {table.start} and must be less than to, {table.end}; exchange them.")
+    return low, high
 
 
 def _ratios(table: VariableTable, fields: Sequence[Parameter], name: str) -> tuple[float, ...]:
@@ -227,28 +229,28 @@ def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, 
     for k, row in enumerate(rows):
         if len(row) != len(fields):
             raise InputError(f"{name}.choices.{k} has {len(row)} values; give one for each of {len(fields)} fields.")
-    read = [
-        [_value(v, f.quantity, f"{name}.choices.{k}") for v, f in zip(r, fields, strict=True)]
-        for k, r in enumerate(rows)
+    choices = [
+        [_value(written, field.quantity, f"{name}.choices.{k}") for written, field in zip(row, fields, strict=True)]
+        for k, row in enumerate(rows)
     ]
     labels = table.labels or [", ".join(str(value) for value in row) for row in rows]
     if len(labels) != len(rows):
         raise InputError(f"{name}.labels has {len(labels)} entries; give one for each of {len(rows)} choices.")
     numbers = values(machine)
-    present = [[float(numbers[leaf]) for leaf in field.leaves] for field in fields]
-    same = [k for k, row in enumerate(read) if all({v} == set(leaves) for v, leaves in zip(row, present, strict=True))]
-    if table.fixed and not same:
+    present = [{float(numbers[leaf]) for leaf in field.leaves} for field in fields]
+    matching = [k for k, choice in enumerate(choices) if [{value} for value in choice] == present]
+    if table.fixed and not matching:
         raise InputError(f"{name} is fixed, but the machine has none of its choices; set it to one of them.")
     return Variable(
         fields=fields,
         ratios=(1.0,) * len(fields),
         low=0.0,
         high=len(rows) - 1.0,
-        choices=np.array(read, dtype=float),
+        choices=np.array(choices, dtype=float),
         labels=tuple(labels),
         fixed=table.fixed,
         tolerance=0.0,
-        initial=float(same[0]) if same else -1.0,
+        initial=float(matching[0]) if matching else -1.0,
     )
 
 
@@ -256,19 +258,19 @@ def _tolerance(table: VariableTable, field: Parameter, name: str) -> float:
     if table.tolerance is None:
         return 0.0
     try:
-        read = parse(table.tolerance, field.quantity.kind)  # a tolerance need not be in the range of its field
+        tolerance = parse(table.tolerance, field.quantity.kind)  # a tolerance need not be in the range of its field
     except UnitError as error:
         raise InputError(f"{name}.tolerance is {shorten(table.tolerance)}: {error}.") from None
-    if not 0.0 <= read < math.inf:
+    if not 0.0 <= tolerance < math.inf:
         raise InputError(f"{name}.tolerance is {shorten(table.tolerance)}; it must not be negative.")
-    return read
+    return tolerance
 
 
 def _bound(written: float | str, quantity: Quantity, name: str) -> float:
-    read = _value(written, quantity, name)
-    if math.isinf(read):
+    bound = _value(written, quantity, name)
+    if math.isinf(bound):
         raise InputError(f"{name} cannot be {shorten(written)}; give a large value, or use choices.")
-    return read
+    return bound
 
 
 def _value(written: float | str, quantity: Quantity, name: str) -> float:
@@ -322,9 +324,9 @@ def read_poses(machine: Machine, table: PosesTable) -> PoseSet:
 
 def _list_columns(machine: Machine, rows: Sequence[Mapping[str, float | str]]) -> dict[str, Array]:
     numbers = values(machine)
-    read = [_row(machine, row, f"poses.list.{i}") for i, row in enumerate(rows)]
-    paths = dict.fromkeys(path for row in read for path in row)
-    return {path: np.array([row.get(path, float(numbers[path])) for row in read]) for path in paths}
+    poses = [_row(machine, row, f"poses.list.{i}") for i, row in enumerate(rows)]
+    paths = dict.fromkeys(path for pose in poses for path in pose)
+    return {path: np.array([pose.get(path, float(numbers[path])) for pose in poses]) for path in paths}
 
 
 def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[str, float]:
