@@ -104,10 +104,10 @@ def _loaded_parts(state: "LoadedState", full: bool) -> Iterator[Table | str]:
     if not state.has_rest:
         return
     display = state.machine.display
-    yield loaded.displacement_table(state, display)
-    yield loaded.springs_or_kinds_table(state, display, full)
+    yield loaded.displacement_table(state)
+    yield loaded.springs_or_kinds_table(state, full)
     yield loaded.SIGNS if state.loaded else ""
-    yield loaded.strut_table(state, display)
+    yield loaded.strut_table(state)
     yield f"Components {' '.join(state.components)} at the loaded {state.machine.reference}, base axes."
     for title, kind, rows in (
         ("Tangent stiffness", "stiffness", state.tangent),

@@ -15,7 +15,7 @@ import numpy as np
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.display import DASH, Display, Scale, number, with_minus_signs
+from kinetostat.display import DASH, Scale, number, with_minus_signs
 from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.late import LateModule
@@ -142,9 +142,9 @@ def actuator_springs(state: LoadedState) -> list[SpringState]:
     return list(first.values())
 
 
-def displacement_table(state: LoadedState, display: Display) -> FittedTable:
+def displacement_table(state: LoadedState) -> FittedTable:
     """Return the displacement of the tool under its loads, beside that of linear equations."""
-    units = component_units(state.components)
+    display, units = state.machine.display, component_units(state.components)
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
     table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
     for what, values in (("under load", state.displacement), ("to first order", state.linear)):
@@ -188,14 +188,15 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
     return table
 
 
-def springs_or_kinds_table(state: LoadedState, display: Display, full: bool = False) -> FittedTable:
+def springs_or_kinds_table(state: LoadedState, full: bool = False) -> FittedTable:
     """Return the table of the springs: each by itself where they are few or `full`, else by kind."""
     few = len(state.springs) <= MOST_LISTED_SPRINGS
-    return spring_table(state, display) if few or full else _kinds_table(state, display)
+    return spring_table(state) if few or full else _kinds_table(state)
 
 
-def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
+def _kinds_table(state: LoadedState) -> FittedTable:
     """Least and greatest load and greatest deformation of the springs of each kind, and how many are slack."""
+    display = state.machine.display
     kinds: dict[tuple[str, bool], list[SpringState]] = {}
     for spring in state.springs:
         kinds.setdefault((spring.name.removeprefix(f"{spring.leg} "), spring.turning), []).append(spring)
@@ -211,8 +212,9 @@ def _kinds_table(state: LoadedState, display: Display) -> FittedTable:
     return table
 
 
-def spring_table(state: LoadedState, display: Display) -> FittedTable:
+def spring_table(state: LoadedState) -> FittedTable:
     """Return the load, deformation and state of every spring."""
+    display = state.machine.display
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
         load = display.show(spring.load, load_unit(spring.turning))
@@ -221,8 +223,9 @@ def spring_table(state: LoadedState, display: Display) -> FittedTable:
     return table
 
 
-def strut_table(state: LoadedState, display: Display) -> FittedTable:
+def strut_table(state: LoadedState) -> FittedTable:
     """Return the compression of each strut, and the load at which it would buckle."""
+    display = state.machine.display
     table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
     for strut in state.struts:
         reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"

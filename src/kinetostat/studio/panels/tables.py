@@ -220,7 +220,7 @@ def loaded_text(state: LoadedState) -> str:
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
     ]
-    springs = as_table(springs_or_kinds_table(state, display), "")
+    springs = as_table(springs_or_kinds_table(state), "")
     return (
         paragraph(" ".join([state.message, sag_sentence(state), actuator_sentence(state)]).rstrip(), "lead")
         + heading("Which legs carry")

@@ -137,14 +137,13 @@ def _loaded_blocks(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
     if not state.has_rest:
         return
     yield Paragraph(typeset(stability_of(state)), "Stability:")
-    display = state.machine.display
-    displacements = displacement_table(state, display)
+    displacements = displacement_table(state)
     yield as_figure(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
     yield as_table(displacements, f"{displacements.title}, with exact geometry and by linear equations; base axes.")
     yield as_figure(bars_figure(state), "What each leg carries.")
-    yield as_table(springs_or_kinds_table(state, display), f"Loads and deformations of the springs. {SIGNS}")
+    yield as_table(springs_or_kinds_table(state), f"Loads and deformations of the springs. {SIGNS}")
     if state.struts:
-        yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
+        yield as_table(strut_table(state), "Struts, which bend away under Euler's load.")
     free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal.tolist()]
     tangent = tangent_table(state, free, analysis.stiffness_diagonal.tolist())
     if tangent is not None:
