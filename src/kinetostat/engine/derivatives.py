@@ -253,9 +253,8 @@ class _Routes:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
         program_inputs = program_columns(self._machine, self._form, columns, len(status))
         rates = self._equations(program_inputs, len(status))
-        program_inputs += self._state(program_inputs, len(status), closed=False) + self._known_modes(
-            columns, len(status)
-        )
+        program_inputs += self._state(program_inputs, len(status), closed=False)
+        program_inputs += self._known_modes(columns, len(status))
         objectives, partial = self._slopes(self._weights, program_inputs, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
 
@@ -292,20 +291,15 @@ class _Routes:
         return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 
     def _state(self, program_inputs: Sequence[Array], count: int, closed: bool) -> list[Array]:
-        """Return the coordinates of the states of rest, if any objective is about the machine under load."""
+        """Return the coordinates of the states of rest and their modes, if any objective is about them."""
         if not self._loaded:
             return []
-        states = StatePrograms(self._machine, self._form, closed, self._native).rest_coordinates(
-            self._fixed, program_inputs, count
-        )
+        programs = StatePrograms(self._machine, self._form, closed, self._native)
+        states = programs.rest_coordinates(self._fixed, program_inputs, count)
         if self._mode_counts is None:
             return states
-        return [
-            *states,
-            *modes_at_rest(
-                self._machine, self._form, self._fixed, [*program_inputs, *states], self._mode_counts, closed
-            ),
-        ]
+        inputs = [*program_inputs, *states]
+        return states + modes_at_rest(self._machine, self._form, self._fixed, inputs, self._mode_counts, closed)
 
     def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
         """Return the modes that programs cannot find themselves, if any objective is about them."""
@@ -317,9 +311,8 @@ class _Routes:
         results[:count] = objectives
         rows = results[count:].reshape(count, len(self._paths), results.shape[1])
         for k, path in enumerate(self._paths):
-            rows[:, k] = (
-                self._known_slopes[path] if path in self._known_slopes else slopes[:, self._differentiated.index(path)]
-            )
+            known = self._known_slopes.get(path)
+            rows[:, k] = slopes[:, self._differentiated.index(path)] if known is None else known
 
     def _slopes(
         self, weights: tuple[Weights, ...], program_inputs: Sequence[Array], codes: Codes, closed: bool = False

@@ -126,7 +126,7 @@ class RestFill:
 
     @property
     def size(self) -> int:
-        """Number of coordinates of a state of rest, where legs close loops."""
+        """Number of coordinates of a state of rest, where legs close loops; the last row is the square of a size."""
         return self._step.rows - self._count - 1
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:

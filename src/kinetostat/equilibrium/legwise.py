@@ -95,18 +95,20 @@ class CondensedLeg:
         """
         self._ways, count = mechanism.ways.astype(object), len(mechanism.actuators)
         acting = self._ways @ of_scalars(wrench)[0]
-        self.placed, here = _terms_at(leg, mechanism, row, acting)
-        self.terms = terms = _terms_at(leg, mechanism, [0.0] * leg.size, 0.0 * acting)[1] if chord else here
-        geometric = terms.geometric[0].astype(object)
+        self.placed, present = _terms_at(leg, mechanism, row, acting)
+        self.terms = present
+        geometric = present.geometric[0].astype(object)
         if chord:
             acting, geometric = 0.0 * acting, 0.0 * geometric
-        self._driven = terms.driven[0][:, :count].astype(object)
-        self.elastic, self.passive = ([k for k, s in enumerate(leg.springs) if (s is None) == free] for free in (0, 1))
-        self._opening = self._ways.T @ _gap(platform, here.end)
+            self.terms = _terms_at(leg, mechanism, [0.0] * leg.size, acting)[1]
+        self._driven = self.terms.driven[0][:, :count].astype(object)
+        self.elastic = [number for number, spring in enumerate(leg.springs) if spring is not None]
+        self.passive = [number for number, spring in enumerate(leg.springs) if spring is None]
+        self._opening = self._ways.T @ _gap(platform, present.end)
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
         self._bracket = turning_of(acting, self._ways)
-        self._close(self._ways.T @ terms.rates[0].astype(object))
-        springs, remaining = self._without_passive_motions(geometric, here.left[0].astype(object))
+        self._close(self._ways.T @ self.terms.rates[0].astype(object))
+        springs, remaining = self._without_passive_motions(geometric, present.left[0].astype(object))
         self._condense_springs(springs, remaining, of_scalars(wrench)[0])
 
     def _close(self, rates: Array) -> None:
@@ -139,12 +141,12 @@ class CondensedLeg:
         """
         self._inner = geometric[np.ix_(self.passive, self.passive)]
         self._mixed = geometric[np.ix_(self.passive, self.elastic)]
-        pushed = product(self._inner, self.passive_by_springs)
-        part = product(self.passive_by_springs.T, self._mixed - 0.5 * pushed)
-        stiff = geometric[np.ix_(self.elastic, self.elastic)] - part - part.T
+        inner_loads = product(self._inner, self.passive_by_springs)
+        half = product(self.passive_by_springs.T, self._mixed - 0.5 * inner_loads)
+        stiff = geometric[np.ix_(self.elastic, self.elastic)] - half - half.T
         for place, number in enumerate(self.elastic):
             stiff[place, place] = stiff[place, place] + self.terms.carrying[0, number]
-        self._coupling = self._mixed - pushed
+        self._coupling = self._mixed - inner_loads
         self._left = left[self.elastic] - product(self.passive_by_springs.T, left[self.passive])
         self._left_of_passive = left[self.passive]
         return stiff, self._left
@@ -260,14 +262,21 @@ def solve_condensed(lines: Array, roots: Array, turning: Array, load: Array, gap
     answers, internal_changes, sure = _shared_by_least_energy(lines, roots, gaps)
     deflections, shares = answers[:, : roots.shape[1]], answers[:, roots.shape[1] :]
     soft = symmetric_product(deflections, deflections.T)
+    # Gaps are closed by a twist of their own; what the load adds moves only what is compliant.
     root, closing = np.array(semidefinite_root(soft.tolist()), dtype=object), -(shares @ gaps)
     rates = np.eye(size) + root.T @ turning @ root
     factors = elimination(rates.tolist(), symmetric=False)
     twist = closing + root @ of_scalars(factors.solve((root.T @ (load - turning @ closing)).tolist()))[0]
     changes = shares.T @ (load - turning @ twist) + internal_changes
-    middle = 0.5 * (rates + rates.T)
-    stays = definite(elimination(middle.tolist()), middle.tolist())
-    return Condensed(root, twist, changes, middle, factors, sure & stays)
+    symmetric = 0.5 * (rates + rates.T)
+    return Condensed(
+        root=root,
+        twist=twist,
+        changes=changes,
+        rates=symmetric,
+        factors=factors,
+        stable=sure & definite(elimination(symmetric.tolist()), symmetric.tolist()),
+    )
 
 
 def _shared_by_least_energy(lines: Array, roots: Array, gaps: Array) -> tuple[Array, Array, Scalar]:
@@ -286,11 +295,11 @@ def _shared_by_least_energy(lines: Array, roots: Array, gaps: Array) -> tuple[Ar
     size, count = lines.shape[1], roots.shape[1]
     balanced, internal, margin = right_inverse(lines.T.tolist())
     mixes = np.array([*zip(*balanced, strict=True), *internal], dtype=object)
-    whole = np.concatenate([product(mixes, roots), mixes], axis=1)
+    with_springs = np.concatenate([product(mixes, roots), mixes], axis=1)
     squares = [total([part * part for part in column]) for column in roots.T.tolist()]
     squares = [1.0 if is_zero(square) else where(square > ZERO_PIVOT, square, 1.0) for square in squares]
-    modes = conjugate(whole[size:].tolist(), [1.0] * count, squares)
-    answers, internal_changes = whole[:size], np.full(len(lines), 0.0, dtype=object)
+    modes = conjugate(with_springs[size:].tolist(), [1.0] * count, squares)
+    answers, internal_changes = with_springs[:size], np.full(len(lines), 0.0, dtype=object)
     for row, inverse in zip(modes.columns, modes.inverses, strict=True):
         mode = np.array(row, dtype=object)
         shares = product(answers[:, :count], mode[:count]) * inverse
@@ -323,23 +332,22 @@ class LegwiseTangent:
         self._ways = ways = mechanism.ways.astype(object)
         size, start = ways.shape[1], carrier.size
         not_driven = np.zeros((1, len(mechanism.driven)))
-        placed = carrier.chain.place(
-            of_scalars(coordinates[:start]), np.concatenate([not_driven, mechanism.growth], axis=1)
-        )
+        amounts = np.concatenate([not_driven, mechanism.growth], axis=1)
+        placed = carrier.chain.place(of_scalars(coordinates[:start]), amounts)
         self.platform = placed.end
-        free = all(is_zero(coordinate) for coordinate in coordinates)
-        self.pulls = [pull_of(rod, None if free else self.platform) for rod in machine.rods]
+        is_free = all(is_zero(coordinate) for coordinate in coordinates)
+        self.pulls = [pull_of(rod, None if is_free else self.platform) for rod in machine.rods]
         self.slack: Scalar = 0.0
         self.rank = len(machine.rods) + sum(len(leg.springs) - leg.springs.count(None) for leg in machine.legs)
         force, self.turning = self._platform_and_rods()
         turning = 0.0 * self.turning if chord else self.turning
         self.legs: list[CondensedLeg] = []
         for leg in machine.legs:
-            row = coordinates[start : start + leg.size]
+            row, wrench = coordinates[start : start + leg.size], coordinates[start + leg.size : start + leg.size + size]
             start += leg.size + size
-            wrench = coordinates[start - size : start]
-            self.legs.append(CondensedLeg(leg, mechanism, row, wrench, self.platform, chord))
-            force, turning = force - self.legs[-1].load_taken, turning + self.legs[-1].turning
+            condensed = CondensedLeg(leg, mechanism, row, wrench, self.platform, chord)
+            self.legs.append(condensed)
+            force, turning = force - condensed.load_taken, turning + condensed.turning
         lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self.pulls]
         along = array_of(lines, len(lines), 6) @ ways
         self.lines = np.concatenate([along, *(leg.wrenches for leg in self.legs)])
@@ -384,9 +392,9 @@ class LegwiseTangent:
         force, length = self.mechanism.force[0], self.mechanism.length[0]
         loads = loads_of_rods(self._rods, self.pulls, self.twist, force)
         holding = total([leg.holding(change) for leg, change in zip(self.legs, self._changes, strict=True)])
-        done = [spring for spring, _ in loads]
+        springs_of_rods = [spring for spring, _ in loads]
         for spring, load in zip(self.mechanism.driven, holding.tolist(), strict=True):
-            if spring not in done:
+            if spring not in springs_of_rods:
                 loads.append((spring, load * (force if spring.joint.point is None else force * length)))
         return loads
 

@@ -46,8 +46,8 @@ class Place:
         platform: displacement of the platform.
         pulls: pulls of the rods.
         terms: contribution of the carrier to the equations.
-        rates: change of what is left, by the coordinates [coordinates x coordinates].
-        elastic: the part of it that springs make.
+        rates: rates of the equations' residuals by the coordinates [coordinates x coordinates].
+        elastic: the part of the rates that springs make.
         slack: number of rods that carry nothing.
     """
 
@@ -67,8 +67,8 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     placed = carrier.chain.place(row, amounts)
     platform = placed.end
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
-    free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
-    pulls = [pull_of(rod, None if free else platform) for rod in machine.rods]
+    is_free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
+    pulls = [pull_of(rod, None if is_free else platform) for rod in machine.rods]
     hold, fall = wrench_of_rods(pulls, [pull.tangent_weight for pull in pulls])
     load, change = platform_load(mechanism, platform)
     terms = leg_terms(carrier, row, load + hold, amounts, mechanism.gravity, placed)
@@ -76,7 +76,14 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
     elastic = springs + twists.T @ sum_of_dyads(pulls, [pull.elastic_weight for pull in pulls]) @ twists
-    return Place(platform, tuple(pulls), terms, rates, elastic, total([pull.slack for pull in pulls]))
+    return Place(
+        platform=platform,
+        pulls=tuple(pulls),
+        terms=terms,
+        rates=rates,
+        elastic=elastic,
+        slack=total([pull.slack for pull in pulls]),
+    )
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":
@@ -152,9 +159,9 @@ class Reduced:
             status of the pose: NOT_CONVERGED where this is not surely a stable state of rest.
         """
         tangent, mechanism = self.tangent(coordinates), self.cut.mechanism
-        displacement, good = _displacement(tangent.platform, tangent.twist)
+        displacement, turns_little = _displacement(tangent.platform, tangent.twist)
         after, square = _after(coordinates, tangent)
-        good = (square < AT_REST**2) & tangent.stable & good
+        sure = (square < AT_REST**2) & tangent.stable & turns_little
         compliance, units = tangent.compliance(), mechanism.compliance_units[0]
         result: dict[str, Any] = {
             "slack": tangent.slack,
@@ -163,11 +170,11 @@ class Reduced:
             "compliance": [compliance[i][i] * units[i, i] for i in range(6)],
         }
         if "stiffness" in wanted:
-            result["stiffness"], sure = self._stiffness_diagonal(tangent, compliance, units)
-            good = good & sure
+            result["stiffness"], stiffness_is_sure = self._stiffness_diagonal(tangent, compliance, units)
+            sure = sure & stiffness_is_sure
         if "factor" in wanted and isinstance(tangent, Tangent):
-            result["factor"], sure = tangent.factor()
-            good = good & sure
+            result["factor"], factor_is_sure = tangent.factor()
+            sure = sure & factor_is_sure
         at_rest: Scalar = int(Status.OK)
         if "actuators" in wanted:
             loads = tangent.actuator_loads()
@@ -175,7 +182,7 @@ class Reduced:
             result |= greatest_loads(loads)
             result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
             at_rest = status_with_load_limits(self.machine, response, loads, at_rest)
-        code = where(good, at_rest, int(Status.NOT_CONVERGED))
+        code = where(sure, at_rest, int(Status.NOT_CONVERGED))
         status = where(response.place_status > Status.OK + 0.5, response.place_status, code)
         return result, status_with_rest(self.machine, names, response.status, status)
 
@@ -183,13 +190,13 @@ class Reduced:
         self, tangent: "Tangent | LegwiseTangent", compliance: list[Row], units: Array
     ) -> tuple[Row, Scalar]:
         """The diagonal of K at the tool [6], and whether it is sure: infinite if rigid parts hold a component."""
-        parts = [part for part in self.components if not is_zero(compliance[part][part])]
-        moving = [[compliance[i][j] for j in parts] for i in parts]
-        by_form = isinstance(tangent, Tangent)
-        stiffness, sure = (_inverse_diagonal if by_form else _free_inverse_diagonal)(moving, tangent.rank)
-        by_part = dict.fromkeys(self.components, math.inf)
-        by_part |= {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
-        return [by_part.get(part, math.nan) for part in range(6)], sure
+        moving = [component for component in self.components if not is_zero(compliance[component][component])]
+        rows = [[compliance[i][j] for j in moving] for i in moving]
+        invert = _inverse_diagonal if isinstance(tangent, Tangent) else _free_inverse_diagonal
+        diagonal, sure = invert(rows, tangent.rank)
+        stiffness = dict.fromkeys(self.components, math.inf)
+        stiffness |= {i: k * reciprocal(units[i, i]) for i, k in zip(moving, diagonal, strict=True)}
+        return [stiffness.get(component, math.nan) for component in range(6)], sure
 
 
 def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, Scalar]:
@@ -300,10 +307,10 @@ def _free_inverse_diagonal(rows: list[Row], most: int) -> tuple[Row, Scalar]:
     """
     size = range(len(rows))
     fixed = [rows[i][i] < ZERO_PIVOT for i in size]
-    moving: Scalar = total([where(part, 0.0, 1.0) for part in fixed])
-    rigid = [where(moving > most + 0.5, 1.0, where(part, 1.0, 0.0)) > 0.5 for part in fixed]
+    moving: Scalar = total([where(is_fixed, 0.0, 1.0) for is_fixed in fixed])
+    rigid = [where(moving > most + 0.5, 1.0, where(is_fixed, 1.0, 0.0)) > 0.5 for is_fixed in fixed]
     separated = [
         [where(rigid[i], float(i == j), where(rigid[j], float(i == j), rows[i][j])) for j in size] for i in size
     ]
     diagonal, sure = _inverse_diagonal(separated, len(rows))
-    return [where(part, math.inf, k) for part, k in zip(rigid, diagonal, strict=True)], sure
+    return [where(is_rigid, math.inf, k) for is_rigid, k in zip(rigid, diagonal, strict=True)], sure

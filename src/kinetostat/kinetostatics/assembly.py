@@ -148,8 +148,10 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
         sharing.append(shares)
         flexibility += spring_twists
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
-        twists, compliance = (shares, mode.compliance) if _in_series(leg) else (spring_twists, leg.compliance)
-        motions += zip(twists, compliance, strict=True)
+        if _in_series(leg):
+            motions += zip(shares, mode.compliance, strict=True)
+        else:
+            motions += zip(spring_twists, leg.compliance, strict=True)
         sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
     loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
     round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0

@@ -326,11 +326,12 @@ def _of_loaded_state() -> list[MapQuantity]:
         motion = partial(_displacement, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
         stiff = _stiffness_unit(i, i)
-        for start, label, symbol, value, better, loaded in (
+        rows: list[tuple[str, str, str, Callable[[Response], Scalar], Better, str]] = [
             ("displacement", unit, rf"$u_{{{shown}}}$", motion, None, "displacement"),
             ("tangent_stiffness", stiff, rf"$K_{{t,{shown}}}$", tangent, "more", "stiffness"),
             ("tangent_free_stiffness", stiff, rf"$1/C_{{t,{shown}}}$", free, "more", "compliance"),
-        ):
+        ]
+        for start, label, symbol, value, better, loaded in rows:
             entries.append(
                 MapQuantity(f"{start}_{name}", label, symbol, value, components=(name,), better=better, loaded=loaded)
             )
