@@ -99,7 +99,7 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
 
 
 def pose_frequencies(state: MachineState) -> Array:
-    """The natural frequencies of any machine at n poses, by NumPy, Hz [n x MODES]; NaN where springs do not hold it."""
+    """Return natural frequencies of any machine at n poses, by NumPy, Hz [n x MODES]; NaN if springs do not hold it."""
     machine, response, count = state.machine, state.free, state.count
     if not legs_without_mass(machine, response.configuration):
         return frequencies(state.free_equations)
@@ -114,7 +114,7 @@ def pose_frequencies(state: MachineState) -> Array:
 
 
 def platform_matrix(machine: Machine, response: Response) -> list[Row]:
-    """The matrix G^T M G with C = G G^T, whose eigenvalues are those of C M, s²; a rigid direction gives zeros.
+    """Return the matrix G^T M G with C = G G^T, whose eigenvalues are those of C M, s²; rigid directions give zeros.
 
     Args:
         machine: a machine in which the platform alone is massive.
@@ -130,7 +130,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
 
 
 def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
-    """The mass matrix of platform and payload for twists of the tool point, base axes, SI [6][6]."""
+    """Return the mass matrix of platform and payload for twists of the tool point, base axes, SI [6][6]."""
     result: list[Row] = [[0.0 for _ in range(6)] for _ in range(6)]
     for weight in platform_weights(machine, response.configuration.platform):
         x, y, z = (weight.point - response.reference).components()
@@ -151,7 +151,7 @@ def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
 
 
 def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list[Scalar]:
-    """The lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
+    """Return the lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
 
     Args:
         machine: the machine with its loops cut; where legs close some, the platform alone is massive.
@@ -162,7 +162,13 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
         tangent, mechanism = LegwiseTangent(machine, coordinates), machine.mechanism
         inertia = platform_inertia(mechanism.platform, tangent.platform, mechanism.length)[0]
         stiff, mass = tangent.over_springs(inertia)
-        return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
+    else:
+        stiff, mass = _matrices_over_carrier(machine, coordinates)
+    return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
+
+
+def _matrices_over_carrier(machine: Cut, coordinates: Row) -> tuple[Array, Array]:
+    """Return K and M over the coordinates of the carrier of a machine whose loops are all cut at rods."""
     place, mechanism = place_of(machine, coordinates), machine.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
     placed = machine.carrier.chain.place(of_scalars(coordinates), amounts)
@@ -174,13 +180,11 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     mass = twists.T @ inertia @ twists
     for _, matrix in energies(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
         mass = mass + matrix[0]
-    mass = mass + np.diag(machine.carrier.rotors[0] * length[0])
-    stiff = 0.5 * (place.rates + place.rates.T)
-    return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
+    return 0.5 * (place.rates + place.rates.T), mass + np.diag(machine.carrier.rotors[0] * length[0])
 
 
 def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
-    """The dyad of the unit line of a rod to the point `far`: its rate of stretching by a twist, squared [6 x 6]."""
+    """Return the dyad of the unit line of a rod to the point `far`: the square of its rate by a twist [6 x 6]."""
     span = (far - rod.ends.near)[0]
     size = sqrt(total([part * part for part in span]))
     unit = np.array([part * (1.0 / size) for part in span], dtype=object)
@@ -190,7 +194,7 @@ def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
 
 
 def lowest_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
-    """The lowest natural frequencies in rising order, Hz [MODES]; equal ones share their mean.
+    """Return the lowest natural frequencies in rising order, Hz [MODES]; equal ones share their mean.
 
     Args:
         modes: 1 / omega² of each mode, s², in any order.
@@ -198,13 +202,11 @@ def lowest_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
     squares, size = [*modes], len(modes)
     for first in range(size):  # odd-even sort without branches: exchange neighbours until the largest come first
         for k in range(first % 2, size - 1, 2):
-            swap = squares[k] < squares[k + 1]
-            squares[k], squares[k + 1] = (
-                where(swap, squares[k + 1], squares[k]),
-                where(swap, squares[k], squares[k + 1]),
-            )
-    shown = squares[:MODES]
-    means = [_mean_of_equals(squares, square) for square in shown] + [0.0] * (MODES - len(shown))
+            left, right = squares[k], squares[k + 1]
+            swap = left < right
+            squares[k], squares[k + 1] = where(swap, right, left), where(swap, left, right)
+    largest = squares[:MODES]
+    means = [_mean_of_equals(squares, square) for square in largest] + [0.0] * (MODES - len(largest))
     return [_frequency(mean, squares[0]) for mean in means]
 
 
@@ -215,7 +217,7 @@ def _mean_of_equals(squares: Sequence[Scalar], square: Scalar) -> Scalar:
 
 
 def _frequency(square: Scalar, largest: Scalar) -> Scalar:
-    """The frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
+    """Return the frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
     finite = square > UNRESISTED * largest
     return where(finite, 0.5 / math.pi / sqrt(where(finite, square, 1.0)), math.inf)
 
