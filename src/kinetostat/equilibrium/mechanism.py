@@ -24,7 +24,7 @@ from kinetostat.equilibrium.elastic_legs import ElasticLeg, LikeLegs, Masses, li
 from kinetostat.equilibrium.leg_reader import GivenMotions, Units, Weight, elastic_leg
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
-from kinetostat.machine.drives import numbers_of_drive, rotor_turns
+from kinetostat.machine.actuators import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Configuration, Machine, Member

@@ -8,7 +8,7 @@ from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, where
 from kinetostat.frozen import dataclass
-from kinetostat.machine.drives import numbers_of_drive
+from kinetostat.machine.actuators import numbers_of_drive
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine

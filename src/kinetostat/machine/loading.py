@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.late import LateModule
+from kinetostat.machine.actuators import check_own_drives, family_with_own_drives
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.cross_section import resolve
-from kinetostat.machine.drives import check_own_drives, family_with_own_drives
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.links import driven_slides

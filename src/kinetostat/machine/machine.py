@@ -200,7 +200,7 @@ class Family:
         members: gives all links that can move of a machine written leg by leg, from its tables.
         loads: names of the loads at other points of the platform that its files have, see `named_loads`.
         own_drives: paths of the tables that single drives have of their own ("servo.leg 1"), each with the fields that
-            are written there, see `machine.drives`.
+            are written there, see `machine.actuators`.
         recipe: the recipe of a family that is made while the program runs, a function and its arguments that make it
             again elsewhere; other families are pickled by name.
     """

@@ -22,7 +22,7 @@ from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
-from kinetostat.machine.drives import numbers_of_drive, rotor_turns
+from kinetostat.machine.actuators import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine

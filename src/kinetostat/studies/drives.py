@@ -21,9 +21,8 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
-from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of
+from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of, numbers_of_drive, rotor_turns
 from kinetostat.machine.column import stacked_columns
-from kinetostat.machine.drives import numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS

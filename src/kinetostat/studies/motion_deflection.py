@@ -16,7 +16,7 @@ from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.equilibrium.state import MachineState, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.drives import with_every_drive
+from kinetostat.machine.actuators import with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.motions import Motion

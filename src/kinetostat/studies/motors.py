@@ -18,8 +18,8 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.actuators import with_every_drive
 from kinetostat.machine.cross_section import MATERIALS
-from kinetostat.machine.drives import with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked

@@ -16,8 +16,8 @@ from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinetostatics.drive_limits import drive_limits, driven_springs
 from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
+from kinetostat.machine.actuators import values_of_drives
 from kinetostat.machine.common_tables import FRICTION_OF_JOINTS
-from kinetostat.machine.drives import values_of_drives
 from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import moving_masses, platform_is_loaded
 from kinetostat.machine.machine import Configuration, Machine

@@ -15,7 +15,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.machine.drives import numbers_of_drive, values_of_drives
+from kinetostat.machine.actuators import numbers_of_drive, values_of_drives
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Configuration, Machine, Member, Plane

@@ -33,7 +33,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.drives import values_of_drives
+from kinetostat.machine.actuators import values_of_drives
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars, still

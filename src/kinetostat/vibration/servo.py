@@ -16,8 +16,7 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.drive_limits import driven_springs
-from kinetostat.machine.actuators import name_of
-from kinetostat.machine.drives import numbers_of_drive, rotor_turns, with_every_drive
+from kinetostat.machine.actuators import name_of, numbers_of_drive, rotor_turns, with_every_drive
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.vibration.modes import Modes
