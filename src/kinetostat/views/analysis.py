@@ -133,7 +133,7 @@ def _platform(analysis: Analysis) -> dict[str, Any]:
 
 
 def _index(key: str, analysis: Analysis) -> Any:
-    """One of the indices; None where there are none, and NaN, which JSON has as null, where this one has no value."""
+    """Return one of the indices: None where there are none, NaN (null in JSON) where this one has no value."""
     if analysis.indices is None:
         return None
     value = indices_json(analysis.indices)[key]

@@ -128,14 +128,14 @@ def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
 
 
 def stiffness_table(analysis: Analysis) -> FittedTable:
-    """K, or its diagonal where a direction is rigid."""
+    """Return K, or its diagonal where a direction is rigid."""
     display = analysis.machine.display
     rows = analysis.stiffness_diagonal[None] if analysis.stiffness is None else analysis.stiffness
     return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
 def compliance_table(analysis: Analysis) -> FittedTable:
-    """C, or its diagonal where a direction is free."""
+    """Return C, or its diagonal where a direction is free."""
     display = analysis.machine.display
     rows = analysis.compliance_diagonal[None] if analysis.compliance is None else analysis.compliance
     return matrix_table("Compliance C", "compliance", analysis.components, rows, display, "free")
@@ -149,7 +149,7 @@ def matrix_table(
     display: Display = ENGINEERING,
     endless: str = "∞",
 ) -> FittedTable:
-    """K ("stiffness") or C ("compliance"), each entry in the unit of its block; one row is the diagonal.
+    """Return K ("stiffness") or C ("compliance"), each entry in the unit of its block; one row is the diagonal.
 
     Args:
         title: title, to which the units are added.
@@ -174,7 +174,7 @@ def entry_unit(kind: str, row: str, column: str) -> str:
 
 
 def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
-    """Attribution, by default of joints and links as a whole."""
+    """Return the attribution: shares of joints and links as a whole, or of single springs if `full`."""
     table = numeric_table("Attribution: share of each part in the diagonal of C", "part", analysis.components)
     springs = {share.spring: [share] for share in analysis.attribution}
     for name, contributions in (springs if full else by_part(analysis.attribution)).items():
@@ -238,7 +238,7 @@ def direction_words(vector: Sequence[float] | Array) -> str:
 
 
 def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Display = ENGINEERING) -> FittedTable:
-    """Eigenvalue, pitch, direction and point of each eigenscrew, the point as seen from the reference point."""
+    """Return eigenvalue, pitch, direction and point of each eigenscrew; points are seen from the reference point."""
     length = display.scale("m")
     heads = [
         display.scale("N/rad").label("eigenvalue"),
@@ -298,7 +298,7 @@ def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) ->
 
 
 def remarks(analysis: Analysis) -> list[str]:
-    """Mobility, internal loads, centre, condition and mass, a sentence each."""
+    """Return a sentence each on mobility, internal loads, centre of stiffness, condition numbers and mass."""
     lines, display = [], analysis.machine.display
     if analysis.mobility:
         mobility = analysis.mobility

@@ -155,7 +155,7 @@ def _name(field: Parameter) -> str:
 
 
 def _term_text(term: Term, fields: Sequence[Parameter]) -> str:
-    """A term as people write it: 1, [x]², [y] cos(2 gravity_angle); [x] goes from -1 to 1 over the range of x."""
+    """Write a term as people do: 1, [x]², [y] cos(2 gravity_angle); [x] goes from -1 to 1 over the range of x."""
     parts = []
     for (kind, k), field in zip(term, fields, strict=True):
         if kind != "power":

@@ -126,7 +126,7 @@ def _families(comparison: Comparison) -> set[str]:
 
 
 def differing_fields(comparison: Comparison) -> dict[str, list[str]]:
-    """The values of the designs for each field in which they differ, by its path; a dash where a design lacks it."""
+    """Return the values of the designs for each field in which they differ, by its path; a dash where one lacks it."""
     families = [design.machine.family.name for design in comparison.designs]
     rows = {"family": families} if len(set(families)) > 1 else {}
     for difference in comparison.differences:
@@ -276,7 +276,7 @@ def _bars_at_pose(comparison: Comparison) -> Bars:
 
 
 def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
-    """Bars under the title of their panel: entries of a matrix about and along axes, members of a group together.
+    """Put bars under the title of their panel: entries of a matrix about and along axes, members of a group together.
 
     A number that stands alone, such as the first frequency, has its whole name in the title.
     """

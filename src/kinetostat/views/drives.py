@@ -254,7 +254,7 @@ def _of_modes(name: str) -> Callable[[DriveLoads], Any]:
 
 
 def _loads_over_time(answer: DriveLoads) -> Array:
-    """Forces and moments that the motion says [components x n]; without times where there is no answer."""
+    """Return forces and moments that the motion says [components x n]; n is 0 where there is no answer."""
     loads = answer.motion.path.loads
     count = 0 if answer.curves is None else len(answer.motion.times)
     return np.array([rows[:count] for rows in loads.values()]).reshape(len(loads), count)

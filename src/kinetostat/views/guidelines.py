@@ -125,7 +125,7 @@ def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
 
 
 def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
-    """K as sums over elements, in the form of the paper's equations 33-38."""
+    """Write K as sums over elements, in the form of the paper's equations 33-38."""
     table = text_table("K at this pose as a sum over elements; k is the stiffness of one part (SI)", "entry", "sum")
     for i, name in enumerate(answer.components):
         parts = (f"{number(row[i], digits=DIGITS_OF_K)} k({element})" for element, row in rows.items() if row[i] != 0.0)
@@ -319,12 +319,12 @@ def _elements(answer: Guidelines) -> list[dict[str, Any]]:
 
 
 def _at_pose(roles: Array) -> Array:
-    """Roles [elements x components x poses] at the only pose of `Guidelines.here`, [elements x components]."""
+    """Take roles [elements x components x poses] at the only pose of `Guidelines.here` [elements x components]."""
     return roles[:, :, 0]
 
 
 def _in_actuators(limit: float | None, actuator: Element | None) -> float | None:
-    """A limit as a multiple of an actuator's stiffness; 0 stays 0, also where there is nothing to compare with."""
+    """Return a limit in units of an actuator's stiffness; 0 stays 0, also where there is nothing to compare with."""
     if limit is None or limit == 0.0:
         return limit
     return limit / actuator.stiffness if actuator and actuator.stiffness else None

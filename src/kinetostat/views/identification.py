@@ -209,6 +209,11 @@ def _unknowns(answer: Identification) -> list[dict[str, Any]]:
     ]
 
 
+def _fit_file(answer: Identification) -> dict[str, Any]:
+    """Return the record of the fit, with the home pose that commands of the machine as built need."""
+    return with_home(answer, json_of(IDENTIFICATION, answer))
+
+
 IDENTIFICATION = Description(
     title="Identification",
     fields=(
@@ -239,8 +244,7 @@ IDENTIFICATION = Description(
     state=lambda answer: f"as built, by {answer.observed.data.path}",
     files={
         "machine.toml": "exchange.leg_by_leg.fitted_text",
-        # Commands of the machine as built need the coordinates of its home pose as well.
-        "fit.json": lambda answer: with_home(answer, json_of(IDENTIFICATION, answer)),
+        "fit.json": _fit_file,
         "next-poses.csv": lambda answer: None if answer.next is None else as_csv(answer.machine, answer.next),
         "klipper.cfg": partial(_firmware_file, klipper_text),
         "marlin.gcode": partial(_firmware_file, marlin_text),

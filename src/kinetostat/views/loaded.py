@@ -195,7 +195,7 @@ def springs_or_kinds_table(state: LoadedState, full: bool = False) -> FittedTabl
 
 
 def _kinds_table(state: LoadedState) -> FittedTable:
-    """Least and greatest load and greatest deformation of the springs of each kind, and how many are slack."""
+    """Return least and greatest load and greatest deformation of the springs of each kind, and how many are slack."""
     display = state.machine.display
     kinds: dict[tuple[str, bool], list[SpringState]] = {}
     for spring in state.springs:

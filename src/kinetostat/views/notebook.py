@@ -56,7 +56,7 @@ _PLAIN = Console(file=io.StringIO(), width=LINE_LENGTH)
 
 
 def html_of(answer: object) -> str:
-    """A machine or an answer as a piece of HTML: a picture where there is one, and the tables of the terminal."""
+    """Return a machine or an answer as a piece of HTML: its picture, if it has one, and the tables of the terminal."""
     console = _HtmlConsole()
     kind_of(answer).tell(console, answer)
     tables = "".join(console.parts)
@@ -132,7 +132,7 @@ def _html_with_style(text: Text, style: str | Style | None = None) -> str:
 
 
 def _styled_html(content: str, style: Style | None) -> str:
-    """HTML in the colour, weight and dimness of a style; its other properties are not shown."""
+    """Return HTML in the colour, weight and dimness of a style, whose other properties are not shown."""
     if style is None or not content:
         return content
     colour = [CLASSES[style.color.name]] if style.color and style.color.name in CLASSES else []

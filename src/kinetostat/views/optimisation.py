@@ -328,7 +328,7 @@ def _convergence(result: Result) -> dict[str, Any]:
 
 
 def _front(result: Result) -> list[dict[str, Any]] | None:
-    """The designs of a front, each with its variables, objectives and constraints; None of a single objective."""
+    """Return the designs of a front with variables, objectives and constraints; None for a single objective."""
     if not result.solved or len(result.problem.objectives) == 1:
         return None
     outcome = result.log.outcome(result.front)

@@ -192,7 +192,7 @@ def _shade(panel: "Axes", numbers: Integers) -> None:
 
 
 def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
-    """The lines below the title: numbers that differ from the file, loads left out, and poses without a result."""
+    """Return the notes: numbers that differ from the file, loads left out, and poses without a result."""
     counts = {status: len(numbers) for status, numbers in answers.failures.items()}
     missing = figures.missing_line(counts, answers.poses.count, " (grey)")
     return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing

@@ -44,7 +44,7 @@ class FittedTable(Table):
     """A table of Rich whose columns are as wide as their texts need, within the width of the terminal."""
 
     def __init__(self, title: str = "") -> None:
-        """An empty table with a title."""
+        """Make an empty table with a title."""
         super().__init__(title=title or None, box=box.SIMPLE_HEAD, pad_edge=False)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -82,7 +82,7 @@ class _ColumnWidths:
     """A column with the widths that it may have, in characters.
 
     Attributes:
-        texts: its head and its cells.
+        texts: the head and the cells.
         numeric: whether it holds numbers.
         aligned: width at which decimal points stand below each other and no text is broken.
         unbroken: width of its longest line.
@@ -155,7 +155,7 @@ UNBOUND = 10_000
 
 
 def print_machines(console: Console, heads: Mapping[str, Document]) -> None:
-    """The bundled machines, by what stands at the top of their files, and the families a file can name."""
+    """Print the bundled machines, by what stands at the top of their files, and the families a file can name."""
     table = text_table("Bundled machines", "name", "machine", "family")
     for name, head in heads.items():
         table.add_row(name, head["name"], head["family"])
@@ -167,7 +167,7 @@ def print_machines(console: Console, heads: Mapping[str, Document]) -> None:
 
 
 def print_studies(console: Console, heads: Mapping[str, Document]) -> None:
-    """The bundled studies by name."""
+    """Print the bundled studies by name."""
     table = text_table("Bundled studies (kinetostat optimize STUDY)", "name", "study", "machine")
     for name, head in heads.items():
         table.add_row(name, head["name"], head["machine"])
@@ -244,7 +244,7 @@ def terminal() -> Console:
 
 
 def piped_width() -> int:
-    """Columns of the terminal at which a pipe or a file is written, as `less` shows it there; `PIPED` without one."""
+    """Return the width of the terminal from which a pipe or a file is written; `PIPED` without a terminal."""
     for stream in (sys.stderr, sys.stdin):
         try:
             return os.get_terminal_size(stream.fileno()).columns or PIPED
@@ -323,7 +323,7 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
     """Print an answer: first the machine with its state, then a line for each sentence, notes, and the tables.
 
     Args:
-        console: on which it is printed.
+        console: the console that prints it.
         description: the description of answers of this kind.
         answer: an answer of the kind that is described.
         full: whether tables show every row.

@@ -156,7 +156,7 @@ VALIDATION = Description(
 
 
 def measured_table(answer: "MeasuredComparison") -> FittedTable:
-    """A row for each measured number: it, the computed one, and their difference, with standard uncertainties."""
+    """Return a row for each number: measured, computed, and their difference, with standard uncertainties."""
     table = text_table(
         "Measured and computed at the tool point, base axes (± one standard uncertainty)",
         "line", "entry", "measured", "computed", "difference", "unit", "model",

@@ -112,7 +112,7 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
 
 
 def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
-    """A lamp with a shadow map [side x side] that covers the ball around all casters: the depth nearest to the lamp."""
+    """Make a lamp with a map [side x side] of the ball around all casters: the depths that are nearest to the lamp."""
     axes = axes_towards(-direction)
     axes[:2] *= 0.5 * (side - 2 * MAP_BORDER) / radius
     shift = np.array([0.5 * side, 0.5 * side, 2.0 * radius]) - axes @ centre
@@ -131,7 +131,7 @@ def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction
 
 
 def _mean_light(lamps: Sequence[Lamp], lift: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
-    """Mean light of lamps on points [3 x n], lifted (m) from their surface, with and without shadows [2 x n]."""
+    """Return the mean light of lamps, with and without shadows [2 x n], on points [3 x n] lifted (m) off a surface."""
     lifted = points + normals * np.float32(lift)
     light = np.zeros((2, points.shape[1]), np.float32)
     for number, (direction, reaches) in enumerate(lamps):
@@ -143,7 +143,7 @@ def _mean_light(lamps: Sequence[Lamp], lift: float, points: Float32s, normals: F
 
 
 def _disc(count: int) -> Array:
-    """Points [count x 2] that fill the unit disc evenly: Vogel's spiral, with the golden angle between neighbours."""
+    """Fill the unit disc evenly with points [count x 2]: Vogel's spiral, with the golden angle between neighbours."""
     numbers = np.arange(count) + 0.5
     radii, angles = np.sqrt(numbers / count), math.pi * (3.0 - math.sqrt(5.0)) * numbers
     return np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
@@ -201,7 +201,7 @@ def _room(direction: Float32s, roughness: Float32s) -> Float32s:
 
 
 def _box(direction: Float32s, roughness: Float32s, centre: Sequence[float], edge: float, power: float) -> Float32s:
-    """Brightness [n x 1] of a soft box in a direction, the more blurred and the weaker the rougher the surface."""
+    """Return the brightness [n x 1] of a soft box in a direction, more blurred and weaker on rougher surfaces."""
     along, blur = direction @ np.array(centre, dtype=np.float32)[:, None], _blur(roughness)
     return power * smooth_step(along, edge - blur, edge + blur) * (1.0 - BOX_DIMMING * roughness)
 
@@ -305,7 +305,7 @@ def _inside(share: Array) -> Float32s:
 
 
 def _grid(places: Array) -> Array:
-    """Share of each pixel that the lines at whole numbers cover, fainter where they crowd [height x width].
+    """Return the share of each pixel that lines at whole numbers cover, less where they crowd [height x width].
 
     Args:
         places: what each pixel shows, in meshes of the grid [height x width x 2].

@@ -66,7 +66,7 @@ def _runs(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integer
 
 
 def _spans(lines: Array, row: Integers, width: int) -> tuple[Integers, Integers]:
-    """First and last pixel of triangles in rows; there is none where the last is before the first."""
+    """Return first and last pixel of triangles in rows; there is none where the last is before the first."""
     slope, rest = lines[0], lines[1] * (row + 0.5) + lines[2]
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = -rest / slope

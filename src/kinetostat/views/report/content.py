@@ -70,7 +70,7 @@ class Figure:
     Attributes:
         caption: a phrase or a sentence.
         picture: an SVG element as text, or the bytes of a PNG.
-        width: its share of the width of the text.
+        width: width of the picture as a share of that of the text.
         live: a scene of solids, in the form of `views.scene`, that a page may show in three dimensions in place of the
             picture.
     """
@@ -160,7 +160,7 @@ def typeset(text: str) -> str:
 
 
 def _scientific(digits: str, zeros: int) -> str:
-    """A large whole number, given by its leading digits and the number of zeros that follow, with a power of ten."""
+    """Write a large whole number with a power of ten, given its leading digits and the number of zeros after them."""
     decimals = f".{digits[1:]}" if digits[1:] else ""
     return f"{digits[0]}{decimals}e{zeros + len(digits) - 1}"
 

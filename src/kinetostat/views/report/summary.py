@@ -255,7 +255,7 @@ def machine_section(analysis: Analysis) -> Section:
 
 
 def _drawing(analysis: Analysis) -> Figure:
-    """Front, side and plan of the machine; of a planar machine the plan alone."""
+    """Return front, side and plan of the machine; of a planar machine the plan alone."""
     views = "Plan" if analysis.machine.family.planar else "Front, side and plan"
     return as_figure(
         three_views(analysis.machine, ""),

@@ -149,7 +149,7 @@ def _attachment(name: str, text: str) -> str:
 
 
 def _live_html(scene: Mapping[str, Any]) -> str:
-    """Elements that unpack the renderer and show a scene in the element with the id "live"; empty without libraries.
+    """Return elements that unpack the renderer and show a scene in the element "live"; none without libraries.
 
     Renderer and scene are compressed together, without a time stamp: the same scene gives the same bytes.
     """

@@ -95,7 +95,7 @@ class Anatomy:
         leg: name.
         label: what a drawing writes beside it.
         actuated: whether it has an actuator; `removed` if all of those are without stiffness.
-        joints, links, rails, springs: its parts in order.
+        joints, links, rails, springs: the parts of the leg in order.
         foot, head: the points on the base and on the platform between which it stands, base frame, m.
     """
 

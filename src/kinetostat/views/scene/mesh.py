@@ -103,7 +103,7 @@ def _revolved_mesh(shape: Turned) -> Mesh:
 
 
 def _ends_of_faces(normals: Array, closed: bool) -> tuple[Array, Array]:
-    """Normals at the first and last line of each face of a strip: shared with its neighbour where the edge is round."""
+    """Return normals at both lines of each face of a strip: shared with its neighbour where the edge is round."""
     before, after = np.roll(normals, 1, axis=0), np.roll(normals, -1, axis=0)
     if not closed:
         before[0], after[-1] = normals[0], normals[-1]
@@ -212,7 +212,7 @@ def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) ->
 
 
 def turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Twice the area of a triangle, positive if it is counter-clockwise."""
+    """Return twice the area of a triangle, positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -268,7 +268,7 @@ def _tangents(path: Array, closed: bool) -> Array:
 
 
 def _frames(tangents: Array, closed: bool) -> tuple[Array, Array]:
-    """Two normals [n x 3] at each point of a curve, carried along it without twist; of a closed one they come back."""
+    """Carry two normals [n x 3] along a curve without twist; along a closed one they come back to themselves."""
     first = np.empty_like(tangents)
     start = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
     first[0] = start / np.linalg.norm(start)

@@ -241,7 +241,7 @@ def deflection_overlays(
 
     Args:
         machine, configuration, sizes: as for `machine_scene`.
-        moved: its small motions.
+        moved: the small motions of the machine.
         factor: the factor of exaggeration; None to choose a round one.
     """
     loads = load_solids(moved.load, machine.tool_point(configuration.platform), sizes)

@@ -75,9 +75,13 @@ def block(width: float, depth: float, height: float, chamfer: float = 0.0) -> Ex
 
 @shared
 def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...]:
-    """Outline of a fork: arms `arm` wide left and right of a `gap` centred at the origin, closed at y = -`reach`.
+    """Return the outline of a fork with arms on both sides of a gap that is centred at the origin.
 
-    The arms end round above the origin; the bridge is `foot` thick.
+    Args:
+        gap: distance of the arms, m.
+        arm: width of an arm, m; the arms end round above the origin.
+        reach: distance of the lower side of the bridge from the origin, towards -y, m.
+        foot: thickness of the bridge, m.
     """
     inner, outer = 0.5 * gap, 0.5 * gap + arm
     bridge = -reach + foot

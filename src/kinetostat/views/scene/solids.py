@@ -134,7 +134,7 @@ class Solid:
 
     Attributes:
         name: a name that is unique within its scene; the same part has the same name at every pose.
-        shape: its shape in its own axes.
+        shape: the shape, in axes of its own.
         material: one of `LOOKS`.
         place: displacement from its own axes to the base frame.
         scale: factors along its own axes.
