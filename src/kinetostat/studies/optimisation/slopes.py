@@ -215,14 +215,15 @@ def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[
     free = np.array([k for k, number in enumerate(survey.free) if not bounds[number]], dtype=int)
     if not free.size:
         return [], "No ridges are sought, because every variable is a choice or is at a bound."
-    ground = _Ground(problem, survey, genes, free)
-    at = genes[survey.free][free]
-    if np.abs(ground.rates(at)[0]).max() > MOST_STATIONARY_SLOPE:
+    objective = _FreeObjective(problem, survey, genes, free)
+    point = genes[survey.free][free]
+    if np.abs(objective.rates(point)[0]).max() > MOST_STATIONARY_SLOPE:
         return [], "No ridges are sought, because the search has not converged; refine it with method = hybrid."
-    at = ground.settle_across(at)
-    values, vectors = np.linalg.eigh(ground.rates(at)[1])
+    point = objective.settle_across(point)
+    values, vectors = np.linalg.eigh(objective.rates(point)[1])
     flat = vectors[:, np.abs(values) < FLAT_CURVATURE]
-    return [ridge for way in _aligned_basis(flat).T if (ridge := ground.ridge(at, way)) is not None], ""
+    ridges = [objective.ridge(point, direction) for direction in _aligned_basis(flat).T]
+    return [ridge for ridge in ridges if ridge is not None], ""
 
 
 def _aligned_basis(flat: Array) -> Array:
@@ -241,7 +242,7 @@ def _aligned_basis(flat: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _Ground:
+class _FreeObjective:
     """The objective over the variables that are free to move, with relative derivatives.
 
     Attributes:
@@ -267,33 +268,33 @@ class _Ground:
                 slopes[k] = slope[self.free] / (abs(values[k]) or 1.0)
         return values, slopes
 
-    def value(self, at: Array) -> float:
+    def value(self, point: Array) -> float:
         """The objective, SI."""
-        return float(self._around(at[None])[0][0])
+        return float(self._around(point[None])[0][0])
 
-    def rates(self, at: Array) -> tuple[Array, Array]:
+    def rates(self, point: Array) -> tuple[Array, Array]:
         """First and second derivatives by the genes, relative to the objective."""
-        steps = DIFFERENCE_STEP * np.eye(len(at))
-        slopes = self._around(np.concatenate([at[None], at + steps, at - steps]))[1]
+        steps = DIFFERENCE_STEP * np.eye(len(point))
+        slopes = self._around(np.concatenate([point[None], point + steps, point - steps]))[1]
         ahead, behind = np.split(slopes[1:], 2)
         matrix = (ahead - behind) / (2.0 * DIFFERENCE_STEP)
         return slopes[0], np.nan_to_num(0.5 * (matrix + matrix.T))
 
-    def settle_across(self, at: Array) -> Array:
+    def settle_across(self, point: Array) -> Array:
         """Return to the best point across the ridge, by Newton's method in the directions that are not flat."""
         for _ in range(SETTLING_STEPS):
-            slope, curvature = self.rates(at)
+            slope, curvature = self.rates(point)
             values, vectors = np.linalg.eigh(curvature)
             steep = np.abs(values) >= FLAT_CURVATURE
             along = vectors[:, steep]
-            at = at - along @ ((along.T @ np.nan_to_num(slope)) / values[steep])
-        return np.clip(at, 0.0, 1.0)
+            point = point - along @ ((along.T @ np.nan_to_num(slope)) / values[steep])
+        return np.clip(point, 0.0, 1.0)
 
-    def ridge(self, at: Array, way: Array) -> Ridge | None:
+    def ridge(self, point: Array, direction: Array) -> Ridge | None:
         """Follow a ridge in both directions; None if it is only a point."""
-        level = self.value(at)
-        first_end, first_change = self._follow(at, -way, level)
-        second_end, second_change = self._follow(at, way, level)
+        level = self.value(point)
+        first_end, first_change = self._follow(point, -direction, level)
+        second_end, second_change = self._follow(point, direction, level)
         travel = np.abs(second_end - first_end)
         if travel.max() <= LEAST_RIDGE * RIDGE_STEP:
             return None
@@ -307,28 +308,28 @@ class _Ground:
         names = tuple(self.problem.space.searched_variables[numbers[k]].name for k in taking_part)
         return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first_change, second_change)))
 
-    def _follow(self, at: Array, way: Array, level: float) -> tuple[Array, float]:
+    def _follow(self, point: Array, direction: Array, level: float) -> tuple[Array, float]:
         """Return the last point of the ridge in one direction, and the greatest relative change up to there."""
         greatest = 0.0
         for _ in range(MOST_RIDGE_STEPS):
-            step = RIDGE_STEP * _room(at, way)
-            following = self.settle_across(at + step * way)
+            step = RIDGE_STEP * _room(point, direction)
+            following = self.settle_across(point + step * direction)
             change = abs(self.value(following) / level - 1.0)
             if not change <= LARGEST_RIDGE_CHANGE:
                 break
-            motion = following - at
-            at, greatest = following, max(greatest, change)
+            motion = following - point
+            point, greatest = following, max(greatest, change)
             if step < RIDGE_STEP or np.linalg.norm(motion) < LEAST_RIDGE * RIDGE_STEP:
                 break
-            way = motion / np.linalg.norm(motion)
-        return at, greatest
+            direction = motion / np.linalg.norm(motion)
+        return point, greatest
 
 
-def _room(at: Array, way: Array) -> float:
+def _room(point: Array, direction: Array) -> float:
     """Return the share of a step that stays within the bounds."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        limits = np.where(way > 0.0, (1.0 - at) / way, np.where(way < 0.0, -at / way, np.inf)) / RIDGE_STEP
-    return float(np.clip(limits.min(initial=1.0), 0.0, 1.0))
+        lengths = np.where(direction == 0.0, np.inf, (np.where(direction > 0.0, 1.0, 0.0) - point) / direction)
+    return float(np.clip((lengths / RIDGE_STEP).min(initial=1.0), 0.0, 1.0))
 
 
 def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
