@@ -289,11 +289,11 @@ def _state_lines(functions: MachineFunctions) -> list[str]:
     lines += ["rest_of(at, state);"] if rests else []
     lines += ["double parts[PARTS];"] if modes else []
     place = rests
-    for program, given, groups in (
+    for program, arguments, groups in (
         ("springs_at_rest_at", "at, state, parts", ((counts.loaded, 1), (counts.factor, 0))),
         ("springs_at", "at, parts", ((counts.free, 1),)),
     ):
-        lines += [f"{program}({given});"] if any(count for count, _ in groups) else []
+        lines += [f"{program}({arguments});"] if any(count for count, _ in groups) else []
         for count, massive in groups:
             if count:
                 lines.append(f"modes_of(parts, {massive}, {count}, state + {place});")

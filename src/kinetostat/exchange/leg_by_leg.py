@@ -50,8 +50,8 @@ def legs_of(name: str) -> str:
     """
     machine = load(name)
     document = document_of(machine)
-    lost = _limits_lost((limit.name for limit in limits_set(machine.tables["limits"])), document)
-    note = f"# Left out, since the platform is tilted at this pose: {lost}.\n" if lost else ""
+    left_out = _limits_lost((limit.name for limit in limits_set(machine.tables["limits"])), document)
+    note = f"# Left out, since the platform is tilted at this pose: {left_out}.\n" if left_out else ""
     return note + _text(document, machine)
 
 
@@ -68,9 +68,9 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
         notes: lines of comment at its head.
     """
     document = document_of(machine, built)
-    lost = _limits_lost(document_of(machine).get("limits", {}), document)
-    if lost:
-        notes = [*notes, f"Left out, since axes of joints do not meet: {lost}; travels stand for lengths of legs."]
+    left_out = _limits_lost(document_of(machine).get("limits", {}), document)
+    if left_out:
+        notes = [*notes, f"Left out, since axes of joints do not meet: {left_out}; travels stand for lengths of legs."]
     return "".join(f"# {note}\n" for note in notes) + _text(document, machine)
 
 
@@ -154,15 +154,15 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
     drawn = [rod for rod in rods(state_of(machine).configuration.legs) if rod.telescopic and rod.leg in parted]
     rams = [(rod.leg, 0.0) for rod in drawn]
     rams += [(leg.name, 0.0) for leg in built.legs for _ in driven_slides(leg.chain)]
-    every = unloaded_parts(built.legs, built.platform.rotation.z, machine.family.planar, rams)
-    parts = replace(every, legs=[leg for leg in built.legs if leg.name not in parted])
-    kept = {name: limit for name, limit in limits.items() if any(True for _ in LIMITS[name].measure(parts))}
+    all_parts = unloaded_parts(built.legs, built.platform.rotation.z, machine.family.planar, rams)
+    whole_legs = replace(all_parts, legs=[leg for leg in built.legs if leg.name not in parted])
+    result = {name: limit for name, limit in limits.items() if any(True for _ in LIMITS[name].measure(whole_legs))}
     lengths = [float(rod.length) for rod in drawn]
     if lengths and "shortest_leg" in limits:
-        kept["travel_from"] = max(limits["shortest_leg"] - min(lengths), limits.get("travel_from", -math.inf))
+        result["travel_from"] = max(limits["shortest_leg"] - min(lengths), limits.get("travel_from", -math.inf))
     if lengths and "longest_leg" in limits:
-        kept["travel_to"] = min(limits["longest_leg"] - max(lengths), limits.get("travel_to", math.inf))
-    return kept
+        result["travel_to"] = min(limits["longest_leg"] - max(lengths), limits.get("travel_to", math.inf))
+    return result
 
 
 def _is_parted(leg: Leg) -> bool:

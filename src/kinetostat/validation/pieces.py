@@ -156,25 +156,25 @@ def moves_in(plane: Plane, piece: Piece) -> bool:
     return is_normal != (joint.point is None)
 
 
-def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece, ...]:
-    """Return the chain with every strut in it as one piece."""
+def _with_struts(name: str, chain: Sequence[Piece], margin: float) -> tuple[Piece, ...]:
+    """Return the chain with every strut in it as one piece; points that are closer than a margin (m) are one."""
     result: list[Piece] = []
     while chain:
-        strut, count = _first_strut(name, chain, near)
+        strut, count = _first_strut(name, chain, margin)
         result.append(strut or chain[0])
         chain = chain[count:]
     return tuple(result)
 
 
-def _first_strut(name: str, chain: Sequence[Piece], near: float) -> tuple[StrutPiece | None, int]:
+def _first_strut(name: str, chain: Sequence[Piece], margin: float) -> tuple[StrutPiece | None, int]:
     """Return the strut with which a chain begins, if there is one, and the number of its pieces, otherwise 1."""
-    start = _first_ball(chain, near)
+    start = _first_ball(chain, margin)
     if start is None:
         return None, 1
     for last in range(PIECES_OF_BALL, len(chain)):
-        end = _first_ball(chain[last:], near)
-        if end is not None and float(np.linalg.norm(array(end - start))) > near:
-            spring = _spring_in_series(chain[PIECES_OF_BALL:last], start, end, near)
+        end = _first_ball(chain[last:], margin)
+        if end is not None and float(np.linalg.norm(array(end - start))) > margin:
+            spring = _spring_in_series(chain[PIECES_OF_BALL:last], start, end, margin)
             if spring is None:
                 return None, 1
             stiffness, preload = spring
@@ -182,17 +182,17 @@ def _first_strut(name: str, chain: Sequence[Piece], near: float) -> tuple[StrutP
     return None, 1
 
 
-def _first_ball(chain: Sequence[Piece], near: float) -> Vector | None:
+def _first_ball(chain: Sequence[Piece], margin: float) -> Vector | None:
     """Return the centre of the spherical joint, three revolutes through a point, with which a chain begins, if any."""
     first = [piece for piece in chain[:PIECES_OF_BALL] if isinstance(piece, Joint) and piece.pitch == 0.0]
     points = [joint.point for joint in first if joint.point is not None]
-    if len(points) < PIECES_OF_BALL or any(_distance(point, points[0]) > near for point in points):
+    if len(points) < PIECES_OF_BALL or any(_distance(point, points[0]) > margin for point in points):
         return None
     volume = float(np.linalg.det([array(joint.axis) for joint in first]))
     return points[0] if abs(volume) > COINCIDENT else None
 
 
-def _spring_in_series(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> tuple[float, float] | None:
+def _spring_in_series(parts: Sequence[Piece], start: Vector, end: Vector, margin: float) -> tuple[float, float] | None:
     """Return stiffness (N/m) and preload (N) of parts in a row; None if they do more than stretch along their line."""
     span = array(end - start)
     along = span / np.linalg.norm(span)
@@ -201,9 +201,9 @@ def _spring_in_series(parts: Sequence[Piece], start: Vector, end: Vector, near: 
         if isinstance(part, Spring) and part.joint.point is None and _is_parallel(part.joint, along):
             compliance += 1.0 / float(part.stiffness)
             contraction += float(part.preload) / float(part.stiffness)
-        elif isinstance(part, Beam) and _distance(part.start, start) < near and _distance(part.end, end) < near:
+        elif isinstance(part, Beam) and _distance(part.start, start) < margin and _distance(part.end, end) < margin:
             compliance += float(np.linalg.norm(span)) / float(part.rigidity.axial)
-        elif not (isinstance(part, Spring) and _turns_about(part.joint, (start, end), near)):
+        elif not (isinstance(part, Spring) and _turns_about(part.joint, (start, end), margin)):
             return None
     return (1.0 / compliance, contraction / compliance) if compliance > 0.0 else (RIGID, 0.0)
 
@@ -216,12 +216,12 @@ def _is_parallel(joint: Joint, direction: Array) -> bool:
     return float(np.linalg.norm(np.cross(array(joint.axis), direction))) < COINCIDENT
 
 
-def _turns_about(joint: Joint, centres: Sequence[Vector], near: float) -> bool:
+def _turns_about(joint: Joint, centres: Sequence[Vector], margin: float) -> bool:
     """Return whether a revolute's axis passes through a spherical joint, so that it carries no load."""
     if joint.point is None or joint.pitch != 0.0:
         return False
     axis, point = array(joint.axis), joint.point
-    return any(float(np.linalg.norm(np.cross(array(centre - point), axis))) < near for centre in centres)
+    return any(float(np.linalg.norm(np.cross(array(centre - point), axis))) < margin for centre in centres)
 
 
 def section_axes(beam: Beam) -> tuple[Array, float]:

@@ -130,15 +130,15 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     receptances = tool.tip_tip, tool.tip_flange, tool.flange_flange
     at_tip, across, at_flange = (_interpolate(tool, values, frequencies) for values in receptances)
     tip, flange = list(tool.tip), list(tool.flange)
-    rest = [part for part in range(6) if part not in tip]
+    others = [part for part in range(6) if part not in tip]
     # Apart, each unit wrench moves the flange of the tool, or that of the machine: forces between both close this gap.
     gaps = np.zeros((len(frequencies), len(flange), 6), dtype=complex)
     gaps[:, :, tip] = np.swapaxes(across, 1, 2)
-    gaps[:, :, rest] = -machine[:, flange][:, :, rest]
+    gaps[:, :, others] = -machine[:, flange][:, :, others]
     forces = np.linalg.solve(at_flange + machine[:, flange][:, :, flange], gaps)
     result = np.zeros((len(frequencies), 6, 6), dtype=complex)
-    for part in rest:
-        result[:, part, rest] = machine[:, part][:, rest]
+    for part in others:
+        result[:, part, others] = machine[:, part][:, others]
         result[:, part] += np.einsum("fc,fcw->fw", machine[:, part][:, flange], forces)
     for place, part in enumerate(tip):
         result[:, part, tip] = at_tip[:, place]
@@ -186,7 +186,7 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
             without friction, and what they add to the compliance stays in D.
     """
     with_mass = modes.ringing
-    kept = with_mass if count is None else min(count, with_mass)
+    size = with_mass if count is None else min(count, with_mass)
     friction = damping.friction
     # Along the principal directions of the friction among motions without mass, some creep, and the others are free.
     sizes, directions = np.linalg.eigh(friction[with_mass:, with_mass:])
@@ -196,27 +196,31 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     without_mass = with_mass + np.arange(len(sizes))
     # What follows at once: modes with mass that are no states, and motions without mass that no friction slows.
     direct_inputs, direct_outputs = (
-        np.concatenate([rows[:, kept:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
+        np.concatenate([rows[:, size:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
     )
     # Amplitudes are scaled to the kinetic energy, so that the mass matrix of the modes is 1.
-    roots, size = np.sqrt(modes.squares[:kept]), len(creeping)
-    coupling = creep.T @ friction[with_mass:, :kept] / roots
+    roots, creep_count = np.sqrt(modes.squares[:size]), len(creeping)
+    coupling = creep.T @ friction[with_mass:, :size] / roots
     by_creep = coupling.T / creeping
-    mode_friction = friction[:kept, :kept] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
-    mode_forces, creep_forces = inputs[:, :kept].T / roots[:, None], creep.T @ inputs[:, without_mass].T
+    mode_friction = friction[:size, :size] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
+    mode_forces, creep_forces = inputs[:, :size].T / roots[:, None], creep.T @ inputs[:, without_mass].T
     rates_by_states = [
-        [np.zeros((kept, kept)), np.eye(kept), np.zeros((kept, size))],
+        [np.zeros((size, size)), np.eye(size), np.zeros((size, creep_count))],
         [-np.diag(1.0 / roots**2), by_creep @ coupling - mode_friction, by_creep],
-        [np.zeros((size, kept)), -coupling / creeping[:, None], -np.diag(1.0 / creeping)],
+        [np.zeros((creep_count, size)), -coupling / creeping[:, None], -np.diag(1.0 / creeping)],
     ]
     rates_by_inputs = [
-        np.zeros((kept, len(inputs))),
+        np.zeros((size, len(inputs))),
         mode_forces - by_creep @ creep_forces,
         creep_forces / creeping[:, None],
     ]
-    outputs_by_states = [outputs[:, :kept] / roots, np.zeros((len(outputs), kept)), outputs[:, without_mass] @ creep]
-    states = [f"{kind} of mode {k + 1}" for kind in ("amplitude", "speed") for k in range(kept)]
-    states += [f"creeping motion {k + 1}" for k in range(size)]
+    outputs_by_states = [
+        outputs[:, :size] / roots,
+        np.zeros((len(outputs), size)),
+        outputs[:, without_mass] @ creep,
+    ]
+    states = [f"{kind} of mode {k + 1}" for kind in ("amplitude", "speed") for k in range(size)]
+    states += [f"creeping motion {k + 1}" for k in range(creep_count)]
     return Equations(
         a=np.block(rates_by_states),
         b=np.vstack(rates_by_inputs),

@@ -367,7 +367,7 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
     modal = [row for row in rows if row.modal or row.loaded == "factor"]
     if not modal:
         return None
-    state, alone = state_of(machine), platform_alone(machine, varying)
+    state, is_platform_alone = state_of(machine), platform_alone(machine, varying)
     with np.errstate(all="ignore"):
         machine_cut = cut(state.free_equations.mechanism)
     if machine_cut is None or not machine_cut.legs or not springs_follow_ways(machine_cut):
@@ -377,7 +377,7 @@ def mode_counts_of(machine: Machine, names: Iterable[str], varying: Collection[s
     counts = []
     for at_rest in (True, False):
         numbers = [int(row.name.rpartition("_")[2]) for row in modal if row.modal and bool(row.loaded) == at_rest]
-        counts.append(min(most, max(numbers) + SPARE_MODES) if numbers and not alone else 0)
+        counts.append(min(most, max(numbers) + SPARE_MODES) if numbers and not is_platform_alone else 0)
     loaded, free = counts
     result = ModeCounts(loaded, int(any(row.loaded == "factor" for row in modal)), free)
     return result if result != ModeCounts() else None
