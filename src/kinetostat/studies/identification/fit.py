@@ -37,7 +37,7 @@ SURELY = 1.959963984540054
 UPPER_QUANTILE = 0.975
 """Probability below the upper end of a 95 % interval."""
 FOLDS = 5
-"""Parts of the poses, each of which is predicted from the others: with more, a part has few poses."""
+"""Parts of the poses, each of which is predicted from the others: of some dozens of poses, each part has several."""
 FULL_PREFERENCE = 50.0
 """Factor on the weak preference for zero for combinations that are not seen: with the weak one alone they would go
 where the curvature of the equations explains some of the noise."""
@@ -164,7 +164,8 @@ def best_fit(equations: ResidualEquations, groups: Integers, options: FitOptions
     """
     values = np.zeros(len(options.sizes))
     before, rates = _rates_at(equations, values, options)
-    state = _Iterate(values, before, rates, np.ones(len(before), dtype=bool), _median_spread(before, rates, options))
+    kept, spread = np.ones(len(before), dtype=bool), _median_spread(before, rates, options)
+    state = _Iterate(values=values, after=before, rates=rates, kept=kept, spread=spread)
     for with_loss in (True, False) if options.robust else (False,):
         state = _settle(equations, options, state, with_loss, tell)
     return _fit_result(before, state, groups, options)
@@ -213,7 +214,7 @@ def _settle(
         else:
             spread = _median_spread(after, rates, options)
         settled, rank = abs(spread - state.spread) <= SAME_SPREAD * state.spread, seen.rank
-        state = _Iterate(values, after, rates, state.kept, spread)
+        state = replace(state, values=values, after=after, rates=rates, spread=spread)
     return state
 
 
@@ -226,27 +227,27 @@ def _rates_at(equations: ResidualEquations, values: Array, options: FitOptions) 
 def _median_spread(residuals: Array, rates: Array, options: FitOptions) -> float:
     """Standard deviation of residuals by the median of their sizes, which outliers hardly change.
 
-    It is at least 1 where standard deviations are known, else what may be round-off, or where combinations are unseen,
-    what these may do. Values that no unknown changes, such as the height of a planar machine, do not count.
+    It is at least 1 where standard deviations are known. Where they are not, it is at least what may be round-off, and
+    what unseen combinations may add. Values that no unknown changes, such as the height of a planar machine, do not
+    count.
     """
-    touched, least = rates.any(axis=1), 1.0
-    if not touched.any():
+    affected, least = rates.any(axis=1), 1.0
+    if not affected.any():
         return least
     if not options.known:
         strengths = np.linalg.svd(rates, compute_uv=False)
         has_unseen = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
         least = max(options.resolution, UNSEEN * float(strengths[0]) if has_unseen else 0.0)
-    return max(DEVIATION_OVER_MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
+    return max(DEVIATION_OVER_MEDIAN * float(np.median(np.abs(residuals[affected]))), least)
 
 
 def _likeliest_spread(residuals: Array, rates: Array, values: Array, options: FitOptions) -> float:
     """Estimate the standard deviation of measurements where priors weigh against them.
 
-    Residuals alone do not say it, because the larger it is, the more of them the priors leave. Of each standard
-    deviation that is tried follows how likely the measured values are, whatever the unknowns: their variance along a
-    direction is that of the measurements, and in the directions that unknowns change, also that of unknowns as large
-    as the priors say, seen through the rates (to first order). The one that makes them most likely is taken. A grid is
-    searched, not the slope, because a second maximum may lie far away.
+    Residuals alone do not say it: the larger it is, the more of them the priors leave. So standard deviations are
+    tried, and the one is taken with which the measured values are most likely, whatever the unknowns are. To first
+    order, the variance of these values along a direction is that of the measurements; along directions that unknowns
+    change, unknowns as large as the priors say add theirs. A grid is searched, because there may be two maxima.
 
     Args:
         residuals: residuals of the kept rows at the values [rows].
