@@ -23,26 +23,27 @@ from kinetostat.validation.pieces import Piece, StrutPiece, array, columns, join
 
 TRIALS = 10
 """Number of stiffnesses that are tried for rigid parts: enough to see where more of it only adds round-off."""
-STIFFER = 100.0
-"""The greatest of them, in units of the stiffest part; the least is that of the softest part. The compliance that rigid
-parts then have is taken away again by extrapolation, exactly so where no leg is redundant."""
+STIFFEST_TRIAL = 100.0
+"""The greatest of these stiffnesses, in units of the stiffest part; the least is that of the softest part. The
+compliance that rigid parts then have is taken away again by extrapolation, exactly so where no leg is redundant."""
 LARGEST_CONTRAST = 1e7
 """Largest ratio of stiffnesses in one machine; beyond it a redundant stiff part can stay hidden from every trial."""
 MOST_TRIALS_EXTRAPOLATED = 6
 """Most trials that one extrapolation uses: polynomials of higher degree amplify round-off."""
 STUB_LENGTH = 0.4
-"""Length of the member that represents a joint, as a share of the machine's: its own stiffness does not depend on
-it."""
+"""Length of the member that represents a joint, as a share of the machine's: its own stiffness does not depend on it,
+and members of like lengths keep the equations well conditioned."""
 LOAD_NAMES = ("MX", "MY", "MZ", "FX", "FY", "FZ")
 DISPLACEMENT_NAMES = ("RX", "RY", "RZ", "DX", "DY", "DZ")
+"""Words of PyNite for loads on a node and for its displacements, in the order rx ry rz x y z."""
 
 
 def solve(configuration: Configuration, reference: Vector) -> Answer:
     """Return C with rigid parts of several stiffnesses k, extrapolated to 1/k = 0.
 
     Args:
-        configuration: placed machine.
-        reference: where loads act and motions are read, base frame, m.
+        configuration: the placed machine.
+        reference: the point where loads act and motions are read, base frame, m.
 
     Raises:
         InputError: if it has a part that no member stands for, or stiffnesses too far apart.
@@ -54,7 +55,7 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
             "Stiffnesses of this machine differ by more than seven decades, too much for PyNite, in which rigid parts "
             "must have a finite stiffness as well; use Exudyn."
         )
-    stiffnesses = np.geomspace(softest, STIFFER * stiffest, TRIALS).tolist()
+    stiffnesses = np.geomspace(softest, STIFFEST_TRIAL * stiffest, TRIALS).tolist()
     trials = [Trial(stiff, _compliance(configuration, reference, stiff)) for stiff in stiffnesses]
     best, second_best = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
     return Answer(best, second_best, "stiffness of rigid parts, N/m", tuple(trials))
@@ -105,7 +106,7 @@ def _stiffnesses(piece: Piece, length: float) -> list[float]:
 
 
 def _compliance(configuration: Configuration, reference: Vector, stiff: float) -> Array:
-    """C at the reference, base axes, with this stiffness (N/m) of what is rigid."""
+    """Return C at the reference, base axes, with a stiffness (N/m) of rigid parts."""
     plane = configuration.plane
     axes = np.eye(3) if plane is None else columns(plane.frame.rotation)
     frame = Frame(plane is not None, float(configuration.length), stiff)
@@ -123,15 +124,15 @@ class Frame:
     Attributes:
         model: the `FEModel3D`.
         planar: whether its nodes move in its x-y plane only.
-        length: of the machine, m.
-        stiff: stiffness of rigid parts, N/m; converted to N·m/rad by the length.
+        length: a characteristic length of the machine, m.
+        stiffness: stiffness of rigid parts, N/m; converted to N·m/rad by the length.
         points: coordinates of each node, m.
     """
 
-    def __init__(self, planar: bool, length: float, stiff: float) -> None:
+    def __init__(self, planar: bool, length: float, stiffness: float) -> None:
         self.model: Any = import_module("Pynite").FEModel3D()
         self.model.add_material("unit", 1.0, 1.0, 0.0, 0.0)
-        self.planar, self.length, self.stiff = planar, length, stiff
+        self.planar, self.length, self.stiffness = planar, length, stiffness
         self.points: dict[str, Array] = {}
 
     def node(self, point: Array) -> str:
@@ -187,11 +188,11 @@ class Frame:
         Args:
             ends: its nodes.
             section: E A (N), E I about y and z, G J (N·m²); infinite ones become as stiff as rigid parts.
-            axes: of its cross-section as columns x y z; PyNite's choice if None.
+            axes: axes of its cross-section as columns x y z; PyNite's choice if None.
         """
-        stiff = [self.stiff * self.length, *[self.stiff * self.length**3] * 3]
+        rigid = [self.stiffness * self.length, *[self.stiffness * self.length**3] * 3]
         name = f"M{len(self.model.members)}"
-        self.model.add_section(name, *(s if math.isinf(k) else k for k, s in zip(section, stiff, strict=True)))
+        self.model.add_section(name, *(r if math.isinf(k) else k for k, r in zip(section, rigid, strict=True)))
         self.model.add_member(name, *ends, "unit", name)
         member = self.model.members[name]
         _keep_whole(member)
@@ -201,9 +202,8 @@ class Frame:
 
     def bar(self, near: str, far: str, stiffness: float) -> None:
         """Add a spring (N/m) between two nodes."""
-        self.model.add_spring(
-            f"S{len(self.model.springs)}", near, far, self.stiff if math.isinf(stiffness) else stiffness
-        )
+        finite = self.stiffness if math.isinf(stiffness) else stiffness
+        self.model.add_spring(f"S{len(self.model.springs)}", near, far, finite)
 
     def compliance(self, node: str) -> Array:
         """Return the displacements of a node under six unit loads on it, rx ry rz x y z, in frame axes [6 x 6]."""
@@ -214,7 +214,7 @@ class Frame:
         self.model.analyze_linear(check_stability=False)
         compliance = np.zeros((6, 6))
         for j in moving:
-            compliance[:, j] = [getattr(self.model.nodes[node], what)[LOAD_NAMES[j]] for what in DISPLACEMENT_NAMES]
+            compliance[:, j] = [getattr(self.model.nodes[node], name)[LOAD_NAMES[j]] for name in DISPLACEMENT_NAMES]
         return compliance
 
 
@@ -229,17 +229,17 @@ def _turn(member: Any, axes: Array) -> None:
 
 def _keep_whole(member: Any) -> None:
     """Keep PyNite from joining a member to every node that lies on it: bodies may touch there and yet be free."""
-    split: Callable[[], None] = member.descritize
+    split_at_nodes: Callable[[], None] = member.descritize
 
-    def alone() -> None:
+    def split_at_ends() -> None:
         model = member.model
-        everything, model.nodes = model.nodes, {node.name: node for node in (member.i_node, member.j_node)}
+        all_nodes, model.nodes = model.nodes, {node.name: node for node in (member.i_node, member.j_node)}
         try:
-            split()
+            split_at_nodes()
         finally:
-            model.nodes = everything
+            model.nodes = all_nodes
 
-    member.descritize = alone
+    member.descritize = split_at_ends
 
 
 def _leg(frame: Frame, leg: Leg, chain: Sequence[Piece], axes: Array, platform: str) -> None:
@@ -290,7 +290,7 @@ def _beam(frame: Frame, beam: Beam, axes: Array, at: str) -> str:
 
 
 def _parallelogram(frame: Frame, piece: Parallelogram, axes: Array, at: str) -> str:
-    """Two bars between bodies; stubs for the motions in the parallelogram's plane keep the bodies parallel to it."""
+    """Add two bars between bodies; stubs for the motions in the parallelogram's plane keep them parallel to it."""
     near, far, side = (axes.T @ array(v) for v in (piece.near, piece.far, piece.side))
     along = (far - near) / np.linalg.norm(far - near)
     normal = np.cross(side, along)
