@@ -57,7 +57,7 @@ SETTLING_ROOTS = 20.0
 left of a deflection."""
 SETTLING_PERIODS = 10
 """Periods of the slowest motion that are worth looking at where nothing is damped."""
-CALM = 2.0
+ARMATURE_ROOT = 2.0
 """Square root of a spring's armature over its stiffness, in units of the geometric mean of step and damping time:
 smaller, springs would be too fast for the step; larger, they would still swing where the machine has come to rest."""
 UNKNOWN_COMPLIANCE = 1e-7
@@ -99,10 +99,10 @@ class Pace:
         return stiffness * self.retardation
 
     def armature(self, freedom: Freedom) -> float:
-        """Inertia added to a joint with a spring, kg or kg·m², so that no spring is too fast for the time step."""
+        """Return the inertia added to a joint, kg or kg·m², so that no spring is too fast for the time step."""
         if self.armatures is not None:
             return self.armatures.get(freedom.name, 0.0)
-        return freedom.stiffness * CALM**2 * self.retardation * self.step
+        return freedom.stiffness * ARMATURE_ROOT**2 * self.retardation * self.step
 
 
 def pace_of(analysis: Analysis, model: Model) -> Pace:
@@ -111,17 +111,17 @@ def pace_of(analysis: Analysis, model: Model) -> Pace:
     length = float(analysis.characteristic_length or 1.0)
     gyration = GYRATION * length
     step = step_for(analysis, min(masses.values()), gyration)
-    slowest = math.sqrt(max(compliances(analysis, length)) * sum(masses.values()))
+    root = math.sqrt(max(compliances(analysis, length)) * sum(masses.values()))  # 1/omega of the slowest motion
     places = {body.name: body.origin for body in model.world.every()}
     places[model.platform.name] = np.array(reference_point(analysis))  # so that loads on the platform act there
     inertias = {name: Heavy(mass, places[name], mass * gyration**2 * np.eye(3)) for name, mass in masses.items()}
-    return Pace(step, retardation=2.0 * DAMPING * slowest, settling=SETTLING_ROOTS * slowest, inertias=inertias)
+    return Pace(step, retardation=2.0 * DAMPING * root, settling=SETTLING_ROOTS * root, inertias=inertias)
 
 
-def step_for(analysis: Analysis, least: float, gyration: float) -> float:
+def step_for(analysis: Analysis, least_mass: float, gyration: float) -> float:
     """Return the time step (s) with which constraints are stiff enough, for a least mass (kg) and its gyration (m)."""
-    stiff = min(compliances(analysis, gyration))
-    return math.sqrt(SOFT_CONSTRAINT * stiff * least / (1.0 - IMPEDANCE)) / LEAST_STEPS
+    least_compliance = min(compliances(analysis, gyration))
+    return math.sqrt(SOFT_CONSTRAINT * least_compliance * least_mass / (1.0 - IMPEDANCE)) / LEAST_STEPS
 
 
 def compliances(analysis: Analysis, arm: float) -> list[float]:
@@ -130,8 +130,8 @@ def compliances(analysis: Analysis, arm: float) -> list[float]:
         return [UNKNOWN_COMPLIANCE]
     matrix = np.array(analysis.compliance)
     turns = np.array([name.startswith("r") for name in analysis.components])
-    moving, turning = (float(np.linalg.norm(matrix[np.ix_(block, block)])) for block in (~turns, turns))
-    sizes = moving, turning * arm**2
+    translation, rotation = (float(np.linalg.norm(matrix[np.ix_(block, block)])) for block in (~turns, turns))
+    sizes = translation, rotation * arm**2
     return [size for size in sizes if size > RIGID_BLOCK * max(sizes)] or [UNKNOWN_COMPLIANCE]
 
 
