@@ -36,7 +36,7 @@ class Tool:
     offset: Annotated[
         Three, along_axes("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T")
     ] = NO_VECTOR
-    mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
+    mass: Annotated[float, Quantity("mass", "mass of the platform and the tool together; 0: not counted")] = 0.0
     centre_of_mass: Annotated[Three, along_axes("length", "centre of that mass from P in platform axes: x, y, z")] = (
         NO_VECTOR
     )
@@ -44,10 +44,12 @@ class Tool:
     payload_centre: Annotated[
         Three, along_axes("length", "centre of the payload from the tool point T in platform axes")
     ] = NO_VECTOR
-    inertia: Annotated[Six, inertia_tensor("of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz")] = (
+    inertia: Annotated[
+        Six, inertia_tensor("inertia of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz")
+    ] = NO_INERTIA
+    payload_inertia: Annotated[Six, inertia_tensor("inertia of the payload about its centre, in the same order")] = (
         NO_INERTIA
     )
-    payload_inertia: Annotated[Six, inertia_tensor("of the payload about its centre, in the same order")] = NO_INERTIA
 
 
 @table
@@ -55,7 +57,7 @@ class Drives:
     """Table [drives], in any machine file: rotors, gears and friction of all actuators; [drives.NAME] is for one."""
 
     rotor_inertia: Annotated[
-        float, Quantity("moment of inertia", "of the rotor of each actuator with all that turns with it")
+        float, Quantity("moment of inertia", "inertia of the rotor of each actuator with all that turns with it")
     ] = 0.0
     lead: Annotated[
         float, Quantity("length", "travel of a linear actuator per turn of its rotor", least=LEAST_OF_KIND["length"])
@@ -134,7 +136,7 @@ class Cutting:
 
     pressure: Annotated[float, Quantity("cutting pressure", "cutting force per area of the chip")] = 0.0
     direction: Annotated[
-        Three, along_axes("direction", "across the cut, in which a vibration changes the chip; base axes")
+        Three, along_axes("direction", "direction across the cut, in which a vibration changes the chip; base axes")
     ] = NO_VECTOR
 
 
@@ -145,9 +147,9 @@ class Load:
     moment: Moment = NO_VECTOR
     force: Force = NO_VECTOR
     gravity: Annotated[
-        Three, along_axes("acceleration", "along x, y, z: pulls at the platform and, under load, at all links")
+        Three, along_axes("acceleration", "gravity along x, y, z: pulls at the platform and, under load, at all links")
     ] = NO_VECTOR
-    gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
+    gravity_angle: Annotated[float, Quantity("angle", "angle by which gravity is turned about gravity_axis")] = 0.0
     gravity_axis: Annotated[Three, along_axes("direction", "axis of that turn, of any length")] = (1.0, 0.0, 0.0)
     min_tension: Annotated[
         float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
@@ -184,11 +186,14 @@ class CableTable:
         along_axes("moment", "half sizes of the box of moments about the load that must be held as well, base axes"),
     ] = NO_VECTOR
     linear_density: Annotated[
-        float, Quantity("linear density", "of unstretched cable, which then sags; 0: cables are straight")
+        float,
+        Quantity("linear density", "mass per length of unstretched cable, which then sags; 0: cables are straight"),
     ] = 0.0
     pulley_radius: Annotated[
         float,
-        Quantity("length", "of pulleys at the base, which swivel about the vertical through their joint; 0: none"),
+        Quantity(
+            "length", "radius of pulleys at the base, which swivel about the vertical through their joint; 0: none"
+        ),
     ] = 0.0
 
 

@@ -44,7 +44,7 @@ class DeltaGeometry(Rings):
     arm_length: Annotated[
         float, Quantity("length", "from the actuated revolute to the middle of the elbow", positive=True)
     ]
-    bar_length: Annotated[float, Quantity("length", "of the bars, from elbow to platform", positive=True)]
+    bar_length: Annotated[float, Quantity("length", "length of the bars from elbow to platform", positive=True)]
     bar_spacing: Annotated[float, Quantity("length", "distance of the two bars of a leg", positive=True)]
 
 
@@ -113,17 +113,19 @@ class LinearDeltaGeometry:
     platform_radius: Annotated[
         float, Quantity("length", "from the middle of the platform to the rods' joints on it", positive=True)
     ]
-    rod_length: Annotated[Three, of_three_legs("length", "of the rods of each tower, joint to joint", positive=True)]
+    rod_length: Annotated[
+        Three, of_three_legs("length", "length of the rods of each tower, joint to joint", positive=True)
+    ]
     rod_spacing: Annotated[float, Quantity("length", "distance of the two rods of a tower", positive=True)]
-    platform_height: Annotated[float, Quantity("length", "of the rods' joints over the nozzle, P")]
+    platform_height: Annotated[float, Quantity("length", "height of the rods' joints over the nozzle, P")]
     carriage_offset: Annotated[
         float, Quantity("length", "from the rail of a tower inwards to the rods' joints", positive=True)
     ]
     lean_out: Annotated[
-        Three, of_three_legs("angle", "by which each tower leans away from the z axis, from the bed up")
+        Three, of_three_legs("angle", "angle by which each tower leans away from the z axis, from the bed up")
     ] = NO_LEAN
     lean_aside: Annotated[
-        Three, of_three_legs("angle", "by which each tower leans sideways, to greater tower angles")
+        Three, of_three_legs("angle", "angle by which each tower leans sideways, to greater tower angles")
     ] = NO_LEAN
 
     @property
@@ -142,7 +144,9 @@ class LinearDeltaStiffness:
     ]
     bar_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of each rod, EA")] = RIGID
     carriage_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the carriages, EI")] = RIGID
-    carriage_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of them, GJ")] = RIGID
+    carriage_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the carriages, GJ")] = (
+        RIGID
+    )
 
 
 def linear_delta(geometry: LinearDeltaGeometry, stiffness: LinearDeltaStiffness, pose: Translations) -> Configuration:
@@ -188,13 +192,17 @@ def _tower_axis(radial: Vector, tangential: Vector, lean_out: Scalar, lean_aside
 class OrthoglideGeometry:
     """Table [geometry]; the origin of the base frame is the point P at the isotropic pose."""
 
-    bar_length: Annotated[float, Quantity("length", "of the bars, from slide to platform", positive=True)]
+    bar_length: Annotated[float, Quantity("length", "length of the bars from slide to platform", positive=True)]
     bar_spacing: Annotated[float, Quantity("length", "distance of the two bars of a leg", positive=True)]
     platform_radius: Annotated[
-        float, Quantity("length", "from the platform joints, on the negative x, y, z axes of the platform, to P")
+        float,
+        Quantity("length", "distance of each platform joint from P, on the negative x, y or z axis of the platform"),
     ]
     foot_length: Annotated[
-        float, Quantity("length", "of the foot on each slide, square to the rail, that carries the bars", positive=True)
+        float,
+        Quantity(
+            "length", "length of the foot on each slide, square to the rail, that carries the bars", positive=True
+        ),
     ]
 
 

@@ -68,11 +68,17 @@ class JointType:
 
 SEAT = {
     "radial": Field(
-        Quantity("linear stiffness", "of the bearings in any direction across the joint's axis", positive=True)
+        Quantity(
+            "linear stiffness", "stiffness of the bearings in any direction across the joint's axis", positive=True
+        )
     ),
-    "axial": Field(Quantity("linear stiffness", "of the bearings along the joint's axis", positive=True)),
-    "tilt": Field(Quantity("torsional stiffness", "of the bearings about any axis across the joint's", positive=True)),
-    "torsion": Field(Quantity("torsional stiffness", "of the bearings about the joint's axis", positive=True)),
+    "axial": Field(Quantity("linear stiffness", "stiffness of the bearings along the joint's axis", positive=True)),
+    "tilt": Field(
+        Quantity("torsional stiffness", "stiffness of the bearings about any axis across the joint's", positive=True)
+    ),
+    "torsion": Field(
+        Quantity("torsional stiffness", "stiffness of the bearings about the joint's axis", positive=True)
+    ),
 }
 """Directions in which data sheets give the stiffness of a joint: what is written as stiffness_radial and so on."""
 
@@ -220,7 +226,7 @@ JOINT_TYPES = {
             "point": POINT,
             "far": Field(along_axes("length", "middle of the far short side, base frame, at the home pose")),
             "axis": AXIS,
-            "width": Field(Quantity("length", "of the short sides", positive=True)),
+            "width": Field(Quantity("length", "width of the short sides", positive=True)),
             "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),
         },
         _parallelogram,

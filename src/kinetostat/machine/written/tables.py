@@ -16,7 +16,7 @@ ROD = Field(Quantity("axial rigidity", "EA of a strut's rod, whose stiffness is 
 MATERIAL_FIELDS = {
     "youngs_modulus": Field(Quantity("elastic modulus", "Young's modulus E", positive=True)),
     "shear_modulus": Field(Quantity("elastic modulus", "shear modulus G", positive=True)),
-    "density": Field(Quantity("density", "of the material"), 0.0),
+    "density": Field(Quantity("density", "density of the material"), 0.0),
     "expansion": Field(Quantity("thermal expansion", "relative growth of the material per kelvin; 0: not known"), 0.0),
     "temperature_rise": Field(
         Quantity("temperature difference", "how much warmer these links are than the machine was when built"), 0.0
@@ -25,10 +25,10 @@ MATERIAL_FIELDS = {
 """Fields of a cross-section beside its sizes, with what they are if neither the file nor a known material says it."""
 
 WEIGHT = {
-    "mass": Field(Quantity("mass", "of the link, in the place of what its cross-section weighs")),
-    "centre_of_mass": Field(along_axes("length", "of that mass, base frame at the home pose")),
+    "mass": Field(Quantity("mass", "mass of the link, in the place of what its cross-section weighs")),
+    "centre_of_mass": Field(along_axes("length", "centre of that mass, base frame at the home pose")),
     "inertia": Field(
-        inertia_tensor("of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz")
+        inertia_tensor("inertia of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz")
     ),
 }
 """Fields of a link about its mass; each needs those before it."""
