@@ -51,6 +51,7 @@ _SENTENCES = {
     Ending.DIVERGED: "A step has not led nearer to a solution, or its numbers are not finite.",
     Ending.OUT_OF_STEPS: "The last step that was allowed still changed something.",
 }
+"""Sentences on the ends of an iteration, for people."""
 
 
 class Batch(Protocol):

@@ -20,6 +20,7 @@ from kinetostat.machine.column import stacked_columns
 from kinetostat.numerics.iteration import with_rows
 
 IDENTITY = np.eye(3)
+"""The rotation of a body that is not turned."""
 SMALL_ANGLE = 0.05
 """Angle, rad, below which quotients like (t - sin t) / t^3 come from their series: the first term left out is 2e-16."""
 

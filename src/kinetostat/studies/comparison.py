@@ -37,6 +37,7 @@ MOST_DESIGNS = 12
 OVERRIDE_SEPARATOR = ";"
 """Sign between overrides of one design."""
 _OVERRIDDEN = re.compile(r"(.+?):(\s*[A-Za-z_][\w.-]*\s*=.*)", re.DOTALL)
+"""A design with overrides: the machine, a colon, and what begins with a field and a sign of equality."""
 
 
 @dataclass(frozen=True)

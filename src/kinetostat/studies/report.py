@@ -47,7 +47,7 @@ from kinetostat.studies.vibration import modes
 MAP_POINTS = 41
 """Points along each coordinate of the maps: contours between them are smooth on a page."""
 GUIDELINE_POINTS = 7
-"""Points along each coordinate at which guidelines are tried: some fifty poses, in half a second."""
+"""Points along each coordinate at which guidelines are tried: some fifty poses of a map."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 """Parts that take time and may be left out; an independent engine computes validation (`views.report.writing`)."""
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."

@@ -32,7 +32,7 @@ from kinetostat.tolerances import EQUAL_ROUTES
 DIAGONALS = (*GROUPS["stiffness"], *GROUPS["compliance"])
 """Quantities that are compared: the diagonals of K and C."""
 COMPARED_POSES = 500
-"""Poses at which routes are compared: several slabs of machine code, and a hundredth of a second of NumPy."""
+"""Poses at which routes are compared: many, and yet so few that NumPy computes them at once."""
 TIMED_POSES = 200_000
 """Poses whose time is taken: enough to keep some cores busy for a tenth of a second."""
 

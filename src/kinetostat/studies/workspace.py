@@ -52,7 +52,8 @@ HOME_MODE = "that of the home pose"
 HALF_STEP = 0.5001
 """Distance from a node, in steps of the grid, within which a pose belongs to it, with some room for round-off."""
 MOST_DEMANDS = 200_000
-"""Inside nodes at which lengths, angles and loads are computed, in a second; of more nodes, evenly chosen ones."""
+"""Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones, whose extremes are
+those of all but for a step of the grid."""
 UNIT_POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 """Signs of the powers of a unit in the unit of a volume."""
 FEWEST_CELLS = 30

@@ -61,9 +61,9 @@ COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": oper
 CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
 """The end of messages about a text that is not a condition."""
 LONGEST_CONDITION = 200
-"""Characters of a condition: more are no condition, and the search for one takes the longer."""
-
+"""Characters of a condition; a longer text is refused unread."""
 _CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
+"""A condition: quantity, comparison and value."""
 COMPARED_KINDS = (
     *("length", "angle", "force", "moment", "mass", "frequency"),
     *("speed", "rate", "acceleration", "angular acceleration"),
@@ -74,6 +74,7 @@ _BY_UNIT = {
     for kind in KINDS.values()
     if kind.name.endswith(("stiffness", "compliance")) or kind.name in COMPARED_KINDS
 }
+"""Kind of the value with which a quantity of a unit is compared; values of other units are plain numbers."""
 
 
 @dataclass(frozen=True)
