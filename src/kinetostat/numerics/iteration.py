@@ -181,7 +181,8 @@ def newton(
         if not rows.size:
             break
     # Problems that are open after the last step keep what it has led to.
-    return Solution(_with_part(value, rows, trial, np.ones(len(rows), dtype=bool)), outcome, residual, steps, longest)
+    value = _with_part(value, rows, trial, np.ones(len(rows), dtype=bool))
+    return Solution(value=value, outcome=outcome, residual=residual, steps=steps, longest_step=longest)
 
 
 def _foreseen_end(length: Array, last_length: Array, arrived: Mask, round_off: float) -> Mask:
@@ -256,7 +257,9 @@ def least_squares(
         stuck = ~solved & ~(damping[rows] < MOST_DAMPING)
         outcome[rows[solved]], outcome[rows[stuck]] = Ending.CONVERGED, Ending.DIVERGED
         is_open[rows] = ~solved & ~stuck
-    return Solution(value, outcome, largest(residuals), steps, np.zeros(count))
+    return Solution(
+        value=value, outcome=outcome, residual=largest(residuals), steps=steps, longest_step=np.zeros(count)
+    )
 
 
 def damped_steps(residuals: Array, rates: Array, damping: Array) -> Array:

@@ -124,7 +124,9 @@ def stiffness_along(
             f"The direction {shorten(direction)} is zero, or perpendicular to the plane of this machine; give three "
             "numbers, e.g. (1, 0, 0), on the command line --along 1,0,0."
         )
-    return Along(np.array(direction), force, force_held, moment, moment_held)
+    return Along(
+        direction=np.array(direction), force=force, force_held=force_held, moment=moment, moment_held=moment_held
+    )
 
 
 def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:

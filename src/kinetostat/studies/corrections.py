@@ -115,7 +115,8 @@ def shortest_law(
     for terms in _candidates(paths, [len(axis) for axis in axes], int(has_correction.sum())):
         functions = _functions(terms, [axis[has_correction] for axis in points], middles, halves)
         coefficients: Array = np.linalg.lstsq(functions, corrections[has_correction], rcond=None)[0].astype(float)
-        law = _without_round_off(Law(tuple(paths), middles, halves, terms, coefficients))
+        law = Law(paths=tuple(paths), middles=middles, halves=halves, terms=terms, coefficients=coefficients)
+        law = _without_round_off(law)
         law_error = error(law)
         if best is None or law_error < best[1]:
             best = law, law_error

@@ -235,7 +235,8 @@ def grid_question(machine: Machine | MachineState, ranges: Sequence[str], quanti
     varied = [(parameter, axis.values) for parameter, axis in zip(chosen, grid.axes, strict=True)]
     about = origin_of(machine, leaves, uncounted_loads(state, names, varied))
     labels = xr.Dataset({}, _coordinates(grid, pairs), about)
-    return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
+    fields = tuple(parameter.path for parameter in chosen)
+    return GridQuestion(machine=machine, grid=grid, fields=fields, names=tuple(names), labels=labels)
 
 
 def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def _curve(first: Array, last: Array, places: Sequence[int], size: float, arc: A
     """The line from a pose to another one, or the arc if there is one; arguments as of `moves_between`."""
     length = float(np.linalg.norm(last[places] - first[places])) if arc is None else arc.radius * arc.angle
     turn = float(np.linalg.norm(np.delete(last - first, places)))
-    return Curve(first, last, length or turn * size, tuple(places), arc)
+    return Curve(start=first, end=last, length=length or turn * size, places=tuple(places), arc=arc)
 
 
 def _arc(start: Array, middle: Array, end: Array) -> Arc | None:
