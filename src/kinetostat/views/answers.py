@@ -160,14 +160,14 @@ def _writers(what: object) -> dict[str, Writer]:
         return {".png": partial(write_content, what)}
     if not kind_of(what).description:
         files = FILES_OF_A_MACHINE.items()
-        return {suffix: partial(write_made, late(made), what) for suffix, made in files}
+        return {suffix: partial(write_made, late(maker), what) for suffix, maker in files}
     description = description_of(what)
     return {f".{form}": partial(write_form, description, what, form) for form in description.forms}
 
 
-def write_made(made: Callable[[Any], Any], what: object, path: Path) -> None:
+def write_made(maker: Callable[[Any], Any], what: object, path: Path) -> None:
     """Write what a function makes of a machine."""
-    write_content(made(what), path)
+    write_content(maker(what), path)
 
 
 def write_form(description: Description, answer: object, form: str, path: Path) -> None:

@@ -61,10 +61,10 @@ def _lines(answer: Budget) -> Lines:
 
 def _exact_sentence(answer: Budget, exact: ExactSample) -> str:
     show, place = answer.machine.display.show_deflection, answer.measures.index(answer.leading)
-    lost = f" {exact.failed:,} of them cannot be assembled." if exact.failed else ""
+    failures = f" {exact.failed:,} of them cannot be assembled." if exact.failed else ""
     return (
         f"{exact.machines:,} machines solved exactly: 95 % keep within {show(float(exact.usual[place]), 'm')}; the "
-        f"first order is off by at most {show(float(exact.difference[place]), 'm')}.{lost} Single contributions "
+        f"first order is off by at most {show(float(exact.difference[place]), 'm')}.{failures} Single contributions "
         f"explain all of the variance but {number(100.0 * float(exact.unexplained[place]), digits=2)} %."
     )
 

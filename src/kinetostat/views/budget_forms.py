@@ -144,10 +144,10 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
         "largest single tolerances": {budget.parts[i].words: rows[:, i].tolist() for i in order},
     }
     heights = [len(bars) + 0.6 for bars in panels.values()]
-    beside = max(LEAST_LABEL_WIDTH, layout.width_of(label for bars in panels.values() for label in bars))
+    label_width = max(LEAST_LABEL_WIDTH, layout.width_of(label for bars in panels.values() for label in bars))
     many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
     with figures.new_figure(
-        (beside + 2.4, 1.4 + 0.24 * sum(heights)), title.format(budget.machine.name), many
+        (label_width + 2.4, 1.4 + 0.24 * sum(heights)), title.format(budget.machine.name), many
     ) as figure:
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
         for panel, (name, bars) in zip(axes, panels.items(), strict=True):

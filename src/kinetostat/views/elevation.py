@@ -243,19 +243,21 @@ def _panels(answer: Elevation) -> list[PanelContent]:
     motions = answer.components, component_units(answer.components), answer.displacement.T
     loads = answer.actuators, map(load_unit, answer.turning), answer.loads.T
     corrections = commands.actuators, commands.units, commands.corrections.T
-    moved, carried, corrected = (list(zip(*columns, strict=True)) for columns in (motions, loads, corrections))
+    motion_rows, load_rows, correction_rows = (
+        list(zip(*columns, strict=True)) for columns in (motions, loads, corrections)
+    )
 
     def of_unit(unit: str, rows: list[Any]) -> dict[str, Array]:
         return {name: values for name, unit_of_values, values in rows if unit_of_values == unit}
 
     panels = [
-        PanelContent("displacement", "m", of_unit("m", moved), fitting=True),
-        PanelContent("rotation", "rad", of_unit("rad", moved), fitting=True),
+        PanelContent("displacement", "m", of_unit("m", motion_rows), fitting=True),
+        PanelContent("rotation", "rad", of_unit("rad", motion_rows), fitting=True),
         PanelContent("first frequency", "Hz", {"": answer.frequency}),
-        PanelContent("force, pulling", "N", of_unit("N", carried)),
-        PanelContent("moment", "N·m", of_unit("N·m", carried)),
+        PanelContent("force, pulling", "N", of_unit("N", load_rows)),
+        PanelContent("moment", "N·m", of_unit("N·m", load_rows)),
         PanelContent("error, 95 %", "m", {} if answer.budget is None else {"": answer.error}, fitting=True),
-        *(PanelContent("correction", unit, of_unit(unit, corrected), fitting=True) for unit in ("m", "rad")),
+        *(PanelContent("correction", unit, of_unit(unit, correction_rows), fitting=True) for unit in ("m", "rad")),
     ]
     return [panel for panel in panels if any(np.isfinite(values).any() for values in panel.curves.values())]
 

@@ -206,21 +206,21 @@ def region_colours(count: int) -> Array:
     return np.asarray(mpl.colormaps["viridis"](np.linspace(0.1, 0.95, count)))
 
 
-def fill_regions(panel: Axes, x: Array, y: Array, places: Any, known: Any, colours: Any) -> QuadMesh:
+def fill_regions(panel: Axes, x: Array, y: Array, places: Any, has_result: Any, colours: Any) -> QuadMesh:
     """Fill a panel pose by pose, without any value between two poses.
 
     Args:
         panel: the panel to fill.
         x, y: the coordinates of the poses, as the axes show them.
         places: the place of each pose's colour [y x x].
-        known: whether there is a result; elsewhere the panel is grey [y x x].
+        has_result: whether there is a result; elsewhere the panel is grey [y x x].
         colours: the colours from which they are taken.
     """
     panel.set_facecolor("#eeeeee")
     panel.grid(visible=False)
-    shown, most = np.ma.masked_array(places, ~known), len(colours) - 0.5
+    shown, end = np.ma.masked_array(places, ~has_result), len(colours) - 0.5
     palette = ListedColormap(colours)
-    return panel.pcolormesh(x, y, shown, cmap=palette, vmin=-0.5, vmax=most, shading="nearest", rasterized=True)
+    return panel.pcolormesh(x, y, shown, cmap=palette, vmin=-0.5, vmax=end, shading="nearest", rasterized=True)
 
 
 def slim_bar(bar: Colorbar) -> None:

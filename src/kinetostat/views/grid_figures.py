@@ -94,8 +94,10 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     across, up = dataset["status"].dims
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    (width, height), (beside, above) = MAP_SIZE, ROOM_BESIDE_MAPS
-    with new_figure((width * columns + beside, height * rows + above), title, *setting_lines(dataset)) as figure:
+    (width, height), (room_beside, room_above) = MAP_SIZE, ROOM_BESIDE_MAPS
+    with new_figure(
+        (width * columns + room_beside, height * rows + room_above), title, *setting_lines(dataset)
+    ) as figure:
         mpl.rcParams["axes.grid"] = False
         panels = figure.subplots(rows, columns, squeeze=False).flat
         x, x_label = axis_values(dataset, str(across))
@@ -166,10 +168,10 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: S
     return [panel.contour(filled, levels=levels.bounds[::2], colors="white", linewidths=0.5)]
 
 
-def _label_outside(panel: Axes, below: str, beside: str) -> None:
+def _label_outside(panel: Axes, x_label: str, y_label: str) -> None:
     """Label the axes of a panel of several that share them; a label is empty where another panel has it."""
-    panel.set(xlabel=below, ylabel=beside)
-    panel.tick_params(labelbottom=bool(below), labelleft=bool(beside))
+    panel.set(xlabel=x_label, ylabel=y_label)
+    panel.tick_params(labelbottom=bool(x_label), labelleft=bool(y_label))
 
 
 def _is_count(data: xr.DataArray) -> bool:

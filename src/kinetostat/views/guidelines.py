@@ -83,8 +83,8 @@ def _lines(answer: Guidelines) -> Lines:
         about += f" Over {', '.join(answer.ranges)}: {answered:,} of {poses:,} poses have a result."
     yield "Directions", about
     for statement in statements(answer):
-        aside = "" if statement.holds is None else f" [{over_poses(statement.holds)}]"
-        yield TOPICS[statement.topic], f"{statement.text}{aside}"
+        extent = "" if statement.holds is None else f" [{over_poses(statement.holds)}]"
+        yield TOPICS[statement.topic], f"{statement.text}{extent}"
     if answer.here is not None:
         yield "Percent", answer.meaning
         yield from (("Others", sentence) for sentence in _left_out(answer))
@@ -133,10 +133,10 @@ def _equation_table(answer: Guidelines, rows: dict[str, Array]) -> FittedTable:
     return table
 
 
-def _element_table(answer: Guidelines, here: Roles) -> FittedTable:
+def _element_table(answer: Guidelines, roles: Roles) -> FittedTable:
     """Return the share of each element in the compliance of each direction."""
     table = numeric_table("Attribution: share of each element in the diagonal of C", "element", answer.components)
-    for element, row in zip(answer.elements, _at_pose(here.shares).tolist(), strict=True):
+    for element, row in zip(answer.elements, _at_pose(roles.shares).tolist(), strict=True):
         table.add_row(element.name, *(_share_text(part) for part in row))
     return table
 
@@ -147,7 +147,7 @@ def _share_text(part: float) -> Text:
     return Text(f"{100 * part:.1f} %", "bold" if part >= BOLD_SHARE else "" if part >= DECIDING_SHARE else "dim")
 
 
-def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
+def _limit_table(answer: Guidelines, roles: Roles) -> FittedTable:
     """Return the stiffness from which each element counts as rigid.
 
     An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
@@ -158,7 +158,7 @@ def _limit_table(answer: Guidelines, here: Roles) -> FittedTable:
     )
     table = numeric_table(title, "element", ["now", *answer.components])
     for k, element in enumerate(answer.elements):
-        factors, scale = _at_pose(here.rigid)[k].tolist(), answer.machine.display.scale(element.unit)
+        factors, scale = _at_pose(roles.rigid)[k].tolist(), answer.machine.display.scale(element.unit)
         if element.stiffness is None:
             present, now = 1.0, "1 × now"
         elif element.stiffness == math.inf:  # the limits of a rigid element are stiffnesses themselves
@@ -242,9 +242,9 @@ def rigid_figure(
     """Draw the stiffness of each direction against that of each element, with dots where it becomes rigid."""
     columns = min(3, len(limited))
     rows = -(-len(limited) // columns)
-    (width, height), (beside, above) = PANEL_SIZE, ROOM_BESIDE_PANELS
+    (width, height), (legend_width, title_height) = PANEL_SIZE, ROOM_BESIDE_PANELS
     with figures.new_figure(
-        (width * columns + beside, height * rows + above),
+        (width * columns + legend_width, height * rows + title_height),
         title.format(guidelines.machine.name),
         setting_of(guidelines.machine),
         guidelines.loads_left_out,

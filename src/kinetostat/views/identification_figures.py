@@ -76,13 +76,13 @@ def _component_names(answer: Identification) -> AnyArray:
 
 def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: Array) -> None:
     """Draw the residuals of some rows over their lines, a colour for each component; outliers are black crosses."""
-    names, kept = _component_names(answer), answer.fit.kept
+    names, is_kept = _component_names(answer), answer.fit.kept
     lines = np.array(answer.observed.data.lines)[answer.observed.row_poses]
     for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
-        of_name = rows & kept & (names == name)
+        of_name = rows & is_kept & (names == name)
         panel.plot(lines[of_name], residuals[of_name], ".", color=colour, ms=3, label=name)
-    edge = ROOM_ABOVE_RESIDUALS * np.abs(residuals[rows & kept]).max(initial=LEAST_RESIDUAL)
-    outliers = rows & ~kept
+    edge = ROOM_ABOVE_RESIDUALS * np.abs(residuals[rows & is_kept]).max(initial=LEAST_RESIDUAL)
+    outliers = rows & ~is_kept
     if outliers.any():
         shown = np.clip(residuals[outliers], -OUTLIER_PLACE * edge, OUTLIER_PLACE * edge)
         panel.plot(lines[outliers], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
@@ -98,8 +98,8 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     size = min(least + UNKNOWN_SIZE * len(matrix), greatest)
     named = answer.unknowns if len(matrix) <= MOST_PATHS else ()
     names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in named]
-    beside = max(LEAST_PATH_WIDTH, width_of(names, PATH_SIZE))
-    with new_figure((size + beside + 0.8, size + beside + 0.2), title.format(answer.machine.name)) as figure:
+    path_width = max(LEAST_PATH_WIDTH, width_of(names, PATH_SIZE))
+    with new_figure((size + path_width + 0.8, size + path_width + 0.2), title.format(answer.machine.name)) as figure:
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)

@@ -96,8 +96,8 @@ def loaded_lines(state: LoadedState) -> Lines:
     if not state.loaded:
         yield "Loads", f"Nothing loads the machine: {NOTHING_LOADS}."
     if state.compliance is not None:
-        felt = stiffness_sentence(names, [row[i] for i, row in enumerate(state.compliance)], display)
-        yield "Stiffness", f"{felt} (against further loads, at the loaded {state.machine.reference}, base axes)."
+        stiffnesses = stiffness_sentence(names, [row[i] for i, row in enumerate(state.compliance)], display)
+        yield "Stiffness", f"{stiffnesses} (against further loads, at the loaded {state.machine.reference}, base axes)."
     if state.softest:
         yield "Softest", softest_sentence(state.softest, display)
     if state.loaded:
@@ -109,20 +109,20 @@ def loaded_lines(state: LoadedState) -> Lines:
 def sag_sentence(state: LoadedState) -> str:
     """Say how far the loads move and turn the tool."""
     show = state.machine.display.show_deflection
-    moved, turned = map(show, state.tool_motion, ("m", "rad"))
-    return f"The loads move the {state.machine.reference} by {moved} and turn it by {turned}."
+    displacement, rotation = map(show, state.tool_motion, ("m", "rad"))
+    return f"The loads move the {state.machine.reference} by {displacement} and turn it by {rotation}."
 
 
 def actuator_sentence(state: LoadedState) -> str:
     """Say which actuators carry most, and how much of their limits they use."""
     show, parts = state.machine.display.show, []
     for turns, kind in KINDS_OF_LOADS:
-        driven = [spring for spring in actuator_springs(state) if spring.turning is turns]
-        if driven:
-            most = max(driven, key=lambda spring: abs(spring.load))
-            direction = "" if turns or not most.load else ", which pulls" if most.load > 0.0 else ", which pushes"
-            size = show(abs(most.load), load_unit(turns))
-            parts.append(f"the greatest {kind} of an actuator is {size} ({most.name}{direction})")
+        springs = [spring for spring in actuator_springs(state) if spring.turning is turns]
+        if springs:
+            hardest = max(springs, key=lambda spring: abs(spring.load))
+            direction = "" if turns or not hardest.load else ", which pulls" if hardest.load > 0.0 else ", which pushes"
+            size = show(abs(hardest.load), load_unit(turns))
+            parts.append(f"the greatest {kind} of an actuator is {size} ({hardest.name}{direction})")
     if not parts:
         return ""
     text, use = "; ".join(parts), state.limit_use
@@ -204,11 +204,11 @@ def _kinds_table(state: LoadedState) -> FittedTable:
     for (kind, turning), members in kinds.items():
         loads = [spring.load for spring in members]
         ends = (display.show(end, load_unit(turning)) for end in (min(loads), max(loads)))
-        most = max((spring.deformation for spring in members), key=abs)
+        deformation = max((spring.deformation for spring in members), key=abs)
         name = f"{kind} ×{len(members)}" if len(members) > 1 else members[0].name
         slack = sum(spring.slack for spring in members)
-        deformation = display.show_deflection(most, motion_unit(turning))
-        table.add_row(name, *ends, deformation, str(slack) if slack else DASH)
+        deformation_text = display.show_deflection(deformation, motion_unit(turning))
+        table.add_row(name, *ends, deformation_text, str(slack) if slack else DASH)
     return table
 
 
@@ -267,8 +267,8 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "F
 def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
     """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed."""
     machine, response = state.machine, state.state.free
-    moved, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
-    draw, factor = moved_machine(machine, response, moved, state.slack_legs)
+    motions, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
+    draw, factor = moved_machine(machine, response, motions, state.slack_legs)
     with mpl.rc_context(figures.STYLE):
         figure = drawing.views_of(
             response.configuration,
@@ -281,20 +281,20 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
 
 
 def moved_machine(
-    machine: Machine, response: Response, moved: Deflection, slack_legs: Sequence[str] = ()
+    machine: Machine, response: Response, motions: Deflection, slack_legs: Sequence[str] = ()
 ) -> tuple[Callable[["Axes", Projection], None], float]:
     """Return a function that draws a moved machine over the machine at its pose, and the factor of exaggeration.
 
     Args:
         machine: the machine at its pose.
         response: the response of the machine there.
-        moved: motions of tool and links from that pose.
+        motions: motions of tool and links from that pose.
         slack_legs: the names of the legs whose links are dashed.
     """
     configuration, (moved_colour, slack_colour) = response.configuration, figures.COLOURS[:2]
-    factor = overlays.exaggeration_of(response, moved, anatomy.proportions_of(machine, configuration).diagonal)
+    factor = overlays.exaggeration_of(response, motions, anatomy.proportions_of(machine, configuration).diagonal)
     point = machine.tool_point(configuration.platform)
-    motion = overlays.exaggerated_displacement(moved.motion, point, factor)
+    motion = overlays.exaggerated_displacement(motions.motion, point, factor)
     heads = drawing.ring_of([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
 
     def draw(panel: "Axes", project: Projection) -> None:
@@ -302,11 +302,11 @@ def moved_machine(
             panel.plot(*project(list(leg.path)), color=UNLOADED_COLOUR, linewidth=1.6, solid_capstyle="round")
         for points, colour in ((heads, UNLOADED_COLOUR), ([motion.apply(head) for head in heads], moved_colour)):
             panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
-        for link in moved.links:
-            bent = [link.point(i / PIECES_OF_LINK, factor) for i in range(PIECES_OF_LINK + 1)]
+        for link in motions.links:
+            points_of_link = [link.point(i / PIECES_OF_LINK, factor) for i in range(PIECES_OF_LINK + 1)]
             slack = link.leg in slack_legs
-            dash, wide = ("--", 0.9) if slack else ("-", 1.6)
-            panel.plot(*project(bent), dash, color=slack_colour if slack else moved_colour, linewidth=wide)
+            dash, width = ("--", 0.9) if slack else ("-", 1.6)
+            panel.plot(*project(points_of_link), dash, color=slack_colour if slack else moved_colour, linewidth=width)
         for tip, colour in ((point, UNLOADED_COLOUR), (motion.apply(point), moved_colour)):
             panel.plot(*project([tip]), "+", color=colour, markersize=7, markeredgewidth=1.2)
 
@@ -339,8 +339,8 @@ def bars_figure(state: LoadedState) -> "Figure":
         turns: [(name, spring) for name, spring in shown if spring.turning is turns] for turns, _ in KINDS_OF_LOADS
     }
     groups = {turns: group for turns, group in by_kind.items() if group}
-    beside = max(LEAST_NAME_WIDTH, layout.width_of(name for name, _ in shown))
-    with figures.new_figure((beside + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
+    name_width = max(LEAST_NAME_WIDTH, layout.width_of(name for name, _ in shown))
+    with figures.new_figure((name_width + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
         heights = [len(group) + 1 for group in groups.values()]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
         for panel, (turns, group) in zip(panels, groups.items(), strict=True):

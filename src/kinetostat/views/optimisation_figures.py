@@ -62,8 +62,8 @@ def convergence(log: Log, title: str) -> Figure:
         left.legend()
         end = best[np.isfinite(best)][-1:] if np.isfinite(best).any() else np.array([np.nan])
         for values, colour, label, dash in ((mean, COLOURS[1], "mean", "--"), (best, COLOURS[0], "best", "-")):
-            away = np.abs(values - end) / np.abs(end)
-            right.plot(steps, np.where(away > 0.0, away, np.nan), dash, color=colour, label=label)
+            distance = np.abs(values - end) / np.abs(end)
+            right.plot(steps, np.where(distance > 0.0, distance, np.nan), dash, color=colour, label=label)
         right.set(xlabel=across, ylabel="relative distance to the last best", yscale="log")
         for panel in (left, right):
             panel.margins(x=0.02)

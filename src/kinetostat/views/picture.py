@@ -199,8 +199,8 @@ def _solids_seen(hits: Sequence[Hits], lights: Sequence[Light], camera: Camera, 
     for body, light in zip(hits, lights, strict=True):
         color = srgb_of(np.minimum(brightness * shaded_colors(body.look, body.normals, body.to_eye, light), 1.0))
         opacity = opacities[body.look]
-        ahead = body.nearness[body.pixel] >= hits[0].nearness[body.pixel]
-        pixel, sample = body.pixel[ahead], body.sample[ahead]
+        in_front = body.nearness[body.pixel] >= hits[0].nearness[body.pixel]
+        pixel, sample = body.pixel[in_front], body.sample[in_front]
         canvas[pixel] *= 1.0 - opacity[sample]
         canvas[pixel] += np.concatenate([color, np.ones_like(opacity)], axis=1)[sample] * opacity[sample]
     finer = canvas.reshape(camera.height, SAMPLES_PER_SIDE, camera.width, SAMPLES_PER_SIDE, 4)

@@ -272,16 +272,16 @@ class Question:
     reports_progress: bool = False
     full: str = ""
 
-    def arguments(self, given: Mapping[str, Any]) -> tuple[list[str], dict[str, Any]]:
+    def arguments(self, values: Mapping[str, Any]) -> tuple[list[str], dict[str, Any]]:
         """Part the options that were given into overrides of the machine's file and arguments of `answer`.
 
         Args:
-            given: values of all options by name; those without a value are left to the defaults of `answer`.
+            values: values of all options by name; those without a value are left to the defaults of `answer`.
         """
         tables = [option.name for option in self.options if option.kind == "setting"]
-        overrides = [f"{table}.{text}" for table in tables for text in given[table]]
-        chosen = {name: value for name, value in given.items() if name not in tables and value not in (None, [])}
-        return overrides, chosen
+        overrides = [f"{table}.{text}" for table in tables for text in values[table]]
+        arguments = {name: value for name, value in values.items() if name not in tables and value not in (None, [])}
+        return overrides, arguments
 
 
 QUANTITIES = (

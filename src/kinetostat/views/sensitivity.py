@@ -134,9 +134,11 @@ def coloured_table(
     """
     shown = list(rows)[:MOST_ROWS]
     cells = np.array([rows[path] for path in shown], dtype=float)
-    (width, height), (beside, above) = CELL_SIZE, ROOM_BESIDE_CELLS
+    (width, height), (bar_width, room_above) = CELL_SIZE, ROOM_BESIDE_CELLS
     name_width = max(LEAST_NAME_WIDTH, layout.width_of(shown))
-    with figures.new_figure((name_width + beside + width * len(heads), above + height * len(shown)), *titles) as figure:
+    with figures.new_figure(
+        (name_width + bar_width + width * len(heads), room_above + height * len(shown)), *titles
+    ) as figure:
         panel = figure.subplots()
         room = int(LETTERS_PER_INCH * BAR_SHARE * figure.get_figheight())
         _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))

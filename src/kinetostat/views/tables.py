@@ -60,8 +60,8 @@ class FittedTable(Table):
         """Return the widths that the table may have: at most that at which nothing is broken."""
         columns = [_ColumnWidths(column) for column in self.columns]
         whole = sum(column.aligned for column in columns) + COLUMN_GAP * (len(columns) - 1) + EDGE_SPACE
-        most = min(max(whole, cell_len(str(self.title or ""))), options.max_width)
-        return Measurement(min(most, EDGE_SPACE + max((column.least for column in columns), default=0)), most)
+        greatest = min(max(whole, cell_len(str(self.title or ""))), options.max_width)
+        return Measurement(min(greatest, EDGE_SPACE + max((column.least for column in columns), default=0)), greatest)
 
     def _part(self, shown: "Sequence[_ColumnWidths]", gap: int, width: int) -> Table:
         """Return a table of some columns, of fixed widths."""

@@ -63,7 +63,7 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> "Fig
     """Draw the tension of each cable as a bar, and the bounds that are near."""
     scale = answer.machine.display.scale("N")
     sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
-    least, most = (bound * scale.factor for bound in answer.bounds)
+    lowest, greatest = (bound * scale.factor for bound in answer.bounds)
     with figures.new_figure(
         (6.0, 1.3 + BAR_HEIGHT * len(sizes)), title.format(answer.machine.name), setting_of(answer.machine)
     ) as figure:
@@ -76,7 +76,7 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> "Fig
         panel.set_xlabel(scale.label("tension"))
         panel.grid(visible=False, axis="y")
         panel.set_axisbelow(True)
-        near = [bound for bound in (least, most) if 0.0 < bound < FARTHEST_BOUND * max(sizes)]
+        near = [bound for bound in (lowest, greatest) if 0.0 < bound < FARTHEST_BOUND * max(sizes)]
         for bound in near:
             panel.axvline(bound, color=figures.COLOURS[1], linewidth=1.2, label="bound" if bound == near[0] else None)
         if near:

@@ -79,9 +79,9 @@ def _engine_tables(validation: Validation, full: bool) -> Iterator[FittedTable]:
         yield table
     if full:
         family, display = validation.machine.family, validation.machine.display
-        kept = list(family.components)
+        components = list(family.components)
         for title, matrix in {"kinetostat": validation.ours, validation.engine: validation.theirs}.items():
-            rows = matrix[kept][:, kept].tolist()
+            rows = matrix[components][:, components].tolist()
             yield matrix_table(f"Compliance C, {title}", "compliance", family.component_names, rows, display)
 
 

@@ -58,8 +58,8 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
     They are those along the direction that was asked for; along x, y and z if there was none.
     """
     machine, frequencies = answer.machine, frequency_range(answer)
-    still = "" if answer.loops is None else " with motors that stand still"
-    legend = f"grey lines: natural frequencies{still}, numbered from the lowest; circles: least real part, "
+    motors = "" if answer.loops is None else " with motors that stand still"
+    legend = f"grey lines: natural frequencies{motors}, numbered from the lowest; circles: least real part, "
     legend += "which limits a cut"
     with new_figure((7.6, 5.6), title.format(machine.name), setting_of(machine, []), legend) as figure:
         panels = _response_panels(figure)

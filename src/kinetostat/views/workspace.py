@@ -234,8 +234,8 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
     labels, conditions = answer.verdicts, answer.conditions
     columns = min(3, len(cuts))
     rows = -(-len(cuts) // columns)
-    wide = 4.6 if len(cuts) == 1 else 2.6
-    with figures.new_figure((wide * columns + 0.3, 0.9 * wide * rows + 0.9), title) as figure:
+    width = 4.6 if len(cuts) == 1 else 2.6
+    with figures.new_figure((width * columns + 0.3, 0.9 * width * rows + 0.9), title) as figure:
         panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
         borders: set[PoseCondition] = set()
         for panel, cut in zip(panels, cuts, strict=False):
@@ -244,7 +244,7 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
                 panel.set_title(_coordinate_text(cut, along))
         for panel in panels[len(cuts) :]:
             panel.remove()
-        map_scales.trim_height(figure, panels[0], 0.85 * wide * rows)
+        map_scales.trim_height(figure, panels[0], 0.85 * width * rows)
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(
             handles=[*_patches(cuts, labels), *_border_legend(conditions, borders)],

@@ -51,10 +51,10 @@ class Camera:
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """Project points [n x 3] (m) to pixels [n x 2] from the upper left corner; also 1 / depth [n], 1/m."""
-        seen = (points - self.eye) @ self.axes.T
-        nearness = 1.0 / seen[:, 2]
+        from_eye = (points - self.eye) @ self.axes.T
+        nearness = 1.0 / from_eye[:, 2]
         centre = (0.5 * self.width, 0.5 * self.height)
-        return seen[:, :2] * (self.focal * nearness)[:, None] + centre, nearness
+        return from_eye[:, :2] * (self.focal * nearness)[:, None] + centre, nearness
 
     def rays(self, x: Array, y: Array) -> Array:
         """Return vectors [... x 3] from the eye through points of the picture (pixels), scaled to a depth of 1 m."""
@@ -68,10 +68,10 @@ class Camera:
 
 def axes_towards(forward: Sequence[float] | Array) -> Array:
     """Return the axes to the right, down and forward of a viewer who looks that way with z up, [3 x 3] by rows."""
-    ahead = np.array(forward) / np.linalg.norm(forward)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    unit_forward = np.array(forward) / np.linalg.norm(forward)
+    right = np.cross(unit_forward, (0.0, 0.0, 1.0))
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 0.0 else np.array((1.0, 0.0, 0.0))
-    return np.stack([right, np.cross(ahead, right), ahead])
+    return np.stack([right, np.cross(unit_forward, right), unit_forward])
 
 
 def camera_on(points: Array, direction: Sequence[float], width: int, height: int) -> Camera:
@@ -90,8 +90,8 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
     target = 0.5 * (points.min(axis=0) + points.max(axis=0))
     distance = float(np.linalg.norm(np.ptp(points, axis=0))) / half.min()
     for _ in range(FITTING_STEPS):
-        seen = (points - target) @ axes.T + (0.0, 0.0, distance)
-        slopes = seen[:, :2] / seen[:, 2:]
+        from_eye = (points - target) @ axes.T + (0.0, 0.0, distance)
+        slopes = from_eye[:, :2] / from_eye[:, 2:]
         low, high = slopes.min(axis=0), slopes.max(axis=0)
         target = target + 0.5 * distance * (low + high) @ axes[:2]
         distance *= float(np.max(0.5 * (high - low) / half)) / (1.0 - 2.0 * EMPTY_MARGIN)

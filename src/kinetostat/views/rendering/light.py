@@ -97,7 +97,7 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
     low, high = box.min(axis=0), box.max(axis=0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
     places, facing = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (points, normals))
-    aside = LOOKUP_BLUR * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
+    map_offsets = LOOKUP_BLUR * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
     parts = [slice(start, start + BLOCK_POINTS) for start in range(0, len(points), BLOCK_POINTS)]
     sums = []
     with ThreadPoolExecutor(available_cores()) as threads:
@@ -105,7 +105,7 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
             side = min(largest, detail)
             lamps = list(threads.map(partial(_lamp, casters, centre, radius, side), directions))
             mean_light = partial(_mean_light, lamps, 2.0 * LIFTED_PIXELS * radius / side)
-            pieces = zip(*((places[:, part], facing[:, part], aside[:, part]) for part in parts), strict=True)
+            pieces = zip(*((places[:, part], facing[:, part], map_offsets[:, part]) for part in parts), strict=True)
             sums.append(np.concatenate(list(threads.map(mean_light, *pieces)), axis=1))
     (sun, _), (sky, unhidden) = sums
     return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, 1e-6), 1.0))
@@ -121,23 +121,25 @@ def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction
     nearest[nearest == 0.0] = -np.inf  # no caster: lit at every depth
     map_axes, map_shift = axes.astype(np.float32), shift.astype(np.float32)[:, None]
 
-    def reaches(points: Float32s, aside: Float32s) -> Mask:
+    def reaches(points: Float32s, map_offsets: Float32s) -> Mask:
         on_map = np.einsum("ij,jn->in", map_axes, points) + map_shift
-        column, row = np.clip(on_map[:2] + aside, 0, side - 1).astype(np.int32)
+        column, row = np.clip(on_map[:2] + map_offsets, 0, side - 1).astype(np.int32)
         lit: Mask = nearest[row * side + column] <= np.float32(4.0 * radius) - on_map[2]
         return lit
 
     return direction.astype(np.float32), reaches
 
 
-def _mean_light(lamps: Sequence[Lamp], lift: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
+def _mean_light(
+    lamps: Sequence[Lamp], lift: float, points: Float32s, normals: Float32s, map_offsets: Float32s
+) -> Float32s:
     """Return the mean light of lamps, with and without shadows [2 x n], on points [3 x n] lifted (m) off a surface."""
     lifted = points + normals * np.float32(lift)
     light = np.zeros((2, points.shape[1]), np.float32)
     for number, (direction, reaches) in enumerate(lamps):
         cosines = np.maximum(np.einsum("i,in->n", direction, normals), 0.0)
         # Neighbours in the list of lamps look up in different places, so that their grain is not the same.
-        light[0] += cosines * reaches(lifted, aside if number % 2 else -aside[::-1])
+        light[0] += cosines * reaches(lifted, map_offsets if number % 2 else -map_offsets[::-1])
         light[1] += cosines
     return light / np.float32(len(lamps))
 

@@ -43,19 +43,19 @@ def _fragments(
     area = (y[1] - y[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (y[2] - y[0])
     first = np.clip(np.ceil(y.min(axis=0) - 0.5), 0, height).astype(np.int64)
     last = np.clip(np.floor(y.max(axis=0) - 0.5), -1, height - 1).astype(np.int64)
-    kept = np.flatnonzero((last >= first) & (area > 0.0))
-    x, y, area, first, rows = x[:, kept], y[:, kept], area[kept], first[kept], (last - first + 1)[kept]
+    visible = np.flatnonzero((last >= first) & (area > 0.0))
+    x, y, area, first, rows = x[:, visible], y[:, visible], area[visible], first[visible], (last - first + 1)[visible]
     # The line opposite each corner: a x + b y + c is positive inside, and the share of the corner there times the area.
     lines = np.stack([y[LAST] - y[NEXT], x[NEXT] - x[LAST], x[LAST] * y[NEXT] - x[NEXT] * y[LAST]])
-    plane = np.einsum("kim,im->km", lines, nearness[triangles[kept].T] / area)
+    plane = np.einsum("kim,im->km", lines, nearness[triangles[visible].T] / area)
     sizes = np.cumsum(rows + 0.5 * area)
-    for chosen in np.split(np.arange(len(kept)), np.flatnonzero(np.diff(sizes // CHUNK_PIXELS)) + 1):
+    for chosen in np.split(np.arange(len(visible)), np.flatnonzero(np.diff(sizes // CHUNK_PIXELS)) + 1):
         triangle, row = _runs(chosen, first[chosen], rows[chosen])
         left, right = _spans(lines[:, :, triangle], row, width)
         span, column = _runs(np.arange(len(triangle)), left, np.maximum(right - left + 1, 0))
         triangle, row = triangle[span], row[span]
         across, down, rest = plane[:, triangle]
-        yield row * width + column, across * (column + 0.5) + down * (row + 0.5) + rest, kept[triangle]
+        yield row * width + column, across * (column + 0.5) + down * (row + 0.5) + rest, visible[triangle]
 
 
 def _runs(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integers, Integers]:

@@ -226,10 +226,10 @@ def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
     for name in names:
         values = maps[name].where(maps["status"] == int(Status.OK)).values
         if (values == values).any():
-            least, most = float(maps[name].min()), float(maps[name].max())
-            ratio = number(most / least) if least > 0.0 else DASH
+            least, greatest = float(maps[name].min()), float(maps[name].max())
+            ratio = number(greatest / least) if least > 0.0 else DASH
             unit = maps[name].attrs["units"]
-            texts = [typeset(display.number(value, unit, "free")) for value in (least, most)]
+            texts = [typeset(display.number(value, unit, "free")) for value in (least, greatest)]
             rows.append((name.replace("_", " "), *texts, typeset(ratio), display.scale(unit).unit))
     heads = ("quantity", "least", "greatest", "ratio", "unit")
     return Table("Extremes over these poses.", heads, tuple(rows), (False, True, True, True, False))

@@ -128,12 +128,12 @@ class _PageWriter:
             stage = f'<div id="live" data-label="{escape(block.caption)} Drag, or use arrow keys, to turn it."></div>'
         caption = f"<b>Figure {next(self._figures)}.</b> {escape(block.caption)}"
         style = f"max-width:{100 * block.width:g}%;--share:{block.width:g}"
-        still = f'<div class="still" style="{style}">{picture}</div>'
-        return f"<figure>{stage}{still}<figcaption>{caption}</figcaption></figure>"
+        picture_box = f'<div class="still" style="{style}">{picture}</div>'
+        return f"<figure>{stage}{picture_box}<figcaption>{caption}</figcaption></figure>"
 
 
-def _point(text: str, aside: str) -> str:
-    softer = f' <span class="soft">({escape(aside)})</span>' if aside else ""
+def _point(text: str, remark: str) -> str:
+    softer = f' <span class="soft">({escape(remark)})</span>' if remark else ""
     return f"<li>{as_markup(text)}{softer}</li>"
 
 

@@ -171,9 +171,9 @@ def _at(joint: JointPart, name: str, shape: Turned | Swept, material: str, z: Ve
 def rail_ends(rail: RailPart, sizes: Proportions) -> tuple[Vector, Vector]:
     """Return the ends of a rail, base frame, m. It does not move with its carriage, and is long enough for it."""
     home, half = sizes.carriages.get(rail.name, rail.point), 0.5 * RAIL_LENGTH * sizes.diagonal
-    moved = (rail.point - home).dot(rail.axis)
-    middle = rail.point - rail.axis * moved
-    return middle + rail.axis * min(-half, moved), middle + rail.axis * max(half, moved)
+    travel = (rail.point - home).dot(rail.axis)
+    middle = rail.point - rail.axis * travel
+    return middle + rail.axis * min(-half, travel), middle + rail.axis * max(half, travel)
 
 
 def _rail(rail: RailPart, sizes: Proportions, radius: float, inward: Vector) -> list[Solid]:

@@ -238,10 +238,10 @@ def plates(configuration: Configuration, legs: Sequence[Anatomy], radius: float)
     feet = [leg for leg in legs if not leg.on_rail]
     base = None
     if feet:
-        into = [leg.second_point - leg.foot for leg in feet]
-        base = plate_behind("base", [leg.foot for leg in feet], into, radius, BASE_FRAME, up)
-    back = [leg.last_but_one - leg.head for leg in legs]
-    top = plate_behind("platform", [leg.head for leg in legs], back, radius, configuration.platform, -up)
+        base_links = [leg.second_point - leg.foot for leg in feet]
+        base = plate_behind("base", [leg.foot for leg in feet], base_links, radius, BASE_FRAME, up)
+    platform_links = [leg.last_but_one - leg.head for leg in legs]
+    top = plate_behind("platform", [leg.head for leg in legs], platform_links, radius, configuration.platform, -up)
     return base, top
 
 
@@ -289,11 +289,11 @@ def convex_hull(points: Sequence[Point2]) -> list[Point2]:
         return ordered
 
     def half(along: Sequence[Point2]) -> list[Point2]:
-        kept: list[Point2] = []
+        corners: list[Point2] = []
         for x, y in along:
-            while len(kept) > 1 and turn_of(kept[-2], kept[-1], (x, y)) <= 0.0:
-                kept.pop()
-            kept.append((x, y))
-        return kept[:-1]
+            while len(corners) > 1 and turn_of(corners[-2], corners[-1], (x, y)) <= 0.0:
+                corners.pop()
+            corners.append((x, y))
+        return corners[:-1]
 
     return half(ordered) + half(ordered[::-1])

@@ -112,8 +112,8 @@ def _ends_of_faces(normals: Array, closed: bool) -> tuple[Array, Array]:
 
 def _shared_normals(normals: Array, others: Array) -> Array:
     smooth = np.einsum("ij,ij->i", normals, others) >= SMOOTH_EDGE
-    both = np.where(smooth[:, None], normals + others, normals)
-    return both / np.linalg.norm(both, axis=1, keepdims=True)
+    sums = np.where(smooth[:, None], normals + others, normals)
+    return sums / np.linalg.norm(sums, axis=1, keepdims=True)
 
 
 def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
@@ -126,8 +126,8 @@ def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
     """
     bands, _, count, _ = points.shape
     step = np.arange(count if closed else count - 1)
-    ahead = (step + 1) % count
-    quads = np.stack([step, ahead, ahead + count, step + count], axis=1)
+    following = (step + 1) % count
+    quads = np.stack([step, following, following + count, step + count], axis=1)
     quads = (quads + 2 * count * np.arange(bands)[:, None, None]).reshape(-1, 4)
     halves = np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
     return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), halves)
@@ -186,29 +186,34 @@ def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
     Source: G. H. Meisters, Polygons have ears, American Mathematical Monthly 82 (1975).
     """
     points = [(float(x), float(y)) for x, y in outline]
-    left = list(range(len(points)))
+    remaining = list(range(len(points)))
     triangles = []
-    while len(left) > 3:
-        tip = next((i for i in range(len(left)) if _is_ear(points, left, i)), _most_turning(points, left))
-        triangles.append((left[tip - 1], left[tip], left[(tip + 1) % len(left)]))
-        del left[tip]
-    return [*triangles, (left[0], left[1], left[2])]
+    while len(remaining) > 3:
+        tip = next(
+            (i for i in range(len(remaining)) if _is_ear(points, remaining, i)), _most_turning(points, remaining)
+        )
+        triangles.append((remaining[tip - 1], remaining[tip], remaining[(tip + 1) % len(remaining)]))
+        del remaining[tip]
+    return [*triangles, (remaining[0], remaining[1], remaining[2])]
 
 
-def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], tip: int) -> bool:
+def _is_ear(points: Sequence[tuple[float, float]], remaining: Sequence[int], tip: int) -> bool:
     """Return whether the triangle at a corner lies inside and holds no other corner."""
-    corners = left[tip - 1], left[tip], left[(tip + 1) % len(left)]
+    corners = remaining[tip - 1], remaining[tip], remaining[(tip + 1) % len(remaining)]
     a, b, c = (points[i] for i in corners)
     if turn_of(a, b, c) <= 0.0:
         return False
-    others = (points[i] for i in left if i not in corners)
+    others = (points[i] for i in remaining if i not in corners)
     return not any(min(turn_of(a, b, p), turn_of(b, c, p), turn_of(c, a, p)) >= 0.0 for p in others)
 
 
-def _most_turning(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
+def _most_turning(points: Sequence[tuple[float, float]], remaining: Sequence[int]) -> int:
     """Return the corner that turns most to the left: the best choice where round-off has hidden every ear."""
-    turns = [turn_of(points[left[i - 1]], points[left[i]], points[left[(i + 1) % len(left)]]) for i in range(len(left))]
-    return max(range(len(left)), key=turns.__getitem__)
+    turns = [
+        turn_of(points[remaining[i - 1]], points[remaining[i]], points[remaining[(i + 1) % len(remaining)]])
+        for i in range(len(remaining))
+    ]
+    return max(range(len(remaining)), key=turns.__getitem__)
 
 
 def turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
@@ -260,11 +265,11 @@ def _tangents(path: Array, closed: bool) -> Array:
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     if not closed:
         edges[-1] = edges[-2]
-    arriving = np.roll(edges, 1, axis=0)
+    arriving_edges = np.roll(edges, 1, axis=0)
     if not closed:
-        arriving[0] = edges[0]
-    both = edges + arriving
-    return both / np.linalg.norm(both, axis=1, keepdims=True)
+        arriving_edges[0] = edges[0]
+    sums = edges + arriving_edges
+    return sums / np.linalg.norm(sums, axis=1, keepdims=True)
 
 
 def _frames(tangents: Array, closed: bool) -> tuple[Array, Array]:
@@ -275,8 +280,8 @@ def _frames(tangents: Array, closed: bool) -> tuple[Array, Array]:
     for i in range(1, len(tangents)):
         first[i] = _carried_normal(first[i - 1], tangents[i])
     if closed:
-        back, side = _carried_normal(first[-1], tangents[0]), np.cross(tangents[0], first[0])
-        twist = math.atan2(back @ side, back @ first[0])
+        carried_back, side = _carried_normal(first[-1], tangents[0]), np.cross(tangents[0], first[0])
+        twist = math.atan2(carried_back @ side, carried_back @ first[0])
         angles = -twist * np.arange(len(tangents))[:, None] / len(tangents)
         first = first * np.cos(angles) + np.cross(tangents, first) * np.sin(angles)
     return first, np.cross(tangents, first)

@@ -173,8 +173,8 @@ def overlays_of(
     if analysis.load is None:
         return solids, None
     load = response.load
-    moved = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
-    ghost, chosen = deflection_overlays(machine, configuration, sizes, moved, factor)
+    motions = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
+    ghost, chosen = deflection_overlays(machine, configuration, sizes, motions, factor)
     return solids + ghost, chosen
 
 
@@ -191,9 +191,9 @@ def loaded_overlays(
     if not state.has_rest:
         return [], None
     response = state.state.free
-    moved = motions_of(state, response)
-    chosen = factor or exaggeration_of(response, moved, sizes.diagonal)
-    return deflection_overlays(state.machine, response.configuration, sizes, moved, chosen)
+    motions = motions_of(state, response)
+    chosen = factor or exaggeration_of(response, motions, sizes.diagonal)
+    return deflection_overlays(state.machine, response.configuration, sizes, motions, chosen)
 
 
 def motions_of(state: LoadedState, response: Response) -> Deflection:
@@ -203,17 +203,17 @@ def motions_of(state: LoadedState, response: Response) -> Deflection:
     return Deflection(response.load, Twist(Vector(*amounts[:3]), Vector(*amounts[3:])), state.links)
 
 
-def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> float:
+def exaggeration_of(response: Response, motions: Deflection, diagonal: float) -> float:
     """Return a round factor, at least 1, that makes the motions of a loaded machine visible.
 
     Args:
         response: the response of the machine at its unloaded pose.
-        moved: the displacements from that pose.
+        motions: the displacements from that pose.
         diagonal: the diagonal of the machine, m.
     """
     legs, point = response.configuration.legs, response.reference
     reach = max(((leg.path[-1] - point).norm() for leg in legs if leg.path), default=0.0)
-    return max(1.0, _exaggeration(moved, float(reach), diagonal))
+    return max(1.0, _exaggeration(motions, float(reach), diagonal))
 
 
 def compliance_overlays(
@@ -233,7 +233,7 @@ def compliance_overlays(
 
 
 def deflection_overlays(
-    machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection, factor: float | None = None
+    machine: Machine, configuration: Configuration, sizes: Proportions, motions: Deflection, factor: float | None = None
 ) -> tuple[list[Solid], float]:
     """Draw the load and the deflected shape, and return the factor by which it is exaggerated.
 
@@ -241,19 +241,19 @@ def deflection_overlays(
 
     Args:
         machine, configuration, sizes: as for `machine_scene`.
-        moved: the small motions of the machine.
+        motions: the small motions of the machine.
         factor: the factor of exaggeration; None to choose a round one.
     """
-    loads = load_solids(moved.load, machine.tool_point(configuration.platform), sizes)
-    if not _finite(moved):
+    loads = load_solids(motions.load, machine.tool_point(configuration.platform), sizes)
+    if not _finite(motions):
         return loads, 1.0
     parts = _moving_parts(machine, configuration, sizes)
-    chosen = factor or _exaggeration(moved, parts.reach, sizes.diagonal)
-    return [*loads, *_ghost(moved, parts, chosen)], chosen
+    chosen = factor or _exaggeration(motions, parts.reach, sizes.diagonal)
+    return [*loads, *_ghost(motions, parts, chosen)], chosen
 
 
 def swing_data(
-    machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection
+    machine: Machine, configuration: Configuration, sizes: Proportions, motions: Deflection
 ) -> list[dict[str, Any]]:
     """Return both ends of a swing as plain data, so that a browser needs nothing else to move the machine between them.
 
@@ -263,15 +263,15 @@ def swing_data(
 
     Args:
         machine, configuration, sizes: as for `machine_scene`.
-        moved: small motions, of any size.
+        motions: small motions, of any size.
     """
     parts = _moving_parts(machine, configuration, sizes)
-    largest = _largest(moved, parts.reach)
+    largest = _largest(motions, parts.reach)
     if not 0.0 < largest < math.inf:
         return []
     factor = SHOWN_DEFLECTION * sizes.diagonal / largest
     solids = []
-    for first, middle, last in zip(*(_ghost(moved, parts, share) for share in (factor, 0.0, -factor)), strict=True):
+    for first, middle, last in zip(*(_ghost(motions, parts, share) for share in (factor, 0.0, -factor)), strict=True):
         ends = [solid_data(end)["place"] for end in (first, last)]
         if isinstance(first.shape, Swept) and isinstance(middle.shape, Swept):
             pairs = zip(first.shape.path, middle.shape.path, strict=True)
@@ -305,20 +305,20 @@ def _moving_parts(machine: Machine, configuration: Configuration, sizes: Proport
     return _MovingParts(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
 
 
-def _finite(moved: Deflection) -> bool:
-    numbers = [*moved.motion.components(), *(c for link in moved.links for c in link.end_motion.components())]
+def _finite(motions: Deflection) -> bool:
+    numbers = [*motions.motion.components(), *(c for link in motions.links for c in link.end_motion.components())]
     return all(math.isfinite(c) for c in numbers)
 
 
-def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
+def _exaggeration(motions: Deflection, reach: float, diagonal: float) -> float:
     """Return a round factor (1, 2 or 5 times a power of ten) that makes a deflected shape visible.
 
     Args:
-        moved: the small motions.
+        motions: the small motions.
         reach: the reach of the platform from the tool point, m.
         diagonal: the diagonal of the machine, m.
     """
-    largest = _largest(moved, reach)
+    largest = _largest(motions, reach)
     if not 0.0 < largest < math.inf:
         return 1.0
     # A little more is allowed, so that a factor that is round already does not fall to the next one by round-off.
@@ -327,21 +327,21 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most)
 
 
-def _largest(moved: Deflection, reach: float) -> float:
+def _largest(motions: Deflection, reach: float) -> float:
     """Return the greatest displacement of all ends of links and of the platform, m."""
-    links = [motion.translational.norm() for link in moved.links for motion in (link.start_motion, link.end_motion)]
-    return max([*links, moved.motion.translational.norm() + moved.motion.rotational.norm() * reach])
+    links = [motion.translational.norm() for link in motions.links for motion in (link.start_motion, link.end_motion)]
+    return max([*links, motions.motion.translational.norm() + motions.motion.rotational.norm() * reach])
 
 
-def _ghost(moved: Deflection, parts: _MovingParts, factor: float) -> list[Solid]:
+def _ghost(motions: Deflection, parts: _MovingParts, factor: float) -> list[Solid]:
     """Return the deflected machine: its links as bent wires, and its platform at its displaced place."""
     wires = []
-    for n, link in enumerate(moved.links):
+    for n, link in enumerate(motions.links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
         path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * parts.radii[link.leg]
         if len(set(path)) == len(path):  # a link without a length is no wire
             wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
-    motion = exaggerated_displacement(moved.motion, parts.point, factor)
+    motion = exaggerated_displacement(motions.motion, parts.point, factor)
     body = [s.moved_by(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in parts.body]
     return [*wires, *body]
 
