@@ -24,7 +24,7 @@ from kinetostat.engine.kernel import (
     program_fill,
 )
 from kinetostat.engine.modes import ModalNumbers, rows_of_modes
-from kinetostat.engine.rest import RestFill
+from kinetostat.engine.rest import LegwiseRestFill, RestFill
 from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.limit import snap_flags
@@ -136,23 +136,28 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
     counts = _mode_counts(machine, tuple(paths), tuple(quantities))
     directly = ModalFill(machine, paths, quantities, counts) if counts else _direct_fill(machine, paths, quantities)
-    every = FallingBack(directly, lambda: solved)
+    composed = FallingBack(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         if cut:
             check_loads(with_values(machine, columns), len(status), cut.mechanism.weighs)
-        every(columns, results, status)
+        composed(columns, results, status)
 
     return fill
 
 
-def _direct_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> ProgramFill | RestFill:
+def _direct_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
     """The fill of quantities for which no modes are needed beside their program."""
-    closed = closes_inside(machine)
-    if not rest_numbers(machine, quantities):
-        return program_fill(machine, paths, quantities, closed)
-    machine_cut = _cut(machine, tuple(paths))
-    return RestFill(machine, paths, quantities, closed, bool(machine_cut and machine_cut.legs))
+    machine_cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
+    if machine_cut and not machine_cut.legs:
+        return RestFill(machine, paths, quantities, closes_inside(machine))
+    return _fill_of_legs(machine, paths, quantities)
+
+
+def _fill_of_legs(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> ProgramFill | LegwiseRestFill:
+    """The same of machines whose legs close loops, and of all that need no state of rest."""
+    make = LegwiseRestFill if rest_numbers(machine, quantities) else program_fill
+    return make(machine, paths, quantities, closes_inside(machine))
 
 
 def _fill_of_cables(
@@ -172,9 +177,9 @@ def _solve_in_parts(
     """Fill by the solver for any machine, a slab of points at a time."""
     for start in range(0, len(status), slab):
         part = slice(start, start + slab)
-        here = {path: values[part] for path, values in columns.items()}
+        part_columns = {path: values[part] for path, values in columns.items()}
         with np.errstate(all="ignore"):
-            response = _response_with_states(machine, quantities, here, len(status[part]))
+            response = _response_with_states(machine, quantities, part_columns, len(status[part]))
             status[part] = response.status
             for row, name in zip(results[:, part], quantities, strict=True):
                 row[:] = QUANTITIES[name].value(response)
@@ -234,7 +239,7 @@ class ModalFill:
         if not others or (counts.at_rest and not rest_numbers(machine, others)):
             others.append("displacement_x" if counts.at_rest else "singularity_margin")  # whatever gives the status
         self._machine, self._count, self._closed = machine, len(others), closes_inside(machine)
-        self._others = _direct_fill(machine, paths, others)
+        self._others = _fill_of_legs(machine, paths, others)
         self._places = [(quantities.index(name), others.index(name)) for name in quantities if name not in needing]
         self._modal: list[tuple[ModalNumbers, list[int], list[int]]] = []
         for what, rows in rows_of_modes(needing).items():
@@ -248,7 +253,7 @@ class ModalFill:
         others, fixed = np.empty((self._count, len(status))), self._others.fixed
         program_inputs = program_columns(self._machine, self._others.form, columns, len(status), self._closed)
         states: list[Array] = []
-        if isinstance(self._others, RestFill):
+        if isinstance(self._others, LegwiseRestFill):
             states = [np.empty((self._others.size, len(status)))]
             self._others.solve(program_inputs, others, status, *states)
         else:

@@ -15,7 +15,7 @@ from kinetostat.frozen import dataclass
 
 
 class Points(Protocol):
-    """Points of parameter space, numbered from 0."""
+    """Points of parameter space, numbered from 0; `Axis` apart, all classes of this file are such."""
 
     @property
     def size(self) -> int:
@@ -50,16 +50,13 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return prod(self.shape)
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of the parameters that vary."""
         return tuple(path for axis in self.axes for path in axis.paths)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         result: dict[str, Array] = {}
         # The value of an axis stays the same while all later axes run through theirs.
         run = self.size
@@ -101,16 +98,13 @@ class PointTable:
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return len(next(iter(self.values.values())))
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of the parameters that vary."""
         return tuple(self.values)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         return {path: column[start:stop] for path, column in self.values.items()}
 
 
@@ -124,16 +118,13 @@ class ConsecutivePoints:
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return self.stop - self.start
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of the parameters that vary."""
         return self.whole.paths
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Return the values of each varying parameter at points `start` to `stop` - 1 of this part, SI."""
         return self.whole.columns(self.start + start, self.start + stop)
 
 
@@ -156,16 +147,13 @@ class Population:
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return self.shape[0] * self.shape[1]
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of the parameters that vary."""
         return *self.designs, *self.poses
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         design, pose = np.divmod(np.arange(start, stop), self.shape[1])
         return {path: column[design] for path, column in self.designs.items()} | {
             path: column[pose] for path, column in self.poses.items()
@@ -199,16 +187,13 @@ class Cells:
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return PER_CELL * prod(self.shape)
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Leaf paths of the parameters that vary."""
         return tuple(path for axis in self.axes for path in axis.paths)
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
-        """Return the values of each varying parameter at points `start` to `stop` - 1, SI."""
         indices = np.unravel_index(np.arange(start, stop) // PER_CELL, self.shape)
         result: dict[str, Array] = {}
         for number, (axis, index) in enumerate(zip(self.axes, indices, strict=True)):

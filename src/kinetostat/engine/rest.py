@@ -93,53 +93,62 @@ class StepMemory:
 
 
 class RestFill:
-    """The fill of quantities at rest.
+    """The fill of quantities at rest of machines whose loops are cut at rods alone.
 
-    Where loops are cut at rods, small programs find the state, and one gives the quantities. Where legs close loops, a
-    step of Newton's method takes as long as the quantities, so that one program does both: steps of the chord method,
-    each a quarter of it, lead so near to the state that this program has to be repeated at few points.
+    Small programs find the states, and one gives the quantities.
+    """
+
+    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool) -> None:
+        """Trace the programs; arguments are those of `program_fill`."""
+        self._machine, self._closed = machine, closed
+        self._form, self._fixed = form_of(machine, paths)
+        self._states = StatePrograms(machine, self._form, closed, native=True)
+        self._program = _program_at_rest(machine, self._form, quantities, closed, stepping=False)
+
+    def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Evaluate a slab, see `Fill`."""
+        program_inputs = program_columns(self._machine, self._form, columns, len(status), self._closed)
+        program_inputs += self._states.rest_coordinates(self._fixed, program_inputs, len(status))
+        self._program.run(self._fixed, program_inputs, results, status)
+
+
+def _program_at_rest(machine: Machine, form: Form, quantities: Sequence[str], closed: bool, stepping: bool) -> Runnable:
+    """The program of quantities at states whose coordinates are its last columns; options as in `TraceOptions`."""
+    objectives = tuple(((name, 1.0),) for name in quantities)
+    plan = plan_for(machine, quantities, form.varying)
+    options = TraceOptions(closed=closed, plan=plan, stepping=stepping)
+    kind = Specimen(at_home(machine, form.varying))
+    return program_of(recipe_of(objectives_of, kind, form, objectives=objectives, options=options))
+
+
+class LegwiseRestFill:
+    """The fill of quantities at rest of machines whose legs close loops.
+
+    A step of Newton's method takes as long as the quantities, so that one program does both. Steps of the chord method,
+    each a quarter of it, lead so near to the state that this program has to be repeated at few points. It gives the
+    quantities, then the coordinates of the states, and in its last row the squares of the sizes of its steps.
 
     Attributes:
         form: how parameters enter the programs.
         fixed: values of those that are the same at all points.
+        size: number of coordinates of a state of rest.
     """
 
-    def __init__(
-        self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool, legs: bool
-    ) -> None:
-        """Trace the programs.
-
-        Args:
-            machine, paths, quantities, closed: as for `program_fill`, of a machine whose loops can be cut.
-            legs: whether legs close loops.
-        """
+    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], closed: bool) -> None:
+        """Trace the programs; arguments are those of `program_fill`."""
         self._machine, self._closed, self._count = machine, closed, len(quantities)
         self.form, self.fixed = form_of(machine, paths)
-        kind = Specimen(at_home(machine, paths))
-        objectives = tuple(((name, 1.0),) for name in quantities)
-        self._states = None if legs else StatePrograms(machine, self.form, closed, native=True)
-        step = partial(recipe_of, step_of, kind, self.form, closed=closed)
-        self._first = program_of(step(step="first"))
-        self._chord = program_of(step(step="chord")) if legs else None
-        options = TraceOptions(closed=closed, plan=plan_for(machine, quantities, paths), stepping=legs)
-        self._step = program_of(recipe_of(objectives_of, kind, self.form, objectives=objectives, options=options))
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates of a state of rest, where legs close loops; the last row is the square of a size."""
-        return self._step.rows - self._count - 1
+        step = partial(recipe_of, step_of, Specimen(at_home(machine, paths)), self.form, closed=closed)
+        self._first, self._chord = program_of(step(step="first")), program_of(step(step="chord"))
+        self._step = _program_at_rest(machine, self.form, quantities, closed, stepping=True)
+        self.size = self._step.rows - self._count - 1
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
-        program_inputs = program_columns(self._machine, self.form, columns, len(status), self._closed)
-        if self._states is None:
-            self.solve(program_inputs, results, status)
-            return
-        program_inputs += self._states.rest_coordinates(self.fixed, program_inputs, len(status))
-        self._step.run(self.fixed, program_inputs, results, status)
+        self.solve(program_columns(self._machine, self.form, columns, len(status), self._closed), results, status)
 
     def solve(self, program_inputs: list[Array], results: Array, status: Codes, states: Array | None = None) -> None:
-        """Evaluate a slab of a machine whose legs close loops.
+        """Evaluate a slab.
 
         Args:
             program_inputs: columns of the programs before those of the states.
@@ -151,42 +160,37 @@ class RestFill:
         memory = StepMemory(self._step.rows, together)
         for start in range(0, count, together):
             part = slice(start, start + together)
-            reached = None if states is None else states[:, part]
-            self._fill([column[part] for column in program_inputs], results[:, part], status[part], reached, memory)
+            some_states = None if states is None else states[:, part]
+            self._fill([column[part] for column in program_inputs], results[:, part], status[part], some_states, memory)
 
     def _fill(
-        self, program_inputs: list[Array], results: Array, status: Codes, reached: Array | None, memory: StepMemory
+        self, program_inputs: list[Array], results: Array, status: Codes, states: Array | None, memory: StepMemory
     ) -> None:
-        """Evaluate some points; `reached` takes the coordinates of their states, if it is given.
-
-        A step gives the quantities, then the coordinates of the states, and in its last row the squares of its sizes.
-        """
+        """Evaluate some points, see `solve`."""
         count = len(status)
         self._first.run(self.fixed, program_inputs, memory.last[self._count :, :count], np.empty(count, dtype=np.int8))
-        if self._chord is not None:
-            self._approach(self._chord, program_inputs, memory, count)
-        states, points = memory.last[self._count :, :count], np.arange(count)
+        self._approach(program_inputs, memory, count)
+        starts, points = memory.last[self._count :, :count], np.arange(count)
         for _ in range(MOST_NEWTON_STEPS):
             stepped, codes = memory.next[:, : len(points)], np.empty(len(points), dtype=np.int8)
-            self._step.run(self.fixed, [*program_inputs, states[:-1]], stepped, codes)
+            self._step.run(self.fixed, [*program_inputs, starts[:-1]], stepped, codes)
             places = slice(None) if len(points) == count else points  # a slice is copied much faster
             results[:, places], status[places] = stepped[: self._count], codes
-            if reached is not None:
-                reached[:, places] = stepped[self._count : -1]
+            if states is not None:
+                states[:, places] = stepped[self._count : -1]
             moving = stepped[-1] > LAST_STEP**2
             if not moving.any():
                 break
-            states = stepped[self._count :]
+            starts = stepped[self._count :]
             if not moving.all():
                 points, program_inputs = points[moving], [column[moving] for column in program_inputs]
-                states = states.compress(moving, axis=1)
+                starts = starts.compress(moving, axis=1)
             memory.swap()
 
-    def _approach(self, chord: Runnable, program_inputs: list[Array], memory: StepMemory, count: int) -> None:
+    def _approach(self, program_inputs: list[Array], memory: StepMemory, count: int) -> None:
         """Take steps of the chord method towards the states of rest, as long as they shrink fast.
 
         Args:
-            chord: program of a step.
             program_inputs: columns of the programs before those of the states.
             memory: its last step has the states, before and after.
             count: number of points.
@@ -198,17 +202,17 @@ class RestFill:
             starts = states if is_all else states.take(points, axis=1)
             columns = program_inputs if is_all else [column[points] for column in program_inputs]
             stepped, codes = memory.next[self._count :, : len(points)], np.empty(len(points), dtype=np.int8)
-            chord.run(self.fixed, [*columns, starts[:-1]], stepped, codes)
+            self._chord.run(self.fixed, [*columns, starts[:-1]], stepped, codes)
             square_before, square = starts[-1], stepped[-1]
             shrinking = square < SHRINKING**2 * square_before
             # The next step will be shorter by the same ratio: size * (size / size before).
-            going_on = shrinking & (square * square > LAST_STEP**2 * square_before)
+            unfinished = shrinking & (square * square > LAST_STEP**2 * square_before)
             stalled = ~shrinking & (square_before >= 0.0)  # not where the size is NaN: there is no state to be lost
             if is_all and not stalled.any():
                 memory.swap()
             else:
                 states[:, points[shrinking]] = stepped.compress(shrinking, axis=1)
-            points = points[going_on]
+            points = points[unfinished]
             if not len(points):
                 break
 
