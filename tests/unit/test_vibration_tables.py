@@ -13,7 +13,7 @@ from kinetostat.studies.vibration import modes
 from kinetostat.views.answers import plot
 from kinetostat.views.figures import look_of
 from kinetostat.views.grid_figures import grid_curves
-from kinetostat.views.vibration import MOST_PARTS, cut_of, mode_table, share_table, strain_of
+from kinetostat.views.vibration import MOST_PARTS, _strain_shares, cut_sentence, mode_table, share_table
 from kinetostat.views.vibration_figures import response_figure
 
 LIGHT_LEGS = {"tool.mass": 12.0, "linear_density.legs": 0.5, "drives.rotor_inertia": 2e-5, "drives.lead": 0.01}
@@ -44,7 +44,7 @@ def test_modes_of_equal_frequency_are_told_together_and_by_the_kind_of_spring():
 def test_springs_that_are_too_many_for_a_table_are_told_by_kind():
     answer = modes(changed(load("hexapod-hardware"), {"tool.mass": 12.0}))
     assert len(answer.modes[0].strain) > MOST_PARTS
-    shares = strain_of(answer.modes)
+    shares = _strain_shares(answer.modes)
     assert {*shares[0]} == {*answer.modes[0].kinds}
     assert "drive screw ×6" in shares[0]
     for mode in answer.modes:
@@ -61,10 +61,10 @@ def test_a_planar_machine_does_not_answer_along_z():
 
 def test_a_cutting_pressure_without_a_direction_asks_for_one():
     machine = changed(load("hexapod"), {"tool.mass": 12.0})
-    assert cut_of(modes(machine)) == ""
+    assert cut_sentence(modes(machine)) == ""
     pressed = changed(machine, {"cutting.pressure": 2e9})
-    assert "write direction = [1, 0, 0]" in cut_of(modes(pressed))
-    assert "Along x " in cut_of(modes(changed(pressed, {"cutting.direction.0": 2.0})))
+    assert "write direction = [1, 0, 0]" in cut_sentence(modes(pressed))
+    assert "Along x " in cut_sentence(modes(changed(pressed, {"cutting.direction.0": 2.0})))
 
 
 def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
