@@ -29,18 +29,18 @@ class PartRates:
     """Motion of a mass by the rates of some coordinates.
 
     Attributes:
-        moving: velocity of its point per unit of each rate [n x 3 x coordinates].
-        turning: angular velocity of its body per unit of each rate [n x 3 x coordinates].
+        velocity: velocity of its point per unit of each rate [n x 3 x coordinates].
+        angular: angular velocity of its body per unit of each rate [n x 3 x coordinates].
         tensor: inertia about its point [n x 3 x 3]; None if it has none.
     """
 
-    moving: Array
-    turning: Array
+    velocity: Array
+    angular: Array
     tensor: Array | None
 
 
 def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
-    """The inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None if it has none."""
+    """Return the inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None if it has none."""
     entries = masses.inertia[:, number]
     if all(is_zero(entry) for entry in entries.flat) if entries.dtype == object else not entries.any():
         return None
@@ -49,51 +49,51 @@ def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
 
 
 def leg_rates(leg: ElasticLeg, placed: PlacedChain) -> list[PartRates]:
-    """Motion of each mass of a leg by the rates of the leg's coordinates."""
+    """Return the motion of each mass of a leg by the rates of the leg's coordinates."""
     follows = leg.chain.follows
     rates = []
-    for number, carried in enumerate(leg.masses.carried):
-        motion, screws = placed.before[carried], placed.screws[:, :carried]
-        point = motion.point(leg.masses.point[:, number])
+    for number, motions in enumerate(leg.masses.carried):
+        carrier, screws = placed.before[motions], placed.screws[:, :motions]
+        point = carrier.point(leg.masses.point[:, number])
         velocities = cross(screws[..., :3], point[:, None]) + screws[..., 3:]
-        moving, turning = (np.swapaxes(part, 1, 2) @ follows[:carried] for part in (velocities, screws[..., :3]))
-        rates.append(PartRates(moving, turning, tensor_of(leg.masses, number, motion)))
+        velocity, angular = (np.swapaxes(part, 1, 2) @ follows[:motions] for part in (velocities, screws[..., :3]))
+        rates.append(PartRates(velocity, angular, tensor_of(leg.masses, number, carrier)))
     return rates
 
 
 def platform_rates(masses: Masses, platform: Motions) -> list[PartRates]:
-    """Motion of each mass of the platform by its twist, at the origin."""
+    """Return the motion of each mass of the platform by its twist, at the origin."""
     rates = []
     for number in range(len(masses.carried)):
         point = platform.point(masses.point[:, number])
         ones = np.broadcast_to(np.eye(3), (len(point), 3, 3))
-        moving = np.concatenate([-skew_of(point), ones], axis=2)
-        turning = np.concatenate([ones, np.zeros((len(point), 3, 3))], axis=2)
-        rates.append(PartRates(moving, turning, tensor_of(masses, number, platform)))
+        velocity = np.concatenate([-skew_of(point), ones], axis=2)
+        angular = np.concatenate([ones, np.zeros((len(point), 3, 3))], axis=2)
+        rates.append(PartRates(velocity, angular, tensor_of(masses, number, platform)))
     return rates
 
 
-def energies(masses: Masses, rates: Sequence[PartRates], length: Array) -> Iterator[tuple[str, Array]]:
-    """Mass matrices of parts with their names, which add up to that of all parts [n x coordinates x coordinates]."""
+def mass_matrices(masses: Masses, rates: Sequence[PartRates], length: Array) -> Iterator[tuple[str, Array]]:
+    """Give mass matrices of parts with their names, which add up to that of all [n x coordinates x coordinates]."""
     for name, part, uncoupled in zip(masses.names, rates, _columns(masses.uncoupled, length), strict=True):
-        matrix = np.swapaxes(part.moving, 1, 2) @ part.moving * uncoupled[:, None, None]
+        matrix = np.swapaxes(part.velocity, 1, 2) @ part.velocity * uncoupled[:, None, None]
         if part.tensor is not None:
-            spun = np.swapaxes(part.turning, 1, 2) @ part.tensor @ part.turning
-            matrix = matrix + spun * length[:, None, None]
+            rotary = np.swapaxes(part.angular, 1, 2) @ part.tensor @ part.angular
+            matrix = matrix + rotary * length[:, None, None]
         yield name, matrix
     coupled = (masses.mass - masses.uncoupled) * length[:, None]
     for first, second in masses.pairs:
-        both = np.swapaxes(rates[first].moving, 1, 2) @ rates[second].moving
-        yield masses.names[first], (both + np.swapaxes(both, 1, 2)) * coupled[:, first, None, None]
+        product = np.swapaxes(rates[first].velocity, 1, 2) @ rates[second].velocity
+        yield masses.names[first], (product + np.swapaxes(product, 1, 2)) * coupled[:, first, None, None]
 
 
 def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
-    """Twice the kinetic energy of some masses in a motion of their coordinates."""
-    moving = [
-        replace(part, moving=(part.moving @ motion)[..., None], turning=(part.turning @ motion)[..., None])
+    """Return twice the kinetic energy of some masses in a motion of their coordinates."""
+    along_motion = [
+        replace(part, velocity=(part.velocity @ motion)[..., None], angular=(part.angular @ motion)[..., None])
         for part in rates
     ]
-    return total([matrix[0, 0, 0] for _, matrix in energies(masses, moving, length)])
+    return total([matrix[0, 0, 0] for _, matrix in mass_matrices(masses, along_motion, length)])
 
 
 def _columns(amounts: Array, length: Array) -> Array:
@@ -101,19 +101,21 @@ def _columns(amounts: Array, length: Array) -> Array:
 
 
 def platform_inertia(masses: Masses, platform: Motions, length: Array) -> Array:
-    """The mass matrix of the platform by its twist, at the origin [n x 6 x 6], from its mass, centre and tensor."""
+    """Return the mass matrix of the platform by its twist, at the origin [n x 6 x 6].
+
+    It follows from the mass, the moment of the masses and their tensor.
+    """
     count = len(length)
-    whole, first = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    total = np.zeros(count)
+    tensor, moment, mass = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros(count)
     if masses.mass.dtype == object or platform.translation.dtype == object:
-        whole, first, total = whole.astype(object), first.astype(object), total.astype(object)
+        tensor, moment, mass = tensor.astype(object), moment.astype(object), mass.astype(object)
     for number, uncoupled in enumerate(_columns(masses.uncoupled, length)):
-        at = platform.point(masses.point[:, number])
-        lever = skew_of(at)
-        whole = whole - lever @ lever * uncoupled[:, None, None]
-        first, total = first + at * uncoupled[:, None], total + uncoupled
-        tensor = tensor_of(masses, number, platform)
-        whole = whole if tensor is None else whole + tensor * length[:, None, None]
-    moment = skew_of(first)
-    plain = np.eye(3) * total[:, None, None]
-    return np.concatenate([np.concatenate([whole, moment], axis=2), np.concatenate([-moment, plain], axis=2)], axis=1)
+        point = platform.point(masses.point[:, number])
+        lever = skew_of(point)
+        tensor = tensor - lever @ lever * uncoupled[:, None, None]
+        moment, mass = moment + point * uncoupled[:, None], mass + uncoupled
+        own_tensor = tensor_of(masses, number, platform)
+        tensor = tensor if own_tensor is None else tensor + own_tensor * length[:, None, None]
+    coupling, diagonal = skew_of(moment), np.eye(3) * mass[:, None, None]
+    rows = np.concatenate([tensor, coupling], axis=2), np.concatenate([-coupling, diagonal], axis=2)
+    return np.concatenate(rows, axis=1)

@@ -22,7 +22,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, NO_MOMENTUM, UNRESISTED
-from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
+from kinetostat.vibration.inertia import leg_rates, mass_matrices, platform_inertia
 
 CLEAR_SHARE = 0.1
 """Share of the largest component of the tool's motion from which modes clearly move the tool along a component: far
@@ -84,7 +84,7 @@ def mass_matrix(equations: Balance) -> Array:
         of_leg = result[:, first:last, first:last]
         if leg.masses.carried:
             placed = leg.chain.place(equations.state.coordinates[number], amounts)
-            for _, matrix in energies(leg.masses, leg_rates(leg, placed), length):
+            for _, matrix in mass_matrices(leg.masses, leg_rates(leg, placed), length):
                 of_leg += matrix
         of_leg += _diagonal(leg.rotors * length[:, None])
     return result

@@ -38,7 +38,7 @@ from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
-from kinetostat.vibration.inertia import energies, energy_of, leg_rates, platform_inertia, platform_rates
+from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, platform_inertia, platform_rates
 from kinetostat.vibration.modes import frequencies, hertz, mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
 EQUAL_SQUARES = 1e-9
@@ -178,7 +178,7 @@ def _matrices_over_carrier(machine: Cut, coordinates: Row) -> tuple[Array, Array
         if not is_zero(rod.rotor):
             inertia = inertia + _stretch_dyad(rod, place.platform.point(rod.ends.far)) * (rod.rotor * length[0])
     mass = twists.T @ inertia @ twists
-    for _, matrix in energies(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
+    for _, matrix in mass_matrices(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
         mass = mass + matrix[0]
     return 0.5 * (place.rates + place.rates.T), mass + np.diag(machine.carrier.rotors[0] * length[0])
 

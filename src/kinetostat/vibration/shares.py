@@ -21,7 +21,7 @@ from kinetostat.equilibrium.tangent import starts_of, tangent_matrices
 from kinetostat.kinetostatics.loading import Deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.tolerances import LEAST_DIVISOR
-from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
+from kinetostat.vibration.inertia import PartRates, leg_rates, mass_matrices, platform_rates
 from kinetostat.vibration.modes import Modes
 
 TURNING_LOADS = "weight and wrenches as they turn"
@@ -54,7 +54,7 @@ def kinetic_shares(equations: Balance, solution: Modes) -> dict[str, Array]:
         shares[name] = shares.get(name, 0.0) + np.einsum("ik,ij,jk->k", motions, matrix, motions) / squares
 
     for masses, rates, motions, leg in _moving_parts(equations, solution):
-        for name, matrix in energies(masses, rates, equations.mechanism.length):
+        for name, matrix in mass_matrices(masses, rates, equations.mechanism.length):
             add(name, matrix[0], motions)
         for number, spring in enumerate(leg.springs if leg else ()):
             if leg and spring is not None and leg.rotors[0, number]:
@@ -68,7 +68,7 @@ def effective_masses(equations: Balance, solution: Modes) -> list[tuple[float, f
     momentum, moving_mass = np.zeros((3, solution.ringing)), 0.0
     for masses, rates, motions, _ in _moving_parts(equations, solution):
         for mass, part in zip(masses.mass[0], rates, strict=True):
-            momentum, moving_mass = momentum + mass * (part.moving[0] @ motions), moving_mass + mass
+            momentum, moving_mass = momentum + mass * (part.velocity[0] @ motions), moving_mass + mass
     scaled = momentum**2 / np.sqrt(solution.squares[: solution.ringing]) ** 2 * float(equations.mechanism.length[0])
     shares = scaled / moving_mass if moving_mass else scaled
     return [(float(x), float(y), float(z)) for x, y, z in shares.T]

@@ -38,7 +38,7 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import SURELY_MORE, UNRESISTED
-from kinetostat.vibration.inertia import energies, energy_of, leg_rates, platform_inertia
+from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, platform_inertia
 from kinetostat.vibration.scalar_frequencies import SPARE_MODES, platform_alone
 
 Modal: TypeAlias = Literal["free", "loaded", "factor"]
@@ -235,7 +235,7 @@ class SpringMotions:
         length = self._machine.mechanism.length
         for leg, elastic in zip(self._tangent.legs, self._machine.legs, strict=True):
             matrix = np.diag(elastic.rotors[0].astype(object) * length[0])
-            for _, part in energies(elastic.masses, leg_rates(elastic, leg.placed), length):
+            for _, part in mass_matrices(elastic.masses, leg_rates(elastic, leg.placed), length):
                 matrix = matrix + part[0]
             yield matrix
 
