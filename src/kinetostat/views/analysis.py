@@ -38,6 +38,7 @@ else:
     loaded = LateModule("kinetostat.views.loaded")
 
 INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
+"""Keys of the indices in JSON: the first is always there, the others where they have a value."""
 
 
 def analyze_in_state(
@@ -216,7 +217,7 @@ ANALYSIS = Description(
     kept=lambda analysis: all(verdict.met for verdict in analysis.requirements),
     undrawn="analyze draws figures of the machine under load only; add --loaded, or leave -o out.",
 )
-SPRING = (
+SPRING = (  # values of each spring of a loaded machine
     Field("name"),
     Field("leg"),
     Field("turning"),

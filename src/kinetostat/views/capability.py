@@ -60,6 +60,7 @@ PANEL_WIDTH_RATIO = 1.12
 MOVING, TURNING = ("force", "speed", "acceleration"), ("moment", "rate", "angular acceleration")
 """Sets that share a figure: those of motions along a direction, and those about one."""
 FIGURES = {"capability": MOVING, "capability_turning": TURNING}
+"""Sets of each figure, by its name."""
 CAPTION = "Cuts of what the drives allow through zero, each with the largest circle in whichever direction."
 
 

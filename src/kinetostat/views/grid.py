@@ -47,12 +47,12 @@ MOST_NAMED_SETS = 11
 apart."""
 USUAL_OF_A_SWEEP, USUAL_OF_A_MAP = "stiffness", "compliance"
 """Quantities that are computed where nobody names one."""
-ONE_OF_A_SWEEP = "sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`."
+ONE_RANGE_OF_A_SWEEP = "sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`."
 CARRYING_ALONE = (
     "--carrying shows which legs carry, not a quantity, and computes in this process; leave out --quantity, --workers, "
     "--cluster and --resume."
 )
-TWO_OF_A_MAP = "map needs two --over ranges or more; for one parameter use `kinetostat sweep --vary ...`."
+TWO_RANGES_OF_A_MAP = "map needs two --over ranges or more; for one parameter use `kinetostat sweep --vary ...`."
 
 
 def display_of(dataset: xr.Dataset) -> Display:
@@ -293,7 +293,7 @@ def sweep_question(machine: Machine, ranges: Sequence[str], quantities: Sequence
         InputError: more than one range, or what `grid_question` refuses.
     """
     if len(ranges) > 1:
-        raise InputError(ONE_OF_A_SWEEP)
+        raise InputError(ONE_RANGE_OF_A_SWEEP)
     return grid_question(machine, ranges, quantities or usual_quantities(machine, USUAL_OF_A_SWEEP))
 
 
@@ -304,7 +304,7 @@ def map_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[s
         InputError: a single range, or what `grid_question` refuses.
     """
     if len(ranges) < 2:
-        raise InputError(TWO_OF_A_MAP)
+        raise InputError(TWO_RANGES_OF_A_MAP)
     return grid_question(machine, ranges, quantities or usual_quantities(machine, USUAL_OF_A_MAP))
 
 
@@ -328,7 +328,7 @@ def map_or_carrying_legs(
     if not carrying:
         return answer(map_question(machine, ranges, quantities), progress)
     if len(ranges) < 2:
-        raise InputError(TWO_OF_A_MAP)
+        raise InputError(TWO_RANGES_OF_A_MAP)
     if quantities:
         raise InputError(CARRYING_ALONE)
     return tensions.carrying_legs(machine, ranges, progress)

@@ -362,6 +362,7 @@ def _grid(answer: Guidelines) -> dict[str, Any] | None:
 
 
 DIRECTIONS = ("component",)
+"""Axis of values by direction."""
 ELEMENT = (
     Field("name", long_name="elastic element", column="element_name"),
     Field("parts", forms=("json",)),

@@ -311,6 +311,7 @@ LAW_TOLERANCE = Option(
     metavar="LENGTH",
 )
 VARIED = "FIELD=from:to:count[:log]"
+"""Form of a field with its range, for the help."""
 
 
 def quantities_option(default: str) -> Option:

@@ -73,7 +73,7 @@ SHOWN_ERRORS = 2
 """Standard errors that are printed: the truth lies within them 95 times of 100."""
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
 VERDICT_COLOURS = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))
-"""Colours of verdicts that need no limit and no condition."""
+"""Colours of verdicts that need no limit and no condition: green inside, grey and dull ones outside."""
 LIMIT_COLOURS = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
 """Colours of verdicts on limits: yellow to brown."""
 CONDITION_COLOURS = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")

@@ -54,6 +54,7 @@ from kinetostat.views.validation import VALIDATION
 ANSWERS_WITH_SECTIONS = [question.name for question in REPORT_QUESTIONS if question.section]
 """Answers with a section of their own, in the order of a report."""
 LEFT_OUT_SENTENCES = {"guidelines": "Guidelines were left out.", "sensitivity": "Sensitivities were left out."}
+"""Sentences in the place of sections that nobody wanted, by answer."""
 LINE_OF_FIRST_PAGE = "Pose"
 """Head of the line that is on the first page of a report already."""
 
