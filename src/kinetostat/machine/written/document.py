@@ -258,10 +258,36 @@ def _leg(name: str, leg: dict[str, Any], legs: Mapping[str, Any], where: str, sh
 
 
 def _joint(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> JointPlan:
+    """The plan of a joint; what is left of its part are its numbers."""
     kind = choice(part.pop("type", None), JOINT_TYPES, f"{where}: type")
     joins = part.pop("joins", None)
     if not isinstance(joins, list) or len(joins) != 2 or not all(isinstance(body, str) and body for body in joins):
         raise InputError(f'{where}: joins is {shorten(joins)}; give the two bodies it joins, e.g. ["base", "arm"].')
+    actuated, sprung, motor = _drive(kind, part, where)
+    series = tuple(part["stiffness"]) if isinstance(part.get("stiffness"), dict) else ()
+    compliance = _matrix(part.pop("compliance", []), where)
+    seat = _seat(kind, part, bool(compliance), where)
+    acts, preloaded = _acts(part, sprung, where), "preload" in part
+    rod, section = _rod(part, shapes, where)
+    return JointPlan(
+        name=name,
+        kind=kind,
+        joins=(joins[0], joins[1]),
+        actuated=actuated,
+        sprung=sprung,
+        compliance=compliance,
+        series=series,
+        seat=seat,
+        motor=motor,
+        preloaded=preloaded,
+        acts=acts,
+        rod=rod,
+        cross_section=section,
+    )
+
+
+def _drive(kind: str, part: dict[str, Any], where: str) -> tuple[bool, bool, str]:
+    """Whether a joint is actuated, whether it has a stiffness, and which of several freedoms is actuated."""
     actuated = part.pop("actuated", False)
     motor, sprung = _motor(kind, actuated, where), "stiffness" in part
     if (actuated or sprung) and kind not in ONE_FREEDOM and not motor:
@@ -274,26 +300,7 @@ def _joint(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str
         raise InputError(
             f'{where} is actuated but has no stiffness; add stiffness = "{example}", or "rigid" if its servo is ideal.'
         )
-    series = tuple(part["stiffness"]) if isinstance(part.get("stiffness"), dict) else ()
-    compliance = _matrix(part.pop("compliance", []), where)
-    seat = _seat(kind, part, bool(compliance), where)
-    acts, preloaded = _acts(part, sprung, where), "preload" in part
-    rod, section = _rod(part, shapes, where)
-    return JointPlan(
-        name=name,
-        kind=kind,
-        joins=(joins[0], joins[1]),
-        actuated=bool(actuated),
-        sprung=sprung,
-        compliance=compliance,
-        series=series,
-        seat=seat,
-        motor=motor,
-        preloaded=preloaded,
-        acts=acts,
-        rod=rod,
-        cross_section=section,
-    )
+    return bool(actuated), sprung, motor
 
 
 def _rod(part: dict[str, Any], shapes: Mapping[str, str], where: str) -> tuple[bool, str]:
