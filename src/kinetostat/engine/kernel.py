@@ -141,13 +141,24 @@ def machine_program_of(recipe: Recipe) -> Program:
 
 
 def _machine_code(recipe: Recipe) -> MachineCode:
-    """Machine code as an earlier process has left it on disk, or compiled."""
-    text = recipe.text
+    def compiled() -> MachineCode:
+        formula = recipe.formula()
+        return machine_code_of(with_gradients(formula.body, formula.inputs))
+
+    return stored_code(recipe.text, compiled)
+
+
+def stored_code(text: str | None, compiled: Callable[[], MachineCode]) -> MachineCode:
+    """Return machine code as an earlier process has left it on disk, or compile it and leave it there.
+
+    Args:
+        text: all that the program is made of; None for one that stays off the disk.
+        compiled: compiles it.
+    """
     kept = read_program(text) if text else None
     if kept:
         return unpack(kept)
-    formula = recipe.formula()
-    code = machine_code_of(with_gradients(formula.body, formula.inputs))
+    code = compiled()
     if text:
         write_program(text, code.pack())
     return code

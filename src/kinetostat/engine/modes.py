@@ -23,9 +23,8 @@ from kinetostat.engine.form import (
     traced_joints,
     traced_machine,
 )
-from kinetostat.engine.kernel import machine_program_of, program_of, recipe_of
-from kinetostat.engine.machine_code import Program, compile_source, host_lanes, unpack
-from kinetostat.engine.program_files import read_program, write_program
+from kinetostat.engine.kernel import machine_program_of, program_of, recipe_of, stored_code
+from kinetostat.engine.machine_code import Program, compile_source, host_lanes
 from kinetostat.engine.trace import Traced, rows_of
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.status import Status
@@ -123,13 +122,7 @@ def eigenvalue_program(pencil: Pencil) -> Program:
 
     In the place of fixed inputs it takes a workspace, which is filled with zeros and begins where a vector may.
     """
-    text = repr(pencil)
-    kept = read_program(text)
-    if kept:
-        return Program(unpack(kept))
-    code = compile_source(pencil_source(pencil, host_lanes()), pencil.count)
-    write_program(text, code.pack())
-    return Program(code)
+    return Program(stored_code(repr(pencil), lambda: compile_source(pencil_source(pencil, host_lanes()), pencil.count)))
 
 
 class ModalNumbers:
@@ -168,33 +161,40 @@ class ModalNumbers:
             The numbers [count x points], frequencies in Hz: infinite where there are fewer, NaN where springs and loads
             do not hold the machine; and whether the programs are sure of them [points].
         """
-        columns = np.array(rows_of(program_inputs))
+        squares, sure = self._eigenvalues_at(fixed, np.array(rows_of(program_inputs)))
+        with np.errstate(all="ignore"):
+            if self._what == "factor":
+                return np.where(squares > UNRESISTED, 1.0 / squares, np.where(np.isnan(squares), np.nan, np.inf)), sure
+            return hertz(squares.T).T, sure
+
+    def _eigenvalues_at(self, fixed: Array, columns: Array) -> tuple[Array, Mask]:
+        """Eigenvalues [count x points], and whether they are sure [points], a block of points at a time.
+
+        The last block is moved back to end with the last point; where there are fewer points than lanes, the last one
+        is repeated.
+        """
         points = columns.shape[1]
-        squares, codes = np.empty((self._pencil.count, points)), np.empty(points, dtype=np.int8)
         size, lanes = min(points, POINTS_TOGETHER), self._eigenvalues.lanes
+        eigenvalues, codes = np.empty((self._pencil.count, points)), np.empty(points, dtype=np.int8)
         block, matrices, roots = (
-            _memory_of_vectors(rows, max(size, lanes)) for rows in (len(columns), self._matrices.rows, len(squares))
+            _memory_of_vectors(rows, max(size, lanes))
+            for rows in (len(columns), self._matrices.rows, self._pencil.count)
         )
-        statuses, workspace = (
-            np.empty(block.shape[1], dtype=np.int8),
-            _memory_of_vectors(self._pencil.layout.size, lanes),
-        )
+        statuses = np.empty(block.shape[1], dtype=np.int8)
+        workspace = _memory_of_vectors(self._pencil.layout.size, lanes)
         workspace[:] = 0.0
         calls = (
             self._matrices.call_on(fixed, [block], matrices, statuses),
             self._eigenvalues.call_on(workspace, [matrices], roots, np.empty_like(statuses)),
         )
         for first in range(0, points, max(size, 1)):
-            part = slice(min(first, points - size), min(first, points - size) + size)
+            start = min(first, points - size)
+            part = slice(start, start + size)
             block[:, :size], block[:, size:] = columns[:, part], columns[:, part][:, -1:]
             for call in calls:
                 call()
-            squares[:, part], codes[part] = roots[:, :size], statuses[:size]
-        sure = codes == int(Status.OK)
-        with np.errstate(all="ignore"):
-            if self._what == "factor":
-                return np.where(squares > UNRESISTED, 1.0 / squares, np.where(np.isnan(squares), np.nan, np.inf)), sure
-            return hertz(squares.T).T, sure
+            eigenvalues[:, part], codes[part] = roots[:, :size], statuses[:size]
+        return eigenvalues, codes == int(Status.OK)
 
 
 def _memory_of_vectors(rows: int, length: int) -> Array:

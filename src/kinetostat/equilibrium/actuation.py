@@ -169,9 +169,9 @@ def _balance_of_wrenches(equations: Balance, pose: int) -> tuple[Array, Array, A
         rows[:, size * number : size * (number + 1)] = (ways.T @ terms.rates[pose]).T
         passive = np.array([spring is None for spring in leg.springs], dtype=bool) | leg.hinged
         conditions.append(rows[passive])
-        right.append(terms.left[pose][passive])
+        right.append(terms.residual[pose][passive])
         loads.append(np.where(passive[:, None], 0.0, rows))
-        weight.append(np.where(passive, 0.0, terms.left[pose]))
+        weight.append(np.where(passive, 0.0, terms.residual[pose]))
     return np.concatenate(conditions), np.concatenate(right), np.concatenate(loads), np.concatenate(weight)
 
 

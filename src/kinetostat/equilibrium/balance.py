@@ -82,9 +82,9 @@ class LegTerms:
         loads: the loads in its springs [n x coordinates], 0 of a passive coordinate.
         holding: what is needed along each given amount to keep it, such as the load of an actuator [n x amounts].
         carrying: stiffness of each spring that carries, 0 of those that are slack [n x coordinates].
-        left: what is left of the equilibrium of its coordinates [n x coordinates].
-        geometric: change of `left` by the coordinates through weight and wrenches alone [n x c x c].
-        by_given: change of `left` by the given amounts [n x coordinates x amounts].
+        residual: residual of the equilibrium of its coordinates [n x coordinates].
+        geometric: rates of the residual by the coordinates through weight and wrenches alone [n x c x c].
+        by_given: rates of the residual by the given amounts [n x coordinates x amounts].
     """
 
     end: Motions
@@ -93,7 +93,7 @@ class LegTerms:
     loads: Array
     holding: Array
     carrying: Array
-    left: Array
+    residual: Array
     geometric: Array
     by_given: Array
 
@@ -112,7 +112,7 @@ class LegTerms:
             loads=self.loads[rows],
             holding=of_machine(self.holding),
             carrying=self.carrying[rows],
-            left=self.left[rows],
+            residual=self.residual[rows],
             geometric=self.geometric[rows],
             by_given=of_machine(self.by_given),
         )
@@ -167,7 +167,7 @@ def leg_terms(
         loads=loads,
         holding=(work - weight) @ drives,
         carrying=stiffness,
-        left=loads + (weight - work) @ follows,
+        residual=loads + (weight - work) @ follows,
         geometric=follows.T @ change @ follows,
         by_given=follows.T @ change @ drives,
     )
@@ -251,7 +251,7 @@ class Balance:
         mechanism: the mechanism.
         state: the place of everything, and the wrenches of the legs.
         legs: what each leg contributes.
-        left: what is left of the equations, 0 at rest [n x unknowns].
+        residual: residuals of the equations, 0 at rest [n x unknowns].
         load: the load on the platform at the origin [n x 6].
         load_change: change of this load by a twist of the platform [n x 6 x 6].
     """
@@ -259,7 +259,7 @@ class Balance:
     mechanism: Mechanism
     state: State
     legs: tuple[LegTerms, ...]
-    left: Array
+    residual: Array
     load: Array
     load_change: Array
 
@@ -291,7 +291,7 @@ class Balance:
         """Rates of the equations by the amounts of the actuators [n x unknowns x actuators]."""
         ways, starts = self.mechanism.ways, self.mechanism.starts
         count = self.state.amounts.shape[1]
-        result = np.zeros((len(self.left), starts[-1], count))
+        result = np.zeros((len(self.residual), starts[-1], count))
         for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
             moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
             result[:, moving] = terms.by_given[:, :, :count]
@@ -337,13 +337,13 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
             rows = slice(poses * place, poses * (place + 1))
             terms[number], gaps[number] = alike.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
     numbers = range(len(mechanism.legs))
-    left_of_legs = [part for k in numbers for part in (terms[k].left, gaps[k])]
+    residuals_of_legs = [part for k in numbers for part in (terms[k].residual, gaps[k])]
     carried = sum(state.wrenches, np.zeros_like(load))
     return Balance(
         mechanism=mechanism,
         state=state,
         legs=tuple(terms[k] for k in numbers),
-        left=np.concatenate([(carried - load) @ ways, *left_of_legs], axis=1),
+        residual=np.concatenate([(carried - load) @ ways, *residuals_of_legs], axis=1),
         load=load,
         load_change=change,
     )

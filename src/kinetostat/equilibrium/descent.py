@@ -95,10 +95,10 @@ def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
 
 def _closing_steps(equations: Balance) -> Array:
     """The least motions that close the legs to first order, as steps of the unknowns [n x unknowns]."""
-    unknowns = np.zeros_like(equations.left)
+    unknowns = np.zeros_like(equations.residual)
     moving, carried = places_of(equations)
     for part in admissible(equations, tangent_matrices(equations)[2]):
-        shift = part.inverse @ equations.left[part.rows][:, carried, None]
+        shift = part.inverse @ equations.residual[part.rows][:, carried, None]
         unknowns[part.rows[:, None], moving] = -shift[:, :, 0]
     return unknowns
 
@@ -124,11 +124,11 @@ def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     """The step within a radius [n] to the lowest point that the model has there."""
     equations = balance(mechanism, state)
     moving, carried = places_of(equations)
-    unknowns = np.zeros_like(equations.left)
+    unknowns = np.zeros_like(equations.residual)
     size, fall = np.full((2, len(radius)), np.nan)
     parts = list(admissible(equations, tangent_matrices(equations)[2]))
     for part in parts:
-        residual = equations.left[part.rows][:, moving, None]
+        residual = equations.residual[part.rows][:, moving, None]
         unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ residual)[:, :, 0]
     equations = balance(mechanism, state_after(mechanism, state, unknowns))
     unknowns = np.zeros_like(unknowns)
@@ -195,7 +195,7 @@ def _model(equations: Balance, part: Admissible) -> _Model:
     """The model of the potential at those poses whose admissible motions these are."""
     legs, starts = equations.mechanism.legs, starts_of(equations)
     elastic, geometric, _ = (matrix[part.rows] for matrix in tangent_matrices(equations))
-    residual = equations.left[part.rows][:, places_of(equations)[0]]
+    residual = equations.residual[part.rows][:, places_of(equations)[0]]
     lines, loads, springs = [], [], []
     for leg, coordinates, start in zip(legs, equations.state.coordinates, starts, strict=False):
         for i in np.flatnonzero(leg.sign):

@@ -108,7 +108,7 @@ class CondensedLeg:
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
         self._bracket = turning_of(acting, self._ways)
         self._close(self._ways.T @ self.terms.rates[0].astype(object))
-        springs, remaining = self._without_passive_motions(geometric, present.left[0].astype(object))
+        springs, remaining = self._without_passive_motions(geometric, present.residual[0].astype(object))
         self._condense_springs(springs, remaining, of_scalars(wrench)[0])
 
     def _close(self, rates: Array) -> None:

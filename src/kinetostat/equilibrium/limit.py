@@ -75,7 +75,7 @@ def snap_flags(balance: Balance) -> Array:
     Returns:
         Floats, as quantities are [n].
     """
-    limits = (load_limit(balance.mechanism.at(np.array([row]))) for row in range(len(balance.left)))
+    limits = (load_limit(balance.mechanism.at(np.array([row]))) for row in range(len(balance.residual)))
     return np.array([float(limit is not None and limit.is_passed) for limit in limits])
 
 

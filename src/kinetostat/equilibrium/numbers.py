@@ -152,7 +152,7 @@ def loaded_numbers(
         return result, states.status
     compliances = compliance(equations) * equations.mechanism.compliance_units
     parts = np.array(state.machine.family.components)
-    stiffness = np.full((len(equations.left), 6), np.nan)
+    stiffness = np.full((len(equations.residual), 6), np.nan)
     stiffness[:, parts] = np.diagonal(inverse(compliances[:, parts[:, None], parts]), axis1=1, axis2=2)
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
     slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)

@@ -213,7 +213,7 @@ class Tangent:
         self.place, self.mechanism, self.carrier, self.rods = place, machine.mechanism, machine.carrier, machine.rods
         self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
         self._factors = elimination(place.rates.tolist(), self._symmetric)
-        self.step: Row = self._factors.solve((-place.terms.left[0]).tolist())
+        self.step: Row = self._factors.solve((-place.terms.residual[0]).tolist())
         self.motion, self.rank, self.platform, self.slack = self.step, len(self.step), place.platform, place.slack
 
     @property

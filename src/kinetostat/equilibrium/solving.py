@@ -207,7 +207,9 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
 
     def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
         evaluated = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
-        return largest(evaluated.left), lambda unsolved: solve(evaluated, -evaluated.left[:, :, None])[unsolved, :, 0]
+        return largest(evaluated.residual), lambda unsolved: solve(evaluated, -evaluated.residual[:, :, None])[
+            unsolved, :, 0
+        ]
 
     # The first step may only find what the legs carry and move nothing, so that one step alone shows nothing.
     end = newton(

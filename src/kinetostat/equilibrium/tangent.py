@@ -45,7 +45,7 @@ def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
     [n x conditions x N], whose product with a small motion is zero if the legs stay closed.
     """
     mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
-    count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
+    count, size, end = len(equations.residual), ways.shape[1], int(starts[-1])
     elastic, geometric = np.zeros((2, count, end, end))
     conditions = np.zeros((count, size * len(mechanism.legs), end))
     geometric[:, :size, :size] = -ways.T @ equations.load_change @ ways
@@ -62,7 +62,7 @@ def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
 def gaps_of(equations: Balance) -> Array:
     """The largest gap of each leg's closing equations, rad or in units of the length [n]."""
     ways = equations.mechanism.ways.shape[1]
-    ends = [equations.left[:, end - ways : end] for end in equations.mechanism.starts[1:]]
+    ends = [equations.residual[:, end - ways : end] for end in equations.mechanism.starts[1:]]
     return np.asarray(np.abs(np.concatenate(ends, axis=1)).max(axis=1, initial=0.0))
 
 
@@ -285,7 +285,7 @@ def compliance(equations: Balance) -> Array:
     """
     ways = equations.mechanism.ways
     size = ways.shape[1]
-    right = np.zeros((len(equations.left), equations.left.shape[1], size))
+    right = np.zeros((len(equations.residual), equations.residual.shape[1], size))
     right[:, :size] = np.eye(size)
     twists = ways @ solve(equations, right)[:, :size] @ ways.T
     shift = _shift(-skew_of(equations.state.platform.translation))
@@ -338,7 +338,7 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     """
     ways = equations.mechanism.ways
     size = ways.shape[1]
-    total = np.zeros((len(equations.left), size, size))
+    total = np.zeros((len(equations.residual), size, size))
     rigid = np.zeros(len(total), dtype=bool)
     for number, leg in enumerate(equations.mechanism.legs):
         block = equations.leg_rates(number, loaded=False)

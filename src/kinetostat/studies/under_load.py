@@ -270,7 +270,7 @@ def _answer_at_rest(state: MachineState, equations: Balance, stability: Stabilit
         mode=(stability.mode * units)[parts],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
-        residual=float(np.abs(equations.left).max() / _largest_wrench(equations)),
+        residual=float(np.abs(equations.residual).max() / _largest_wrench(equations)),
         links=loaded_links(equations, response.configuration.legs, response.reference),
     )
 
@@ -329,7 +329,7 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array
     if int(response.status) not in REGULAR or not np.isfinite(rows).all():
         return None
     start = balance(mechanism, free_state(mechanism))
-    step = solve(start, -start.left[:, :, None], loaded=False)[0, :, 0]
+    step = solve(start, -start.residual[:, :, None], loaded=False)[0, :, 0]
     return _in_si(mechanism, mechanism.ways @ step[: mechanism.ways.shape[1]], parts)
 
 

@@ -289,7 +289,7 @@ def motions_left_out(equations: Balance, mass: Array) -> Array:
         mass: see `mass_matrix`.
     """
     starts, ways = starts_of(equations), equations.mechanism.ways
-    result = np.zeros((len(equations.left), starts[-1] - starts[0], starts[-1]))
+    result = np.zeros((len(equations.residual), starts[-1] - starts[0], starts[-1]))
     parts = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
     for leg, terms, (first, last) in parts:
         within_ways, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
@@ -326,7 +326,7 @@ def frequencies(equations: Balance, count: int = MODES) -> Array:
 
     Infinite where there are fewer modes with mass, NaN where springs and loads do not hold the machine.
     """
-    result = np.full((len(equations.left), count), np.nan)
+    result = np.full((len(equations.residual), count), np.nan)
     for part in solved_modes(equations, shaped=False):
         present = min(count, part.squares.shape[1])
         result[part.rows] = np.inf
