@@ -86,7 +86,8 @@ class Multibody:
         are nodes of an element with that matrix of mass, exactly at the points of the bodies, however these are placed.
         """
         nodes = [self.system.AddNode(self.items.NodePoint(referenceCoordinates=list(end))) for end in ends]
-        self._add_mass_matrix(nodes, np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit))
+        matrix = np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit)
+        self._add_mass_matrix(nodes, np.asarray(matrix, dtype=float))
         for body, end, node in zip(bodies, ends, nodes, strict=True):
             place = self.items.MarkerBodyPosition(bodyNumber=body.number, localPosition=end - body.origin)
             markers = [self.items.MarkerNodePosition(nodeNumber=node), place]
