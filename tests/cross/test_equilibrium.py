@@ -229,7 +229,7 @@ def test_legs_of_one_form_together_are_each_of_them_alone(name):
     amounts = rng.uniform(-0.1, 0.1, free.amounts.shape)
     state = replace(state_after(mechanism, free, step), amounts=amounts)
     together, alone = balance(mechanism, state), balance(mechanism.at(many), state.at(many))
-    assert together.left[0] == pytest.approx(alone.left[-1], rel=1e-12, abs=1e-14)
+    assert together.residual[0] == pytest.approx(alone.residual[-1], rel=1e-12, abs=1e-14)
     assert together.by_actuators()[0] == pytest.approx(alone.by_actuators()[-1], rel=1e-12, abs=1e-14)
     for number in range(len(mechanism.legs)):
         assert together.leg_rates(number)[0] == pytest.approx(alone.leg_rates(number)[-1], rel=1e-12, abs=1e-14)
