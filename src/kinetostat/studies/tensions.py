@@ -7,14 +7,13 @@ Source: theory section 12 for slack legs, section 18 for cables.
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Mask
-from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.cables import Cables, cable_signs, cables_of
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
@@ -219,7 +218,9 @@ class Carrying(ImmutableAnswer):
 
 
 @checked
-def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progress: Progress = silent) -> Carrying:
+def carrying_legs(
+    machine: Machine | MachineState, ranges: Sequence[str], progress: Callable[[int, int], None] | None = None
+) -> Carrying:
     """Find which legs carry the machine at rest under its loads, over all combinations of some ranges.
 
     A leg is slack where one of its springs could only carry loads of the other sign; all other legs carry.
@@ -227,7 +228,7 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
     Args:
         machine: the machine with its loads, or its state (`state_of`); gives all parameters that do not vary.
         ranges: one axis each, "FIELD=from:to:count[:log]".
-        progress: receives how far the work is.
+        progress: receives how far the work is; nobody does if None.
 
     Raises:
         InputError: no leg of the machine can go slack, a range that `evaluate_grid` refuses, or loads that
@@ -246,7 +247,8 @@ def carrying_legs(machine: Machine | MachineState, ranges: Sequence[str], progre
         part = slice(start, min(start + slab, size))
         columns = question.grid.columns(part.start, part.stop)
         carries[part], status[part] = _carrying_in_slab(machine, columns, part.stop - start, len(names))
-        progress(part.stop, size)
+        if progress is not None:
+            progress(part.stop, size)
     codes, rows, counts = _numbered_sets(carries, status == Status.OK)
     sets = tuple(tuple(name for name, carried in zip(names, row, strict=True) if carried) for row in rows)
     words = ["+".join("_".join(name.split()) for name in members) or "none" for members in sets]
