@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from kinetostat import build, state_of
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.equilibrium.elastic_legs import ElasticLeg, FreeSpin, Masses, RodEnds
 from kinetostat.equilibrium.leg_reader import GivenMotions, Units, elastic_leg
@@ -79,3 +80,31 @@ def test_some_poses_of_a_leg_are_those_of_all_its_parts():
                 np.testing.assert_array_equal(taken, value[rows] if len(value) == poses else value)
 
     compare(leg, leg.at(rows))
+
+
+def test_a_platform_on_three_lifts_that_slide_outwards_sinks_by_its_weight():
+    """A machine 3-PPS: each leg begins with a slide that nothing drives, and its ball carries a third of the weight."""
+    angles = (0.0, 2.0, 4.0)
+    legs = []
+    for name, angle in zip("abc", np.array(angles) * np.pi / 3.0, strict=True):
+        x, y = 0.2 * np.cos(angle), 0.2 * np.sin(angle)
+        slide = {"name": "slide", "type": "prismatic", "joins": ["base", "cart"], "point": [x, y, 0], "axis": [x, y, 0]}
+        lift = {"name": "lift", "type": "prismatic", "joins": ["cart", "post"], "point": [x, y, 0.1], "axis": [0, 0, 1]}
+        ball = {"name": "ball", "type": "spherical", "joins": ["post", "platform"], "point": [x, y, 0.4]}
+        legs.append({"name": name, "joints": [slide, {**lift, "actuated": True, "stiffness": 5e7}, ball]})
+    machine = build(
+        {
+            "schema": 1,
+            "name": "3-PPS",
+            "family": "legs",
+            "platform": {"point": [0, 0, 0.4]},
+            "pose": {"z": 0.4, "roll": 0.0, "pitch": 0.0},
+            "load": {"force": [0, 0, -150.0]},
+            "legs": legs,
+        }
+    )
+    state = state_of(machine)
+    assert state.stands
+    assert [load for _, load in state.actuator_loads] == pytest.approx([50.0] * 3, rel=1e-12)
+    shift = state.at_rest.state.platform.translation[0] * state.mechanism.length[0]
+    assert shift == pytest.approx([0.0, 0.0, -1e-6], abs=1e-15)
