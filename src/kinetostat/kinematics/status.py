@@ -32,6 +32,11 @@ class Status(IntEnum):
         return self.name.lower()
 
     @property
+    def phrase(self) -> str:
+        """The words for people: ok, out of reach, joint limit, singular, not converged, no rest, undecided."""
+        return self.word.replace("_", " ")
+
+    @property
     def sentence(self) -> str:
         """A sentence for people."""
         return _SENTENCES[self]

@@ -357,7 +357,7 @@ def _answer(
         reason = Status(int(status[0]))
         where = "the pose" if len(status) == 1 else "all poses"
         raise InputError(
-            f"{sums.machine.name} has no result at {where} ({reason.word.replace('_', ' ')}): {reason.sentence} "
+            f"{sums.machine.name} has no result at {where} ({reason.phrase}): {reason.sentence} "
             f"{columns.unit_doubt if columns else ''}".rstrip()
         )
     pressed = np.concatenate(sums.pressed)

@@ -392,7 +392,7 @@ def without_command(machine: Machine, columns: Mapping[str, Array], status: Inte
 
 def tally(status: Integers) -> str:
     """Count the statuses that are not OK, such as "2 out of reach, 1 no rest"."""
-    counts = Counter(Status(code).word.replace("_", " ") for code in status[status != Status.OK].tolist())
+    counts = Counter(Status(code).phrase for code in status[status != Status.OK].tolist())
     return ", ".join(f"{count} {word}" for word, count in counts.items())
 
 

@@ -238,7 +238,7 @@ def drive_loads(state: MachineState, form: RigidForm, motion: Motion) -> DriveLo
     lost = np.flatnonzero(~np.isin(codes, PASSABLE))
     if lost.size:
         status = Status(int(codes[lost[0]]))
-        where = f"at {motion.times[lost[0]]:.4g} s the pose is {status.word.replace('_', ' ')}"
+        where = f"at {motion.times[lost[0]]:.4g} s the pose is {status.phrase}"
         message = f"The motion cannot be followed: {where}. {status.sentence} {motion.unit_doubt}".rstrip()
         return DriveLoads(state.machine, status, message, motion)
     forces = forces_on_path(form, motion.path, joints=True)

@@ -209,7 +209,8 @@ class Carrying(ImmutableAnswer):
     points: tuple[int, ...]
 
     def __repr__(self) -> str:
-        return f"<Carrying of {self.machine.name!r}: {len(self.sets)} sets of legs>"
+        count = f"{len(self.sets)} set{'s' if len(self.sets) != 1 else ''} of legs"
+        return f"<Carrying of {self.machine.name!r}: {count}>"
 
     @property
     def is_map(self) -> bool:

@@ -156,7 +156,7 @@ class ScenePanel:
 
     def look_for_nearest(self) -> None:
         """Say at once that a pose is out of reach, while the nearest one is being looked for; `explain` names it."""
-        self._show_verdict(False, Status.OUT_OF_REACH.word.replace("_", " "), LOOKING)
+        self._show_verdict(False, Status.OUT_OF_REACH.phrase, LOOKING)
 
     def fail(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""
@@ -183,7 +183,7 @@ def _verdict(report: Report) -> tuple[str, str]:
         return "no answer", report.refused
     if report.loaded is not None:
         return f"under load: {report.loaded.rest.word}", report.loaded.message
-    return report.analysis.status.word.replace("_", " "), report.analysis.message
+    return report.analysis.status.phrase, report.analysis.message
 
 
 def scene_key(report: Report) -> str:

@@ -49,7 +49,7 @@ def _lines(answer: Budget) -> Lines:
     yield "As built", answer.message
     for code in sorted({*answer.status.tolist()} - {int(Status.OK)}):
         count, status = int((answer.status == code).sum()), Status(code)
-        text = f"{count:,} of {len(answer.status):,} poses: no result ({status.word.replace('_', ' ')})."
+        text = f"{count:,} of {len(answer.status):,} poses: no result ({status.phrase})."
         yield "Poses", f"{text} {status.sentence}"
     drawn = f"{answer.samples:,} machines drawn, to first order; the worst case is at the limits of all tolerances."
     yield "Percentiles", drawn

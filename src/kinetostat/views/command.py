@@ -58,7 +58,7 @@ def _poses_table(answer: Command) -> FittedTable:
             pairs = zip(row, answer.units, strict=True)
             cells = [coordinate_text(float(value), unit, display) for value, unit in pairs]
             cells += [display.show_deflection(float(errors[i]), "m") for errors in (answer.before, answer.left)]
-        status = [] if all_settled else [Status(int(answer.status[i])).word.replace("_", " ")]
+        status = [] if all_settled else [Status(int(answer.status[i])).phrase]
         table.add_row(str(i + 1), *cells, *status)
     return table
 

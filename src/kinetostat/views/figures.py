@@ -196,7 +196,7 @@ def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> s
         poses: number of all.
         shown: the words in brackets on how the figure shows them.
     """
-    words = {status.word.replace("_", " "): count for status, count in counts.items()}
+    words = {status.phrase: count for status, count in counts.items()}
     why = ", ".join(words if len(words) == 1 else (f"{word}: {count:,}" for word, count in words.items()))
     return f"no result{shown} at {sum(words.values()):,} of {poses:,} poses ({why})" if words else ""
 

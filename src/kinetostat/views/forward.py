@@ -41,7 +41,7 @@ def mode_table(machine: Machine, poses: Sequence[ForwardPose]) -> FittedTable:
     for number, pose in enumerate(poses, 1):
         values = [coordinate_text(pose.pose[name], unit, display) for name, unit in units.items()]
         mark = f"{number} (present)" if pose.present else f"{number}{'' if pose.by_pose else ' *'}"
-        table.add_row(mark, *values, pose.status.word.replace("_", " "), f"{pose.residual:.0e}")
+        table.add_row(mark, *values, pose.status.phrase, f"{pose.residual:.0e}")
     return table
 
 

@@ -127,7 +127,7 @@ def lines_of_points(failed: Mapping[Status, int], size: int) -> Lines:
     """
     yield "Points", f"{size - sum(failed.values()):,} of {size:,} points have a result."
     for status, count in failed.items():
-        word = status.word.replace("_", " ")
+        word = status.phrase
         yield "No result", f"{count:,} of {size:,} points have no result ({word}). {status.sentence}"
 
 

@@ -62,7 +62,7 @@ def _lines(answer: PoseAnswers) -> Lines:
     for status, numbers in failures.items():
         first = numbers[0] + 1
         poses = f"{len(numbers):,} poses, the first is {first}" if len(numbers) > 1 else f"pose {first}"
-        yield "No result", f"{status.word.replace('_', ' ')}: {poses}. {status.sentence}"
+        yield "No result", f"{status.phrase}: {poses}. {status.sentence}"
     if failures and answer.poses.unit_doubt:
         yield "Units", answer.poses.unit_doubt
 
