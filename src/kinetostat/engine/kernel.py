@@ -141,24 +141,24 @@ def machine_program_of(recipe: Recipe) -> Program:
 
 
 def _machine_code(recipe: Recipe) -> MachineCode:
-    def compiled() -> MachineCode:
+    def compile_recipe() -> MachineCode:
         formula = recipe.formula()
         return machine_code_of(with_gradients(formula.body, formula.inputs))
 
-    return stored_code(recipe.text, compiled)
+    return stored_code(recipe.text, compile_recipe)
 
 
-def stored_code(text: str | None, compiled: Callable[[], MachineCode]) -> MachineCode:
+def stored_code(text: str | None, compile_program: Callable[[], MachineCode]) -> MachineCode:
     """Return machine code as an earlier process has left it on disk, or compile it and leave it there.
 
     Args:
         text: all that the program is made of; None for one that stays off the disk.
-        compiled: compiles it.
+        compile_program: compiles it.
     """
     kept = read_program(text) if text else None
     if kept:
         return unpack(kept)
-    code = compiled()
+    code = compile_program()
     if text:
         write_program(text, code.pack())
     return code

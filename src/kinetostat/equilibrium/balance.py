@@ -141,18 +141,7 @@ def leg_terms(
     placed = placed or leg.chain.place(coordinates, amounts)
     screws = placed.screws
     weight, pulling = _weight(leg, placed.before, screws, gravity)
-    # A screw changes with the motions before it, so that the work of the wrench and of the weight on it does.
-    turning = brackets_by(wrench, screws)
-    if symmetric:
-        turning = 0.5 * turning
-        turning[..., :3] += pulling
-        change = -np.einsum("njc,nkc->nkj", screws, turning)
-        change = np.tril(change, -1) + np.swapaxes(np.tril(change, -1), 1, 2)
-        change -= np.einsum("nkc,nkc->nk", screws[..., :3], pulling)[:, :, None] * np.eye(screws.shape[1])
-    else:
-        weighing = np.tril(np.einsum("njc,nkc->nkj", screws[..., :3], pulling))
-        change = -weighing - np.swapaxes(np.tril(weighing, -1), 1, 2)
-        change -= np.tril(np.einsum("njc,nkc->nkj", screws, turning), -1)
+    change = (_symmetric_change if symmetric else _change)(screws, brackets_by(wrench, screws), pulling)
     follows, drives = leg.chain.follows, leg.chain.follows_given(amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     stiffness = leg.stiffness
@@ -171,6 +160,30 @@ def leg_terms(
         geometric=follows.T @ change @ follows,
         by_given=follows.T @ change @ drives,
     )
+
+
+def _change(screws: Array, turning: Array, pulling: Array) -> Array:
+    """Change of the work of wrench and weight on each motion, by each motion [n x motions x motions].
+
+    A screw changes with the motions before it, and so does the work on it.
+
+    Args:
+        screws: the screws of the motions [n x motions x 6].
+        turning: brackets of the screws by the wrench [n x motions x 6].
+        pulling: second result of `_weight` [n x motions x 3].
+    """
+    weighing = np.tril(np.einsum("njc,nkc->nkj", screws[..., :3], pulling))
+    change = -weighing - np.swapaxes(np.tril(weighing, -1), 1, 2)
+    return np.asarray(change - np.tril(np.einsum("njc,nkc->nkj", screws, turning), -1))
+
+
+def _symmetric_change(screws: Array, turning: Array, pulling: Array) -> Array:
+    """The symmetric part of `_change`, in fewer operations: traced programs compute half of its entries."""
+    by_motion = 0.5 * turning
+    by_motion[..., :3] += pulling
+    below = np.tril(-np.einsum("njc,nkc->nkj", screws, by_motion), -1)
+    diagonal = np.einsum("nkc,nkc->nk", screws[..., :3], pulling)[:, :, None] * np.eye(screws.shape[1])
+    return np.asarray(below + np.swapaxes(below, 1, 2) - diagonal)
 
 
 def _weight(leg: ElasticLeg, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:

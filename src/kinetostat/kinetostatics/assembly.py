@@ -126,7 +126,7 @@ class _Shared:
 
 
 def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
-    """The shares of the legs in any load."""
+    """The shares of the legs in any load: by statics alone for six wrenches, by least energy for more."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [free_springs_as_joints(leg.with_unit_wrenches) for leg in legs] if redundant else legs
     modes = [modes_of(leg) if redundant or _in_series(leg) else _wrenches_as_modes(leg) for leg in balanced]
@@ -150,12 +150,21 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         if _in_series(leg):
             motions += zip(shares, mode.compliance, strict=True)
+            sizes += mode.amount_squares()
         else:
             motions += zip(spring_twists, leg.compliance, strict=True)
-        sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
+            sizes += leg.load_squares
     loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
     round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0
-    return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt, round_off)
+    return _Shared(
+        modes=modes,
+        sharing=sharing,
+        flexibility=flexibility,
+        motions=motions,
+        singularity_margin=singularity_margin,
+        doubt=doubt,
+        round_off=round_off,
+    )
 
 
 def _round_off(
