@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from kinetostat.display import number
+from kinetostat.display import DASH, number
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import setting_of
 from kinetostat.studies.tensions import Tensions, tensions
@@ -50,10 +50,10 @@ def _tables(answer: Tensions, _full: bool) -> Iterator[FittedTable]:
     heads = ["tension", "reserve", "length", *(["at the base", "sag", "stiffness kept"] if sags else [])]
     table = numeric_table("Cables", "cable", heads)
     for cable in answer.cables:
-        forces = [("-" if value is None else show(value, "N")) for value in (cable.tension, cable.reserve)]
+        forces = [(DASH if value is None else show(value, "N")) for value in (cable.tension, cable.reserve)]
         row = [*forces, show(cable.length, "m")]
         if sags:
-            base = "-" if cable.base_tension is None else show(cable.base_tension, "N")
+            base = DASH if cable.base_tension is None else show(cable.base_tension, "N")
             row += [base, show(cable.sag, "m"), f"{number(100.0 * cable.stiffness_share)} %"]
         table.add_row(cable.name, *row)
     yield table
