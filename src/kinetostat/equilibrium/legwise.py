@@ -128,12 +128,12 @@ class CondensedLeg:
         self.passive_by_springs = product(self.passive_by_twist, rates[:, self.elastic])
         self.spring_loads = product(self.wrenches, rates[:, self.elastic])
 
-    def _without_passive_motions(self, geometric: Array, left: Array) -> tuple[Array, Array]:
+    def _without_passive_motions(self, geometric: Array, residual: Array) -> tuple[Array, Array]:
         """Take passive motions, which follow the platform and the springs, out of the equations of the springs.
 
         Args:
             geometric: stiffness of all coordinates by wrenches that turn [coordinates x coordinates].
-            left: the forces that are not in balance yet, of all coordinates [coordinates].
+            residual: the forces that are not in balance yet, of all coordinates [coordinates].
 
         Returns:
             The stiffness of the springs, their own and that of turning wrenches [springs x springs], and the forces of
@@ -147,18 +147,18 @@ class CondensedLeg:
         for place, number in enumerate(self.elastic):
             stiff[place, place] = stiff[place, place] + self.terms.carrying[0, number]
         self._coupling = self._mixed - inner_loads
-        self._left = left[self.elastic] - product(self.passive_by_springs.T, left[self.passive])
-        self._left_of_passive = left[self.passive]
-        return stiff, self._left
+        self._spring_residual = residual[self.elastic] - product(self.passive_by_springs.T, residual[self.passive])
+        self._passive_residual = residual[self.passive]
+        return stiff, self._spring_residual
 
-    def _condense_springs(self, stiff: Array, left: Array, wrench: Array) -> None:
+    def _condense_springs(self, stiff: Array, residual: Array, wrench: Array) -> None:
         """Eliminate the springs: what remains are the wrenches of the leg with their compliance.
 
         With E = L D L^T for the stiffness of the springs, products with its inverse are those of rows that L has been
         taken from.
 
         Args:
-            stiff, left: E [springs x springs], and the forces that are not in balance [springs].
+            stiff, residual: E [springs x springs], and the forces that are not in balance [springs].
             wrench: the wrench that the platform exerts on the leg [ways].
         """
         count = len(self.elastic)
@@ -166,7 +166,7 @@ class CondensedLeg:
         self.sure = self.sure & definite(self._factors, stiff.tolist())
         loads, coupled, remaining = (
             array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), count)
-            for rows in (self.spring_loads, self._coupling, left[None])
+            for rows in (self.spring_loads, self._coupling, residual[None])
         )
         shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
         solved, driven = loads * shrink, coupled * shrink
@@ -180,7 +180,7 @@ class CondensedLeg:
         stiffening = self._inner - symmetric_product(driven, coupled.T)
         by_twist = self.passive_by_twist
         self.turning = symmetric_product(by_twist.T, product(stiffening, by_twist)) + self._bracket
-        pressed = product(by_twist.T, self._left_of_passive - product(driven, remaining[0]))
+        pressed = product(by_twist.T, self._passive_residual - product(driven, remaining[0]))
         self.load_taken = wrench + pressed + self.turning @ self._opening
 
     def step(self, twist: Array, change: Array) -> tuple[Row, Row]:
@@ -192,12 +192,12 @@ class CondensedLeg:
         """
         end_step = twist + self._opening
         following = product(self.passive_by_twist, end_step)
-        pushed = product(self.spring_loads.T, change) - product(self._coupling.T, following) - self._left
+        pushed = product(self.spring_loads.T, change) - product(self._coupling.T, following) - self._spring_residual
         springs = of_scalars(self._factors.solve(pushed.tolist()))[0]
         passive = following - product(self.passive_by_springs, springs)
         result = np.zeros(len(springs) + len(passive), dtype=object)
         result[self.elastic], result[self.passive] = springs, passive
-        pressed = self._left_of_passive + product(self._inner, passive) + product(self._mixed, springs)
+        pressed = self._passive_residual + product(self._inner, passive) + product(self._mixed, springs)
         wrench = product(self.wrenches.T, change) + product(self.passive_by_twist.T, pressed) + self._bracket @ end_step
         return result.tolist(), wrench.tolist()
 

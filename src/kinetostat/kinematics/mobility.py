@@ -78,34 +78,36 @@ class Mobility:
     platform_least_singular_value: float
 
 
-def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Vector) -> Mobility:
+def mobility(configuration: Configuration, nearby: Sequence[Configuration], reference: Vector) -> Mobility:
     """Return the mobility of a machine and the kind of its pose.
 
     Args:
-        here: the machine at the pose.
+        configuration: the machine at the pose.
         nearby: the machine at some poses around it, to tell what holds in general from what is special here.
         reference: point of reference of twists, base frame, m.
     """
-    ranks = freedoms(here, reference)
+    ranks = freedoms(configuration, reference)
     general = [freedoms(pose, pose.platform.translation) for pose in nearby] or [ranks]
     full_cycle = min(pose.platform for pose in general)
-    general_ranks = [max(pose.legs[i] for pose in general) for i in range(len(here.legs))]
-    lost = tuple(leg.name for leg, has, may in zip(here.legs, ranks.legs, general_ranks, strict=True) if has < may)
-    constraints, holding = _platform_wrenches(here, reference)
+    general_ranks = [max(pose.legs[i] for pose in general) for i in range(len(configuration.legs))]
+    lost = tuple(
+        leg.name for leg, has, may in zip(configuration.legs, ranks.legs, general_ranks, strict=True) if has < may
+    )
+    constraints, holding = _platform_wrenches(configuration, reference)
     kind = SortOfPose.REGULAR
     twists: tuple[tuple[float, ...], ...] = ()
     if ranks.platform > full_cycle:
-        kind, twists = SortOfPose.CONSTRAINT, _free_twists(constraints, ranks.platform, float(here.length))
+        kind, twists = SortOfPose.CONSTRAINT, _free_twists(constraints, ranks.platform, float(configuration.length))
     elif ranks.locked:
-        kind, twists = SortOfPose.ACTUATION, _free_twists(holding, ranks.locked, float(here.length))
+        kind, twists = SortOfPose.ACTUATION, _free_twists(holding, ranks.locked, float(configuration.length))
     elif lost:
         kind = SortOfPose.LEG
-    absent = _twists_absent(here)
+    absent = _twists_absent(configuration)
     legs = [
-        _least(_leg_screws(here, leg, reference), rank + absent)
-        for leg, rank in zip(here.legs, general_ranks, strict=True)
+        _least(_leg_screws(configuration, leg, reference), rank + absent)
+        for leg, rank in zip(configuration.legs, general_ranks, strict=True)
     ]
-    actuators = sum(len(_drives(leg)) for leg in here.legs)
+    actuators = sum(len(_drives(leg)) for leg in configuration.legs)
     return Mobility(
         here=ranks,
         full_cycle=full_cycle,

@@ -183,7 +183,7 @@ def _ball_signs(leg: Leg) -> Scalar:
     joints = [row for row in rows if row]
     for i, joint in enumerate(joints):
         balls = [other for other in (*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]) if len(other) == SPACE]
-        strut = [here - there for ball in balls[:1] for here in joint[0].path for there in ball[0].path]
+        strut = [end - start for ball in balls[:1] for end in joint[0].path for start in ball[0].path]
         axes = [*(revolute.axis for revolute in joint), *strut][:SPACE]
         if len(axes) == SPACE:
             sign = where(axes[0].cross(axes[1]).dot(axes[2]) < 0.0, -sign, sign)
