@@ -11,6 +11,7 @@ from kinetostat.accuracy.model import error_model
 from kinetostat.cli import main
 from kinetostat.engine.machine_functions import functions_of
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.elevation import _overall_status, _reversals
 from kinetostat.studies.vibration import modes
 
 TELESCOPE = str(Path(__file__).parents[1] / "cases" / "telescope-weight.toml")
@@ -68,6 +69,23 @@ def test_loads_reverse_where_the_drives_at_rest_pass_zero(telescope, over_elevat
                         for side in (-width, width))  # fmt: skip
         assert below * above < 0.0
         assert reversal.parts == ("drive", "lower u", "upper")
+
+
+def test_more_elevations_hide_no_reversal(telescope, over_elevation, monkeypatch):
+    """A reaction is compared with the load at an elevation, not with the sum of the loads at all of them."""
+    monkeypatch.setattr("kinetostat.studies.elevation.NO_REACTION", 1e-2)
+    parts = [(reversal.leg, reversal.parts) for reversal in over_elevation.reversals]
+    angles = np.radians(np.linspace(90.0, 0.0, 901))
+    model = error_model(replace(telescope, loaded=True), {"load.gravity_angle": angles}, len(angles))
+    reversals = _reversals(model, angles, telescope)
+    assert [(reversal.leg, reversal.parts) for reversal in reversals] == parts
+
+
+@pytest.mark.parametrize(
+    ("statuses", "overall"), [([0, 0], "ok"), ([0, 2], "joint_limit"), ([2, 0, 5, 3], "no_rest"), ([1], "out_of_reach")]
+)
+def test_an_elevation_without_a_result_counts_before_one_beyond_a_limit(statuses, overall):
+    assert _overall_status(np.array(statuses)).word == overall
 
 
 def test_a_reversal_moves_the_tool_by_both_clearances(telescope, over_elevation):

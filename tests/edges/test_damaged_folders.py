@@ -9,9 +9,10 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
+from kinetostat.spec.errors import InputError
 from kinetostat.studies import datasets
 from kinetostat.studies.storage import LIST
-from kinetostat.studies.study_folder import read_history, read_question
+from kinetostat.studies.study_folder import read_history, read_question, study_folder
 from refusals import refused
 from studies import SMALL
 
@@ -270,3 +271,18 @@ def test_a_report_in_a_finished_folder_is_listed_too(finished, tmp_path, capsys)
     flipped(report, 0.7)
     assert main(["check", str(folder)]) == NO_ANSWER
     assert "report.html" in capsys.readouterr().err
+
+
+def test_a_disk_that_fails_while_a_history_is_cleaned_loses_no_sound_note(tmp_path, monkeypatch):
+    """All that is kept is written at once: notes that followed one by one would be lost with the process."""
+
+    def failing(_):
+        raise OSError
+
+    notes = [{"chunk": number} for number in range(100)]
+    with study_folder(tmp_path) as study:
+        study.note({"chunk": 100})
+        monkeypatch.setattr("kinetostat.studies.study_folder.settle", failing)
+        with pytest.raises(InputError, match="is kept"):
+            study.keep(notes)
+    assert read_history(tmp_path)[0] == notes

@@ -117,6 +117,35 @@ def test_a_gear_or_a_screw_of_the_catalogue_takes_the_place_of_the_file(motion, 
         motors(machine, motion, path, screw="step")
 
 
+GEAR_AND_SCREW = (
+    "[gears.planetary]\nratio = 10\nefficiency = 0.5\ninertia = 1e-5\n"
+    "[screws.steep]\nlead = 0.02\nefficiency = 0.9\ninertia = 2e-5\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "gear", "screw", "said"),
+    [
+        ("hexapod", "planetary", "steep", "choose one"),
+        ("hexapod", "planetary", "", "leg 1 actuator of .* is linear"),
+        ("delta", "", "steep", "is rotary"),
+    ],
+)
+def test_a_transmission_is_of_the_kind_of_the_drives(name, gear, screw, said, tmp_path):
+    """The efficiency and the inertia of one that moves no drive would count nonetheless."""
+    path = tmp_path / "mine.toml"
+    path.write_text(GEAR_AND_SCREW)
+    with pytest.raises(InputError, match=said):
+        with_transmission(load(name), read_catalogue(path), gear, screw)
+
+
+def test_a_gear_goes_before_rotary_drives(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(GEAR_AND_SCREW)
+    geared, inertia = with_transmission(load("delta"), read_catalogue(path), "planetary", "")
+    assert (geared.tables["drives"].ratio, geared.tables["drives"].efficiency, inertia) == (10.0, 0.5, 1e-5)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

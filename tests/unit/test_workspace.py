@@ -257,6 +257,15 @@ class TestBorders:
                 code = judge.verdicts(answer.status, answer.values, lambda _, poses=poses: poses)[0]
                 assert bool(code == verdict[i, k]) is wanted
 
+    def test_a_pose_at_its_limit_is_beyond_no_singularity(self):
+        """Machine code may call a pose beyond a limit that its check, computed again, keeps to the last digit."""
+        judge = Judge(state_of(load("hexapod", ["limits.longest_leg=20 cm"])), ())
+        at_home = {"pose.z": np.array([0.135])}
+        (code,) = judge.verdicts(
+            np.array([Status.JOINT_LIMIT]), {"aspect": np.array([judge.aspect])}, lambda _: at_home
+        )
+        assert judge.labels[code] == "limits.longest_leg"
+
     def test_the_depth_vanishes_on_a_straight_border(self):
         """A border at any slope: linear interpolation between nodes on either side gives it back."""
         x, y = np.meshgrid(np.arange(12.0), np.arange(12.0), indexing="ij")

@@ -299,6 +299,16 @@ class _Block:
     errors: Array
 
 
+def greatest_work(load: Array, length: float) -> Array:
+    """The most work that loads can do per length of any motion, N [n]: a share far below it is round-off.
+
+    Args:
+        load: wrench at the tool point, N·m and N [n x 6].
+        length: a characteristic length of the machine, m.
+    """
+    return np.asarray(np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length)
+
+
 def random_inputs(
     parts: Sequence[TolerancedPart],
     rates: Array,
@@ -318,9 +328,7 @@ def random_inputs(
     """
     count, _, size = rates.shape
     work = np.einsum("nie,ni->ne", rates, load)
-    # The most work that any motion of a length can do: work far below it is no reaction.
-    greatest_work = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
-    reacts = np.abs(work) > NO_REACTION * greatest_work[:, None]
+    reacts = np.abs(work) > NO_REACTION * greatest_work(load, length)[:, None]
     pressed = np.array([part.free & reacts[:, list(part.errors)].any(axis=1) for part in parts]).T
     shift, drawn, blocks = np.zeros((count, 6)), np.zeros(size), list[_Block]()
     for number, part in enumerate(parts):

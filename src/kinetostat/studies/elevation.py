@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.accuracy.toleranced_parts import toleranced_parts
+from kinetostat.accuracy.toleranced_parts import greatest_work, toleranced_parts
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
@@ -28,7 +28,7 @@ from kinetostat.equilibrium.numbers import loaded_numbers
 from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import limit_use
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.drive_limits import driven_springs, play
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.loading import changed
@@ -84,7 +84,8 @@ class Elevation(AnswerInState):
 
     Attributes:
         state: the state of the machine as it stands upright.
-        status: worst `Status` of all elevations.
+        status: OK if every elevation has a result within the limits; otherwise that of the first elevation without a
+            result, or, where only limits are passed, `JOINT_LIMIT`.
         message: the elevations without a result, with the reasons; empty where all have one.
         elevations: the elevations, rad [n].
         statuses: `Status` codes [n].
@@ -166,10 +167,10 @@ def elevation(
         InputError: no gravity or nothing that weighs, a bad range or axis, or what `correction_table` and `budget`
             refuse.
     """
-    drawn = state_of(machine).machine
-    _check_gravity(drawn)
+    as_given = state_of(machine).machine
+    _check_gravity(as_given)
     axis_of_gravity = {"load.gravity_axis": list(about)} if len(about) else {}
-    upright = replace(changed(drawn, {**axis_of_gravity, GRAVITY_ANGLE: 0.0}), loaded=True)
+    upright = replace(changed(as_given, {**axis_of_gravity, GRAVITY_ANGLE: 0.0}), loaded=True)
     elevations = _elevations(over)
     count, angles = len(elevations), UPRIGHT - elevations
     steps = ANSWERS_BEFORE_REQUIREMENTS + (count if upright.requirements else 0)
@@ -188,7 +189,7 @@ def elevation(
     at_rest = np.isfinite(loads).all(axis=1)
     return Elevation(
         state=state_of(upright),
-        status=Status(int(statuses[np.argmax(statuses != Status.OK)])),
+        status=_overall_status(statuses),
         message=_message(statuses, elevations, upright),
         elevations=elevations,
         statuses=statuses,
@@ -241,6 +242,12 @@ def _elevations(over: str) -> Array:
     return values
 
 
+def _overall_status(statuses: Integers) -> Status:
+    """The first status of an elevation without a result; else the first beyond a limit, or OK."""
+    irregular = statuses[~np.isin(statuses, REGULAR)]
+    return Status(int(irregular[0] if irregular.size else statuses.max()))
+
+
 def _message(statuses: Integers, elevations: Array, machine: Machine) -> str:
     """Say at which elevations there is no result, or a limit is passed, and why."""
     sentences = []
@@ -269,13 +276,13 @@ def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reve
     if not np.isfinite(rates).all():
         return ()
     reactions = np.einsum("nie,ni->ne", rates, model.drawn.load)
-    # The most work that any motion of a length can do: a reaction far below it is round-off.
-    most_work = np.abs(model.drawn.load[:, 3:]).sum() + np.abs(model.drawn.load[:, :3]).sum() / model.length
+    round_off = NO_REACTION * float(greatest_work(model.drawn.load, model.length).max())
     gaps = _gaps(model, machine)
     parts_by_place: dict[tuple[str, float], list[_ReversedPart]] = {}
     for (leg, part), places in _free_motions(model).items():
         gap = gaps.get((leg, part))
-        for angle, direction in _zeros_of_reaction(reactions[:, places], angles, NO_REACTION * most_work):
+        for angle, direction in _zeros_of_reaction(reactions[:, places], angles, round_off):
+            # The drawn machine stays where it is, so that all elevations share the rates of the first one.
             twist = None if gap is None else rates[0][:, places] @ (direction * gap)
             height = round(UPRIGHT - angle, DIGITS_OF_ELEVATION)
             parts_by_place.setdefault((leg, height), []).append(_ReversedPart(part, twist))
@@ -385,9 +392,11 @@ def _requirements(
             place = f"{verdict.place}, {where}" if verdict.place else where
             by_condition.setdefault(condition, []).append(replace(verdict, place=place))
         done(number)
-    return tuple(min(verdicts, key=_margin_of_met) for _, verdicts in sorted(by_condition.items()))
+    return tuple(min(verdicts, key=_margin_or_bound) for _, verdicts in sorted(by_condition.items()))
 
 
-def _margin_of_met(verdict: Verdict) -> float:
+def _margin_or_bound(verdict: Verdict) -> float:
     """The margin of a verdict; without one, minus infinity where the requirement is not met, and 0 where it is."""
-    return -math.inf if verdict.margin is None and not verdict.met else verdict.margin or 0.0
+    if verdict.margin is not None:
+        return verdict.margin
+    return 0.0 if verdict.met else -math.inf

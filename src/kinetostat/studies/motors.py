@@ -18,7 +18,8 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.actuators import with_every_drive
+from kinetostat.kinetostatics.drive_limits import driven_springs
+from kinetostat.machine.actuators import name_of, with_every_drive
 from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
@@ -39,10 +40,12 @@ CATALOGUE = Path(__file__).with_name("catalogue.toml")
 class MotorRating:
     """A table [motors.NAME] of a catalogue: a motor that turns."""
 
-    torque: Annotated[float, Quantity("moment", "continuous torque, up to the rated speed", True)]
-    peak_torque: Annotated[float, Quantity("moment", "greatest torque for a short while, up to the rated speed", True)]
-    rated_speed: Annotated[float, Quantity("rate", "speed up to which these torques hold", True)]
-    greatest_speed: Annotated[float, Quantity("rate", "speed that the motor must not exceed", True)]
+    torque: Annotated[float, Quantity("moment", "continuous torque, up to the rated speed", positive=True)]
+    peak_torque: Annotated[
+        float, Quantity("moment", "greatest torque for a short while, up to the rated speed", positive=True)
+    ]
+    rated_speed: Annotated[float, Quantity("rate", "speed up to which these torques hold", positive=True)]
+    greatest_speed: Annotated[float, Quantity("rate", "speed that the motor must not exceed", positive=True)]
     inertia: Annotated[float, Quantity("moment of inertia", "of its rotor")]
 
     def limit(self, peak: bool, speeds: Array) -> Array:
@@ -66,8 +69,8 @@ class MotorRating:
 class GearRating:
     """A table [gears.NAME] of a catalogue."""
 
-    ratio: Annotated[float, Quantity("ratio", "turns of the motor per turn of the drive", True)]
-    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
+    ratio: Annotated[float, Quantity("ratio", "turns of the motor per turn of the drive", positive=True)]
+    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", positive=True, most=1.0)] = 1.0
     inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it, at the motor")] = 0.0
 
 
@@ -75,8 +78,8 @@ class GearRating:
 class ScrewRating:
     """A table [screws.NAME] of a catalogue."""
 
-    lead: Annotated[float, Quantity("length", "travel per turn of the motor", True)]
-    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", True, most=1.0)] = 1.0
+    lead: Annotated[float, Quantity("length", "travel per turn of the motor", positive=True)]
+    efficiency: Annotated[float, Quantity("ratio", "share of power that it passes on", positive=True, most=1.0)] = 1.0
     inertia: Annotated[float, Quantity("moment of inertia", "of what turns in it beside the shaft")] = 0.0
     shaft: Annotated[float, Quantity("linear moment of inertia", "of the screw shaft per length")] = 0.0
     diameter: Annotated[float, Quantity("length", "of a solid steel shaft, if `shaft` is not given")] = 0.0
@@ -274,8 +277,15 @@ def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: 
     """The machine with a gear or a screw of a catalogue, and the inertia of what turns with each rotor then, kg·m².
 
     Raises:
-        InputError: there is no gear or screw of that name.
+        InputError: there is no gear or screw of that name, both are chosen, or the machine has drives of the other
+            kind.
     """
+    if gear and screw:
+        raise InputError(
+            "gear and screw are both given; a gear is for rotary drives and a screw for linear ones, choose one."
+        )
+    if gear or screw:
+        _check_kind_of_drives(machine, linear=bool(screw))
     settings, inertia = dict[str, float](), 0.0
     if gear:
         chosen_gear = catalogue.gears[choice(gear, catalogue.gears, "the gear of the catalogue")]
@@ -286,6 +296,17 @@ def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: 
         settings |= {"drives.lead": chosen_screw.lead, "drives.efficiency": chosen_screw.efficiency}
         inertia += chosen_screw.turning
     return with_every_drive(machine, settings), inertia
+
+
+def _check_kind_of_drives(machine: Machine, linear: bool) -> None:
+    """Refuse a screw where a drive is rotary, and a gear where one is linear: its efficiency would count there too."""
+    others = [s for s in driven_springs(state_of(machine).configuration) if (s.joint.point is None) is not linear]
+    if others:
+        chosen, needed, kind = ("screw", "linear", "rotary") if linear else ("gear", "rotary", "linear")
+        raise InputError(
+            f"a {chosen} is for {needed} drives, and the drive {name_of(others[0])} of {machine.name} is {kind}; leave "
+            f"{chosen} out, and write lead or ratio, and efficiency, under [drives]."
+        )
 
 
 def loads_with(machine: Machine, motor: MotorRating, inertia: float, motion: Motion) -> DriveLoads:

@@ -29,7 +29,6 @@ CHECK = "check"
 """Key of the checksum of a record, its last."""
 DATA = "data"
 """Key of the checksum of the numbers that a record is about."""
-
 VERSION = "kinetostat"
 """Key of the version that began a folder; later ones go on with it."""
 CHECKED = "checksums"
@@ -69,9 +68,14 @@ def read_history(folder: Path, start: int = 0) -> tuple[list[Record], int]:
             text = stream.read()
     except FileNotFoundError:
         return [], start
-    lines = text[: text.rfind(b"\n") + 1]
-    records = map(_checked_record, lines.splitlines())
+    lines = _whole_lines(text)
+    records = map(_checked_note, lines.splitlines())
     return [record for record in records if record is not None], start + len(lines)
+
+
+def _whole_lines(text: bytes) -> bytes:
+    """The text without a last line that was cut short."""
+    return text[: text.rfind(b"\n") + 1]
 
 
 def read_question(folder: Path) -> Record:
@@ -83,7 +87,7 @@ def read_question(folder: Path) -> Record:
     path, trouble = folder / QUESTION, "is damaged and cannot be read; choose another folder, or remove this one"
     for name in (QUESTION, COPY):
         try:
-            question = _checked_record((folder / name).read_bytes(), {})
+            question = _checked_record((folder / name).read_bytes())
         except OSError as error:
             if name == QUESTION:
                 trouble = f"cannot be read: {error.strerror}; choose another folder"
@@ -96,7 +100,7 @@ def read_question(folder: Path) -> Record:
 def damaged_questions(folder: Path) -> list[str]:
     """Return the names of the files of a question that are damaged or lost; a folder of an earlier version has one."""
     texts = {name: (folder / name).read_bytes() for name in (QUESTION, COPY) if (folder / name).exists()}
-    damaged = [name for name, text in texts.items() if _checked_record(text, {}) is None]
+    damaged = [name for name, text in texts.items() if _checked_record(text) is None]
     return damaged if QUESTION in texts else [QUESTION, *damaged]
 
 
@@ -106,7 +110,10 @@ def has_checksums(question: Record) -> bool:
 
 
 def checksum(data: bytes | memoryview, before: str = "0") -> str:
-    """Return the CRC-32 of some bytes, or of more bytes after those of another checksum; it sees every damaged bit."""
+    """Return the CRC-32 of some bytes, or of more bytes after those of another checksum.
+
+    Any damage within 32 bits in a row changes it; other damage does so but for one case in four thousand million.
+    """
     return f"{zlib.crc32(data, int(before, 16)):08x}"
 
 
@@ -115,28 +122,33 @@ def _with_checksum(record: Record) -> Record:
     return {**record, CHECK: checksum(json.dumps(record).encode())}
 
 
-def _checked_record(text: bytes, least: Record | None = None) -> Record | None:
-    """Return the record in a text, without its checksum; None if it is damaged.
+def _as_line(note: Record) -> bytes:
+    """A note with its checksum as a line of the history."""
+    return json.dumps(_with_checksum(note)).encode() + b"\n"
 
-    Args:
-        text: JSON.
-        least: keys that it must have; a number of a chunk if None.
-    """
+
+def _checked_note(line: bytes) -> Record | None:
+    """Return the note in a line of the history, without its checksum; None if it is damaged or names no chunk."""
+    note = _checked_record(line)
+    number = None if note is None else note.get("chunk")
+    return note if isinstance(number, int) and number >= 0 else None
+
+
+def _checked_record(text: bytes) -> Record | None:
+    """Return the record in a JSON text, without its checksum; None if it is damaged."""
     try:
         record = json.loads(text)
     except ValueError:
         return None
-    if not isinstance(record, dict) or not (least or {}).keys() <= record.keys():
-        return None
-    if least is None and not (isinstance(record.get("chunk"), int) and record["chunk"] >= 0):
+    if not isinstance(record, dict):
         return None
     check = record.pop(CHECK, None)
     if check is None:  # of an earlier version, unless the key itself is damaged
         return None if {DATA, CHECKED} & record.keys() else record
-    return record if check == checksum(json.dumps(record).encode()) and text.strip() in _texts(record) else None
+    return record if check == checksum(json.dumps(record).encode()) and text.strip() in _written_forms(record) else None
 
 
-def _texts(record: Record) -> Iterator[bytes]:
+def _written_forms(record: Record) -> Iterator[bytes]:
     """The forms in which a record may stand in a file: one line of a history, or the lines of a question."""
     yield json.dumps(_with_checksum(record)).encode()
     yield json.dumps(_with_checksum(record), ensure_ascii=False, indent=1).encode()
@@ -156,6 +168,8 @@ class StudyFolder:
 
     def question(self, wanted: Record, restated: Callable[[Record], Record]) -> Record | None:
         """Return the question that this folder answers, or None where it has none yet; check that it is the wanted one.
+
+        A damaged or missing copy of it is written again.
 
         Args:
             wanted: the question that is asked.
@@ -180,7 +194,7 @@ class StudyFolder:
 
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""
-        (self.path / LIST).unlink(missing_ok=True)
+        self._forget_digests()
         self._history.truncate(0)
         self.write_question(question)
 
@@ -194,29 +208,33 @@ class StudyFolder:
         """Return the notes about the chunks that are done, by their number; a line cut short or damaged is dropped."""
         self._history.seek(0)
         text = self._history.read()
-        whole_lines = text[: text.rfind(b"\n") + 1]
+        whole_lines = _whole_lines(text)
         if len(whole_lines) < len(text):
             self._history.truncate(len(whole_lines))
-        lines = [_checked_record(line) for line in whole_lines.splitlines()]
+        lines = [_checked_note(line) for line in whole_lines.splitlines()]
         records = [record for record in lines if record is not None]
         self.damaged = len(lines) - len(records)
         return {record["chunk"]: record for record in records}
 
     def keep(self, records: Iterable[Record]) -> None:
         """Forget all that was noted but these records, where others are damaged."""
-        kept = list(records)
-        (self.path / LIST).unlink(missing_ok=True)
+        text = b"".join(map(_as_line, records))
+        self._forget_digests()
         with writing(self.path / HISTORY, KEPT_SENTENCE):
             self._history.truncate(0)
-        for record in kept:
-            self.note(record)
+            self._history.write(text)
+            settle(self._history)
 
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
-        (self.path / LIST).unlink(missing_ok=True)
+        self._forget_digests()
         with writing(self.path / HISTORY, KEPT_SENTENCE):
-            self._history.write(json.dumps(_with_checksum(record)).encode() + b"\n")
+            self._history.write(_as_line(record))
             settle(self._history)
+
+    def _forget_digests(self) -> None:
+        """Remove the list of checksums of finished files: one of them is about to change."""
+        (self.path / LIST).unlink(missing_ok=True)
 
 
 @contextmanager

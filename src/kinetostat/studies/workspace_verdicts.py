@@ -51,11 +51,6 @@ LIMIT_VERDICT, CONDITION_VERDICT = "limits.", "fails "
 """The words with which verdicts of limits and of conditions begin."""
 
 
-def phrase(label: str) -> str:
-    """Write a verdict in a few words."""
-    return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT_VERDICT}{limit.name}"), label)
-
-
 COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 """Comparisons of a condition, and their functions."""
 CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
@@ -69,12 +64,17 @@ COMPARED_KINDS = (
     *("speed", "rate", "acceleration", "angular acceleration"),
 )
 """Kinds of quantities beside stiffnesses and compliances, of which several have one unit."""
-_BY_UNIT = {
+KIND_OF_UNIT = {
     kind.unit: kind.name
     for kind in KINDS.values()
     if kind.name.endswith(("stiffness", "compliance")) or kind.name in COMPARED_KINDS
 }
 """Kind of the value with which a quantity of a unit is compared; values of other units are plain numbers."""
+
+
+def phrase(label: str) -> str:
+    """Write a verdict in a few words."""
+    return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT_VERDICT}{limit.name}"), label)
 
 
 @dataclass(frozen=True)
@@ -127,8 +127,8 @@ def value_of(unit: str, written: float | str | None, where: str) -> float:
         InputError: it is of another kind, or not finite.
     """
     try:
-        if unit in _BY_UNIT:
-            return _finite(parse(written, _BY_UNIT[unit]))
+        if unit in KIND_OF_UNIT:
+            return _finite(parse(written, KIND_OF_UNIT[unit]))
         return _finite(float(written if written is not None else math.nan))
     except UnitError as error:
         raise InputError(f"in {where}, {shorten(written)}: {error}.") from None
@@ -200,17 +200,20 @@ class Judge:
             status, values: status and values of the poses, of any shape.
             poses: a function from numbers of some of the poses to their coordinates.
         """
-        codes = np.zeros(status.shape, dtype=np.int8)
-        for place, known in enumerate(STATUS_VERDICTS):
-            codes[status == known] = place
-        codes[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
+        labels = self.labels
+        codes = np.full(status.shape, labels.index(INSIDE), dtype=np.int8)
+        for code, verdict in STATUS_VERDICTS.items():
+            codes[status == code] = labels.index(verdict)
+        codes[(status == Status.OK) & self._beyond(values)] = labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
-            codes.flat[limited] = (
-                len(STATUS_VERDICTS) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
-            )
-        for place, condition in enumerate(self.conditions, len(STATUS_VERDICTS) + 1 + len(self.limits)):
-            codes[(codes == 0) & ~condition.holds(np.asarray(values[condition.quantity]))] = place
+            limit_codes = np.array([labels.index(f"{LIMIT_VERDICT}{name}") for name in self.limits])
+            passed = first_limit_passed(self.machine, poses(limited), self.limits)
+            # A pose exactly at a limit may pass none when it is computed again: it is then named after the first.
+            codes.flat[limited] = limit_codes[np.maximum(passed, 0)]
+        for condition in self.conditions:
+            fails = ~condition.holds(np.asarray(values[condition.quantity]))
+            codes[(codes == labels.index(INSIDE)) & fails] = labels.index(f"{CONDITION_VERDICT}{condition.text}")
         return codes
 
     def _beyond(self, values: Mapping[str, Any]) -> Mask:
@@ -286,7 +289,7 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
     for k in range(min(DRAWN_COORDINATES, verdict.ndim)):
         changes = np.zeros(verdict.shape, dtype=bool)
         lower, upper = _neighbours(verdict, k)
-        changes[_all_but(k, slice(None, -1))] = lower != upper
+        changes[_along_axis(k, slice(None, -1))] = lower != upper
         searched = np.zeros_like(changes)
         searched[drawn] = True
         nodes_by_axis.append(np.argwhere(changes & searched))
@@ -340,7 +343,7 @@ def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
     for k, share in enumerate(shares):
         nearest = np.full(region.shape, np.inf)
         lower, upper = _neighbours(region, k)
-        before_border, behind_border = _all_but(k, slice(None, -1)), _all_but(k, slice(1, None))
+        before_border, behind_border = _along_axis(k, slice(None, -1)), _along_axis(k, slice(1, None))
         has_border = lower != upper
         nearest[before_border] = np.where(has_border, share[before_border], np.inf)
         from_second = np.where(has_border, 1.0 - share[before_border], np.inf)
@@ -353,10 +356,11 @@ def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
 
 def _neighbours(nodes: AnyArray, k: int) -> tuple[AnyArray, AnyArray]:
     """Return all nodes but the last along an axis, and all but the first: each node beside its next neighbour."""
-    return nodes[_all_but(k, slice(None, -1))], nodes[_all_but(k, slice(1, None))]
+    return nodes[_along_axis(k, slice(None, -1))], nodes[_along_axis(k, slice(1, None))]
 
 
-def _all_but(k: int, chosen: slice) -> tuple[slice, ...]:
+def _along_axis(k: int, chosen: slice) -> tuple[slice, ...]:
+    """The index that chooses nodes along axis k, and all nodes along the others."""
     return (*[slice(None)] * k, chosen)
 
 
