@@ -165,6 +165,9 @@ SURELY_HANGING = 1e-10
 """The same below which the shape is good after the last step that was allowed, with three digits less."""
 SETTLED_CABLE = 1e-13
 """Change of a cable's direction, or of where it leaves its pulley, m, below which it is round-off."""
+SURELY_SETTLED_CABLE = 1e-7
+"""The same below which a cable has settled after the last step that was allowed: steps that shrink slowly have then
+left half of the digits, and cables that swing between two shapes change by far more."""
 DEGENERATE_FACE = 1e-10
 """Product of unit wrenches below which they are dependent and span no face: their round-off is then its direction."""
 SURELY_REGULAR = 1e-6

@@ -8,6 +8,7 @@ from kinetostat import analyze, evaluate, evaluate_grid, load, state_of, tension
 from kinetostat.engine.batch import evaluate as evaluate_points
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cables import cables_of, leaving_points
+from kinetostat.kinematics.status import Status
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.report import REPORT_QUESTIONS, Answers
 from kinetostat.studies.sensitivity import sensitivity
@@ -198,6 +199,20 @@ def test_cables_that_hang_over_pulleys_hold_the_load_by_their_own_shapes():
     guides = np.array([machine.tables[f"legs.cable {n}.anchor"].point for n in range(1, 9)])
     again = leaving_points(guides[None], cables.far, np.array([0.08]), shape.base_slope)[0]
     assert cables.near == pytest.approx(again, abs=1e-11)
+
+
+def test_heavy_cables_whose_shapes_do_not_settle_are_not_at_rest():
+    """Tensions that swing between two shapes balance the load in neither of them, so that there are no numbers."""
+    machine = load("cogiro", ["pose.x=3", "pose.y=-2", "cables.linear_density=1", "load.min_tension=5"])
+    names = ("least_tension", "capacity", "wrench_closure")
+    result = values(machine, *names, x=[3.0, 0.0], y=[-2.0, 0.0])
+    assert result.status.tolist() == [Status.NO_REST, Status.OK]
+    assert all(np.isnan(result.values[name]).tolist() == [True, False] for name in names)
+    answer = tensions(machine)
+    assert answer.status == Status.NO_REST
+    assert "do not settle" in answer.message
+    assert answer.sag_message == "The sag of cables without a shape is not known."
+    assert all(np.isnan([cable.length, cable.sag]).all() for cable in answer.cables)
 
 
 def test_cables_of_hardly_any_weight_over_tiny_pulleys_are_straight_ones():

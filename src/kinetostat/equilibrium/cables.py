@@ -6,7 +6,8 @@ each of its legs is an actuated slide between two joints that only pulls (or onl
 
 A cable of uniform weight hangs in a vertical plane. From its platform end, along its unstretched length, the horizontal
 part of its tension stays the same and the vertical part grows by its weight, so that its shape is known in closed form.
-Here its tension at the platform is given; its slope there and its unstretched length follow by Newton's method.
+Here its tension at the platform is given; its slope there and its unstretched length follow by Newton's method. Tensions
+are chosen with the directions in which cables then pull, and both follow from each other in steps.
 
 Source: theory (76)-(80); M. Irvine, Cable Structures (1981), section 1.2; pulleys: A. Pott, "Influence of pulley
 kinematics on cable-driven parallel robots", Latest Advances in Robot Kinematics (2012).
@@ -33,18 +34,24 @@ from kinetostat.numerics.distribution import Rule, distribution
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.numerics.polytopes import capacity, wrench_closure
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import HANGING, SETTLED_CABLE, SURELY_HANGING, UNRESISTED
+from kinetostat.tolerances import HANGING, LEAST_DIVISOR, SETTLED_CABLE, SURELY_HANGING, SURELY_SETTLED_CABLE
 
 MOST_NEWTON_STEPS = 30
 """Most steps of Newton's method for slope and length of a cable: three or four unless it hangs like a chain."""
 MOST_TENSION_STEPS = 60
 """Most steps in which directions and tensions of hanging cables follow from each other: each changes hardly more than a
-hundredth of what the last one has changed, so that some seven do unless cables hang like chains."""
+hundredth of what the last one has changed, so that some seven do unless cables hang like chains. Those may swing between
+two shapes for ever, and then have none."""
 
 
 @dataclass(frozen=True)
 class Hanging:
     """Cables in their vertical planes; each array [n x cables].
+
+    With H across, U up, the weight q per metre and the length L, the base end is away by
+    H (L/EA + (arsinh((U + q L)/H) - arsinh(U/H)) / q), and higher by
+    (2 U + q L) L / (2 EA) + (hypot(H, U + q L) - hypot(H, U)) / q. Neither difference is formed here: each is written
+    as a product, so that the digits of light and taut cables are kept.
 
     Attributes:
         across, up: parts of the tension at the platform end, horizontally to the base end and upwards, N.
@@ -93,7 +100,10 @@ class Hanging:
 
     @property
     def _slope_change(self) -> Array:
-        """Difference of the inverse hyperbolic sines of both slopes over the weight of a metre, however small."""
+        """Difference of the inverse hyperbolic sines of both slopes over the weight of a metre, m/N.
+
+        It is the logarithm of a quotient, of whose two forms the one is taken in which nothing cancels.
+        """
         whole_weight = self.weight * self.length
         rising = whole_weight * (1.0 + self._mean_sine) / (self.up + self.tension)
         falling = whole_weight * (1.0 - self._mean_sine) / (self.base_tension - (self.up + whole_weight))
@@ -126,8 +136,9 @@ class Hanging:
         """Greatest distance of the cable from the line of its ends, m."""
         level, rise = self.spans
         # The farthest point is where the cable runs along that line: up + w s = across * rise / level.
-        part = np.clip((self.across * rise / np.maximum(level, UNRESISTED) - self.up) / self.weight, 0.0, self.length)
-        x, z = replace(self, length=np.maximum(part, UNRESISTED)).spans
+        up_there = self.across * rise / np.maximum(level, LEAST_DIVISOR)
+        part = np.clip((up_there - self.up) / self.weight, 0.0, self.length)
+        x, z = replace(self, length=part).spans
         return np.abs(z * level - x * rise) / np.hypot(level, rise)
 
 
@@ -180,8 +191,7 @@ def leaving_points(guides: Array, ends: Array, radius: Array, slope: Array) -> t
     Returns:
         The points where they leave [n x cables x 3], m, and lengths that lie on the wheels [n x cables], m.
     """
-    ahead = (ends - guides) * [1.0, 1.0, 0.0]
-    ahead = ahead / np.maximum(np.sqrt((ahead * ahead).sum(axis=2, keepdims=True)), UNRESISTED)
+    ahead = _units((ends - guides) * [1.0, 1.0, 0.0])
     forward = radius[:, None] * (1.0 + np.sin(slope))
     points = guides + forward[:, :, None] * ahead
     points[:, :, 2] += radius[:, None] * np.cos(slope)
@@ -223,6 +233,8 @@ class Cables:
         stiffness: stiffness of each straight cable with its winch, N/m [n x cables].
         wound: length of each cable that lies on its pulley, m [n x cables].
         shape: their shapes as they hang; None for straight ones.
+
+    Where sagging cables find no shape, their directions are NaN, and all that follows from these.
     """
 
     near: Array
@@ -239,6 +251,11 @@ class Cables:
     stiffness: Array
     wound: Array
     shape: Hanging | None = None
+
+    @cached_property
+    def settled(self) -> Mask:
+        """Whether the cables of a pose have directions: straight ones always, sagging ones if they find a shape [n]."""
+        return ~np.isnan(self.directions).any(axis=(1, 2))
 
     @cached_property
     def wrenches(self) -> Array:
@@ -338,9 +355,8 @@ def _units(vectors: Array) -> Array:
 def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
     """Cables as they hang, and run over their pulleys, with the tensions that they have in these places.
 
-    Directions and tensions depend on each other: tensions are chosen with the directions of the last step, and new
-    directions follow from them, until nothing changes. Cables sag little, so that a step changes hardly more than a
-    hundredth of what the last step has changed.
+    Tensions are chosen with the directions of the last step, and new directions follow from them, until nothing
+    changes. Poses at which that does not end have directions and lengths of NaN.
 
     Args:
         cables: the cables, straight and without pulleys.
@@ -351,10 +367,13 @@ def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> 
     hung = cables
     for _ in range(MOST_TENSION_STEPS):
         last, hung = hung, _cables_with_tensions_of(hung, cables, up, weight, radius)
-        changes = hung.directions - last.directions, hung.near - last.near
-        if max(np.nan_to_num(np.abs(change)).max() for change in changes) < SETTLED_CABLE:
+        changes = np.abs([hung.directions - last.directions, hung.near - last.near])
+        changes_by_pose = np.nan_to_num(changes).max(axis=(0, 2, 3))
+        if changes_by_pose.max() < SETTLED_CABLE:
             break
-    return hung
+    unknown = np.where(changes_by_pose < SURELY_SETTLED_CABLE, 0.0, np.nan)
+    shape = None if hung.shape is None else replace(hung.shape, length=hung.shape.length + unknown[:, None])
+    return replace(hung, directions=hung.directions + unknown[:, None, None], shape=shape)
 
 
 def _cables_with_tensions_of(hung: Cables, cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
@@ -367,8 +386,8 @@ def _cables_with_tensions_of(hung: Cables, cables: Cables, up: Array, weight: Ar
     tensions = np.where(np.isnan(hung.tensions[0]), np.inf, hung.tensions[0])
     sags = np.isfinite(tensions) & heavy[:, None] & (tensions > 0.0)
     rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
-    loads = np.where(heavy, weight, 1.0)[:, None] + 0.0 * level
-    shape = hanging_cables(level, rise, np.where(sags, tensions, 1.0), loads, rigidity)
+    weights = np.broadcast_to(np.where(heavy, weight, 1.0)[:, None], level.shape)  # 1 N/m of those that hang straight
+    shape = hanging_cables(level, rise, np.where(sags, tensions, 1.0), weights, rigidity)
     straight = np.arctan2(rise, level)
     slope = np.where(sags, np.arctan2(shape.up, shape.across), straight)
     directions = np.cos(slope)[:, :, None] * _units(sideways) + np.sin(slope)[:, :, None] * up[:, None]
@@ -390,12 +409,13 @@ def cable_numbers(machine: Machine, names: Collection[str], count: int) -> tuple
 
     Returns:
         Their values by name, SI [n], NaN where there is none or legs are no cables, and `Status` codes [n]: NO_REST
-        where tensions are wanted and none within their bounds hold the load.
+        where sagging cables find no shape, or tensions are wanted and none within their bounds hold the load.
     """
     signs, status = cable_signs(machine), np.full(count, Status.OK, dtype=np.int8)
     if not signs:
         return {name: np.full(count, np.nan) for name in names}, status
     cables = cables_of(machine, signs, count)
+    status[~cables.settled] = Status.NO_REST
     result = {}
     if "wrench_closure" in names:
         result["wrench_closure"] = wrench_closure(cables.wrenches)

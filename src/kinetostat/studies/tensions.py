@@ -73,7 +73,7 @@ class Tensions(ImmutableAnswer):
 
     Attributes:
         machine: the machine at its pose, with its loads.
-        status: OK, or NO_REST where no tensions within the bounds hold the load.
+        status: OK, or NO_REST where no tensions within the bounds hold the load, or sagging cables find no shape.
         message: the answer in a sentence.
         cables: all cables.
         bounds: least and greatest tension that are allowed, N; the greatest one may be infinite.
@@ -101,6 +101,8 @@ class Tensions(ImmutableAnswer):
         table, show = self.machine.tables["cables"], self.machine.display.show
         if not table.linear_density:
             return "Cables are straight here; with [cables] linear_density they hang under their own weight."
+        if any(math.isnan(cable.sag) for cable in self.cables):
+            return "The sag of cables without a shape is not known."
         deepest = max(self.cables, key=lambda cable: cable.sag)
         softest = min(self.cables, key=lambda cable: cable.stiffness_share)
         share = f"{100.0 * softest.stiffness_share:.0f} % of the stiffness of a straight cable"
@@ -137,6 +139,11 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
         sizes = [cable.tension for cable in states if cable.tension is not None]
         ends = f"{show(min(sizes), 'N')} to {show(max(sizes), 'N')}"
         message = f"Tensions from {ends} hold the load."
+    elif not cables.settled[0]:
+        message = (
+            f"No shape was found in which the cables of {machine.name} hang and hold this load: tensions and shapes, "
+            "which follow from each other, do not settle. Raise load.min_tension, or make the cables lighter."
+        )
     else:
         message = why_no_tensions(machine)
     return Tensions(
