@@ -6,8 +6,8 @@ each of its legs is an actuated slide between two joints that only pulls (or onl
 
 A cable of uniform weight hangs in a vertical plane. From its platform end, along its unstretched length, the horizontal
 part of its tension stays the same and the vertical part grows by its weight, so that its shape is known in closed form.
-Here its tension at the platform is given; its slope there and its unstretched length follow by Newton's method. Tensions
-are chosen with the directions in which cables then pull, and both follow from each other in steps.
+Here its tension at the platform is given; its slope there and its unstretched length follow by Newton's method. As
+tensions are chosen with the directions in which cables then pull, both follow from each other in steps.
 
 Source: theory (76)-(80); M. Irvine, Cable Structures (1981), section 1.2; pulleys: A. Pott, "Influence of pulley
 kinematics on cable-driven parallel robots", Latest Advances in Robot Kinematics (2012).
@@ -40,8 +40,8 @@ MOST_NEWTON_STEPS = 30
 """Most steps of Newton's method for slope and length of a cable: three or four unless it hangs like a chain."""
 MOST_TENSION_STEPS = 60
 """Most steps in which directions and tensions of hanging cables follow from each other: each changes hardly more than a
-hundredth of what the last one has changed, so that some seven do unless cables hang like chains. Those may swing between
-two shapes for ever, and then have none."""
+hundredth of what the last one has changed, so that some seven do unless cables hang like chains. Those may swing
+between two shapes for ever, and then have none."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ Source: MuJoCo documentation, Computation, section on the constraint model (impe
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
@@ -162,9 +163,9 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
         InputError: if nothing has a mass.
     """
     machine, joints, configuration = analysis.machine, analysis.state.joints, analysis.state.configuration
-    carried, armatures = tuple(on_platform(machine, configuration.platform)), _rotors(machine, model)
+    carried = tuple(on_platform(machine, configuration.platform))
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
-    heavy = _parts_by_body(model, configuration, links(members, configuration), armatures)
+    heavy, slide_armatures = _parts_by_body(model, configuration, links(members, configuration))
     known_mass = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
     if known_mass == 0.0:
         raise InputError(
@@ -178,8 +179,13 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
         name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
         for name, at in places.items()
     }
+    # A platform that carries masses is heavier than its entry here, which may be that of a body without a mass.
     least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
-    step = min([step_for(analysis, least, gyration), *_steps_for_springs(_moving_bodies(model), inertias, armatures)])
+    between_springs = _inertias_between_springs(_moving_bodies(model), inertias)
+    sources = _rotors(machine, model), slide_armatures, between_springs
+    armatures = {name: sum(source.get(name, 0.0) for source in sources) for source in sources for name in source}
+    spring_steps = _steps_for_springs(_moving_bodies(model), inertias, between_springs)
+    step = min([step_for(analysis, least, gyration), *spring_steps])
     period = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known_mass)
     return Pace(
         step=step,
@@ -205,32 +211,44 @@ def _rotors(machine: Machine, model: Model) -> dict[str, float]:
 
 
 def _parts_by_body(
-    model: Model, configuration: Configuration, parts: Iterable[HeavyLink], armatures: dict[str, float]
-) -> dict[str, list[Heavy]]:
-    """Return the parts of links that each body carries, by its name.
+    model: Model, configuration: Configuration, parts: Iterable[HeavyLink]
+) -> tuple[dict[str, list[Heavy]], dict[str, float]]:
+    """Return the parts of links that each body carries, by its name, and armatures of slides in rods, by theirs.
 
-    A link that stretches evenly changes the armature of its slide in `armatures`.
+    A rod between two bodies is two halves. Where one of them slides by q against the other, both have m/12 q² more
+    kinetic energy than a rod that stretches evenly: so the slide has the armature -m/6.
     """
-    heavy: dict[str, list[Heavy]] = {}
+    heavy: defaultdict[str, list[Heavy]] = defaultdict(list)
+    armatures: defaultdict[str, float] = defaultdict(float)
     chains = [pieces(leg, configuration.plane) for leg in configuration.legs]
     for link in parts:
-        for body, part in _parts_of_link(link, model, chains[link.leg], armatures):
-            heavy.setdefault(body.name, []).append(part)
-    return heavy
+        if len(link.points) == 1:
+            body = model.chains[link.leg][link.bodies[0]]
+            heavy[body.name].append(Heavy(link.mass, link.points[0], link.inertia))
+            continue
+        for (near, far), (start, end), mass in _rods_of_link(link, model, chains[link.leg]):
+            if near is far:
+                heavy[near.name].append(rod(mass, start, end))
+                continue
+            middle = 0.5 * (start + end)
+            heavy[near.name].append(rod(0.5 * mass, start, middle))
+            heavy[far.name].append(rod(0.5 * mass, middle, end))
+            for freedom in far.freedoms:
+                if not freedom.is_hinge and _is_along(freedom.axis, end - start):
+                    armatures[freedom.name] -= mass / 6.0
+    return heavy, armatures
 
 
-def _parts_of_link(
-    link: HeavyLink, model: Model, chain: Sequence[Piece], armatures: dict[str, float]
-) -> Iterator[tuple[Body, Heavy]]:
-    """Give the bodies that carry a link and what each carries: both bars of a parallelogram, or the bar that it is."""
+def _rods_of_link(
+    link: HeavyLink, model: Model, chain: Sequence[Piece]
+) -> Iterator[tuple[tuple[Body, Body], tuple[Array, Array], float]]:
+    """Give the rods of a link, which are two in a parallelogram: bodies and points of both ends, and the mass, kg."""
     bodies, first, last = model.chains[link.leg], link.bodies[0], link.bodies[-1]
-    if len(link.points) == 1:
-        yield bodies[first], Heavy(link.mass, link.points[0], link.inertia)
-        return
     start, end = link.points
     if bar := _bar_at(model, link.leg, start):
-        yield from _halves(bar, (start, end), link.mass, armatures)
+        yield bar, (start, end), link.mass
         return
+    # A joint at an end of the link leaves this end where it is, so that the body next to it carries the link as well.
     while first < last and _turns_at(chain[first], start):
         first += 1
     while first < last and _turns_at(chain[last - 1], end):
@@ -239,7 +257,7 @@ def _parts_of_link(
     pairs = bars or [(bodies[first], bodies[last])]
     for near, far in pairs:
         shift = near.origin - start if len(pairs) > 1 else np.zeros(3)
-        yield from _halves((near, far), (start + shift, end + shift), link.mass / len(pairs), armatures)
+        yield (near, far), (start + shift, end + shift), link.mass / len(pairs)
 
 
 def _bar_at(model: Model, leg: int, start: Array) -> tuple[Body, Body] | None:
@@ -251,25 +269,9 @@ def _bar_at(model: Model, leg: int, start: Array) -> tuple[Body, Body] | None:
     return None
 
 
-def _halves(
-    bodies: tuple[Body, Body], ends: tuple[Array, Array], mass: float, armatures: dict[str, float]
-) -> Iterator[tuple[Body, Heavy]]:
-    """Give a rod to one body, or half of it to each of two.
-
-    Two halves of a rod, one of which slides by q against the other, have m/12 q² more kinetic energy than a rod that
-    stretches evenly: so the slide has the armature -m/6.
-    """
-    (near, far), (start, end) = bodies, ends
-    if near is far:
-        yield near, rod(mass, start, end)
-        return
-    for slide in far.freedoms:
-        along = abs(slide.axis @ (end - start)) > (1.0 - COINCIDENT) * np.linalg.norm(end - start)
-        if not slide.is_hinge and along:
-            armatures[slide.name] = armatures.get(slide.name, 0.0) - mass / 6.0
-    middle = 0.5 * (start + end)
-    yield near, rod(0.5 * mass, start, middle)
-    yield far, rod(0.5 * mass, middle, end)
+def _is_along(axis: Array, span: Array) -> bool:
+    """Return whether a unit axis and a span have one direction."""
+    return bool(abs(axis @ span) > (1.0 - COINCIDENT) * np.linalg.norm(span))
 
 
 def _turns_at(piece: Piece, point: Array) -> bool:
@@ -288,16 +290,27 @@ def rod(mass: float, start: Array, end: Array) -> Heavy:
     return Heavy(mass, thin.centre, thin.inertia + mass * THIN_SHARE**2 * np.outer(span, span))
 
 
-def _steps_for_springs(bodies: list[Body], inertias: dict[str, Heavy], armatures: dict[str, float]) -> Iterator[float]:
-    """Give a time step for each spring, s; springs in a row on one body get a little inertia between them."""
-    for body in bodies:
-        for freedom in body.freedoms:
-            if freedom.stiffness > 0.0:
-                size = _moved_inertia(freedom, inertias[body.name])
-                if len(body.freedoms) > 1:
-                    size *= SHARE_BETWEEN_SPRINGS
-                    armatures[freedom.name] = armatures.get(freedom.name, 0.0) + size
-                yield 2.0 * math.pi * math.sqrt(size / freedom.stiffness) / STEPS_OF_SPRING
+def _inertias_between_springs(bodies: list[Body], inertias: dict[str, Heavy]) -> dict[str, float]:
+    """Return the little inertia that each spring in a row on one body gets, kg or kg·m², by the spring's name."""
+    return {
+        freedom.name: SHARE_BETWEEN_SPRINGS * _moved_inertia(freedom, inertias[body.name])
+        for body in bodies
+        for freedom in body.freedoms
+        if freedom.stiffness > 0.0 and len(body.freedoms) > 1
+    }
+
+
+def _steps_for_springs(
+    bodies: list[Body], inertias: dict[str, Heavy], between_springs: dict[str, float]
+) -> list[float]:
+    """Return a time step for each spring, s, by the inertia that hangs on it."""
+    inertias_and_stiffness = [
+        (between_springs.get(freedom.name, _moved_inertia(freedom, inertias[body.name])), freedom.stiffness)
+        for body in bodies
+        for freedom in body.freedoms
+        if freedom.stiffness > 0.0
+    ]
+    return [2.0 * math.pi * math.sqrt(size / k) / STEPS_OF_SPRING for size, k in inertias_and_stiffness]
 
 
 def _moved_inertia(freedom: Freedom, part: Heavy) -> float:
