@@ -18,9 +18,9 @@ from studio_page import on_page
 
 from kinetostat import export
 from kinetostat.machine.loading import build, bundled, load
-from kinetostat.studio.left_panes import explanation_of, reading
 from kinetostat.studio.menus import about
 from kinetostat.studio.serving import LOOPBACK, BoundedBody
+from kinetostat.studio.text_pane import explanation_of, reading
 
 MACHINE = "zhang-gosselin-4dof"
 

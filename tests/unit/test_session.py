@@ -78,6 +78,35 @@ def test_contradictions_are_found_when_the_hand_lets_go(session):
     assert session.value("limits.shortest_leg") == 0.9
 
 
+CONTRADICTION = {"limits.shortest_leg": 0.9}, {"limits.longest_leg": 0.5}
+
+
+def test_undo_in_the_middle_of_a_drag_keeps_no_numbers_that_contradict_each_other(session):
+    session.move(CONTRADICTION[0])
+    session.settle()
+    session.move(CONTRADICTION[1])
+    session.undo()
+    assert math.isinf(session.value("limits.longest_leg"))
+    assert session.value("limits.shortest_leg") == 0.9
+    assert not session.can_redo
+    session.undo()
+    assert session.machine is session.origin
+
+
+def test_another_drag_or_a_reset_checks_the_one_before(session):
+    session.move(CONTRADICTION[0])
+    session.settle()
+    for change in (lambda: session.move({"pose.x": 0.01}), session.settle):
+        session.move(CONTRADICTION[1])
+        with refused("nothing lies between them"):
+            change()
+        assert math.isinf(session.value("limits.longest_leg"))
+    session.move(CONTRADICTION[1])
+    session.reset()
+    session.undo()
+    assert math.isinf(session.value("limits.longest_leg"))
+
+
 def test_a_field_of_several_entries_moves_them_together(session):
     session.write("stiffness.actuator", "5000 N/m")
     assert [session.value(f"stiffness.actuator.{i}") for i in range(4)] == [5000.0] * 4

@@ -17,19 +17,20 @@ from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportReq
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.lanes import Lane, as_sentence
-from kinetostat.studio.left_panes import ParametersPanel, TextPane
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.menus import FilesMenu, Gallery
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.panels.influences import ContributionsPanel, LinkPanel, SensitivityPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel, RequirementsPanel
 from kinetostat.studio.panels.vibration import VibrationPanel
+from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.playback import DrivesPanel, Playback
 from kinetostat.studio.processes import check_upload
 from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.question_tab import AskTab
 from kinetostat.studio.scene_panel import Handles, ScenePanel
 from kinetostat.studio.session import Memory, Session, address_of
+from kinetostat.studio.text_pane import TextPane
 from kinetostat.views.scene.anatomy import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
@@ -190,13 +191,13 @@ class StudioPage:
         self.scene.draw(drawn)
         if drawn.status is Status.OUT_OF_REACH and request.machine.family.chains is not None:
             self.scene.look_for_nearest()
-        self.parameters.go_on()
+        self.parameters.take_waiting_position()
         self._report()
 
     def _say_failure(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed, and let a waiting slider go on."""
         self.scene.fail(error)
-        self.parameters.go_on()
+        self.parameters.take_waiting_position()
 
     def _report(self) -> None:
         self._reports.ask(ReportRequest(self.session.machine, self._sizes, self.session.exaggeration))

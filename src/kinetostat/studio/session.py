@@ -27,7 +27,7 @@ from kinetostat.studio.wording import typed_value, unit_shown
 from kinetostat.units import UnitError
 
 TYPED_TEXT = "text"
-"""Word in the place of a path while the text of the machine is being typed."""
+"""Entry of an open step, in the place of a path, while the text of the machine is being typed."""
 MOST_UNDONE_STEPS = 200
 """Steps that can be undone: more than anybody goes back, at some kilobytes each."""
 
@@ -54,6 +54,9 @@ class Memory:
 class Session:
     """A machine and its history.
 
+    Numbers change by `slide` (a slider), `move` (a handle, the map, a moving machine) and `write` (a field), the whole
+    machine by `take`. All changes of the same numbers are one step of the history, which is open until `settle`.
+
     Attributes:
         machine: the machine as it is now; its pose may be out of reach.
         origin: the machine as it was loaded.
@@ -74,7 +77,7 @@ class Session:
         self.exaggeration = memory.exaggeration
         self._past = [*memory.past]
         self._future: list[Machine] = []
-        self._dragged: tuple[str, ...] = ()
+        self._open_step: tuple[str, ...] = ()  # paths of the numbers that change until `settle`; nothing can be redone
 
     @property
     def controls(self) -> dict[str, Control]:
@@ -118,10 +121,11 @@ class Session:
         same_family = machine.family.name == self.machine.family.name
         alike = same_family and values(machine).keys() == values(self.machine).keys()
         if alike:
-            source = (TYPED_TEXT,) if typed else ()
-            if not typed or self._dragged != source:
+            step = (TYPED_TEXT,) if typed else ()
+            if not typed or self._open_step != step:
+                self._close_step()
                 self._note()
-            self.machine, self._dragged = machine, source
+            self.machine, self._open_step = machine, step
         else:
             self._start(Memory(machine))
         return alike
@@ -145,13 +149,13 @@ class Session:
         self._change(dict.fromkeys(control.parameter.leaves, control.value_at(position)))
 
     def settle(self) -> None:
-        """End a drag, and check the numbers that changed against all others.
+        """End the open step, and check the numbers that changed against all others.
 
         Raises:
-            InputError: the numbers contradict each other; the machine is again as it was before the drag.
+            InputError: the numbers contradict each other; the machine is again as it was before the step.
         """
-        dragged, self._dragged = self._dragged, ()
-        if any(path != TYPED_TEXT and related(self.machine, path) for path in dragged):
+        paths, self._open_step = self._open_step, ()
+        if any(path != TYPED_TEXT and related(self.machine, path) for path in paths):
             try:
                 self.machine = read_again(self.machine)
             except InputError:
@@ -182,20 +186,28 @@ class Session:
         self._change(where)
 
     def _change(self, numbers: Mapping[str, float]) -> None:
+        step = tuple(numbers)
+        if self._open_step != step:
+            self.settle()
         new = self.machine.with_drafted_values(numbers)
-        paths = tuple(numbers)
-        if self._dragged != paths:
+        if self._open_step != step:
             self._note()
-        self._dragged = paths
-        self._future.clear()
-        self.machine = new
+        self.machine, self._open_step = new, step
 
     def show_loaded(self, loaded: bool) -> None:
         """Show the machine at rest under its loads, or without them, as `state` in [load] says it."""
         if loaded is not self.machine.loaded:
-            self.settle()
+            self._close_step()
             self._note()
             self.machine = replace(self.machine, loaded=loaded)
+
+    def _close_step(self) -> bool:
+        """Settle before the machine is replaced; return False where the open step has been taken back instead."""
+        try:
+            self.settle()
+        except InputError:
+            return False
+        return True
 
     def _note(self) -> None:
         """Add the present machine to the history; a new branch begins, so nothing can be redone."""
@@ -212,21 +224,22 @@ class Session:
 
     def undo(self) -> None:
         """Go back by one step, if there is one."""
-        if self._past:
+        if self._close_step() and self._past:
             self._future.append(self.machine)
-            self.machine, self._dragged = self._past.pop(), ()
+            self.machine = self._past.pop()
 
     def redo(self) -> None:
         """Take back the last undo, if there is one."""
         if self._future:
             self._past.append(self.machine)
-            self.machine, self._dragged = self._future.pop(), ()
+            self.machine = self._future.pop()
 
     def reset(self) -> None:
         """Return to the machine as it was loaded; this can be undone."""
+        self._close_step()
         if self.machine is not self.origin:
             self._note()
-            self.machine, self._dragged = self.origin, ()
+            self.machine = self.origin
 
     def as_file(self) -> tuple[str, bytes]:
         """Return a file name and the machine as TOML."""

@@ -222,7 +222,7 @@ SPRING = (  # values of each spring of a loaded machine
     Field("leg"),
     Field("turning"),
     Field("actuated"),
-    Field("load", long_name="load that it carries, positive where it pulls, N or N m"),
+    Field("load", long_name="load that it carries, positive where it pulls, N or N·m"),
     Field("deformation", long_name="deformation from the free state, m or rad"),
     Field("slack"),
 )

@@ -193,9 +193,11 @@ def _draw_row(
         panel.add_patch(patches.Polygon(corners, facecolor=colour, alpha=0.25, edgecolor="none"))
         panel.add_patch(patches.Polygon(corners, facecolor="none", edgecolor=colour, linewidth=1.4))
         panel.add_patch(
-            patches.Circle((0.0, 0.0), part.least * scale.factor, facecolor="none", edgecolor="#444444", linestyle="--")
+            patches.Circle(
+                (0.0, 0.0), part.least * scale.factor, facecolor="none", edgecolor=figures.GUIDE_COLOUR, linestyle="--"
+            )
         )
-        panel.plot(0.0, 0.0, "+", color="#444444", markersize=5)
+        panel.plot(0.0, 0.0, "+", color=figures.GUIDE_COLOUR, markersize=5)
         limit = reach * scale.factor
         panel.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
         panel.locator_params(axis="x", nbins=4)  # five-digit forces run into each other in three panels side by side

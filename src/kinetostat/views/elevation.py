@@ -187,7 +187,7 @@ def elevation_csv(answer: Elevation) -> str:
     columns["status"] = [Status(code).word for code in answer.statuses.tolist()]
     columns |= {f"{name} [{unit}]": values for name, (unit, values) in _columns(answer, full=True).items()}
     for name, turning, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True):
-        columns[f"{name} load [{'N m' if turning else 'N'}]"] = values
+        columns[f"{name} load [{load_unit(turning)}]"] = values
     commands = answer.corrections.command
     for name, unit, values in zip(commands.actuators, commands.units, commands.corrections.T, strict=True):
         columns[f"{name} correction [{unit}]"] = values
@@ -273,7 +273,7 @@ def _draw_panel(panel: "Axes", answer: Elevation, content: PanelContent, angle_f
     panel.set_ylabel(scale.label(content.meaning))
     panel.margins(x=0.0)
     if content.unit in ("N", "N·m"):
-        panel.axhline(0.0, color="#444444", linewidth=0.8)
+        panel.axhline(0.0, color=figures.GUIDE_COLOUR, linewidth=0.8)
         for reversal in answer.reversals:
             panel.axvline(reversal.elevation * angle_factor, color=figures.COLOURS[1], linewidth=0.8, linestyle=":")
     if "" in curves:
@@ -296,7 +296,7 @@ ELEVATION = Description(
         Field("rotation", unit="rad", long_name="rotation of the platform by the loads", axes=("elevation",)),
         Field("frequency", unit="Hz", long_name="first natural frequency", axes=("elevation",)),
         Field("actuators"),
-        Field("load", "loads", "N, N m", "load of each actuator, positive where it is pulled",
+        Field("load", "loads", "N, N·m", "load of each actuator, positive where it is pulled",
               axes=("elevation", "actuator")),
         Field("limit_use", unit="1", long_name="greatest share of a limit of the loads", axes=("elevation",)),
         Field("error", unit="m", long_name="error of the tool point that 95 % of all machines keep within",

@@ -28,6 +28,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.studies.storage import replacing
 from kinetostat.views.layout import fix_layout, steady_ticks
 
+GUIDE_COLOUR = "#444444"
+"""Dark grey of lines and signs that are no result: axes, zero, what was before."""
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "text.hinting": "no_hinting",
@@ -36,7 +38,7 @@ STYLE: Any = {
     "axes.titley": 1.0,  # no panel has ticks above it; else each one is measured twice more, whenever a title is placed
     "axes.labelsize": 8.0,
     "axes.linewidth": 0.6,
-    "axes.edgecolor": "#444444",
+    "axes.edgecolor": GUIDE_COLOUR,
     "axes.grid": True,
     "grid.color": "#dddddd",
     "grid.linewidth": 0.5,

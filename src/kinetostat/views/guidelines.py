@@ -257,7 +257,7 @@ def rigid_figure(
         styles = zip(guidelines.components, figures.COLOURS, figures.DASHES, strict=False)
         curves = [lines.Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         near = f"within {100.0 * EXCESS:g} %"
-        dot = lines.Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label=near)
+        dot = lines.Line2D([], [], color=figures.GUIDE_COLOUR, marker="o", markersize=4, linestyle="", label=near)
         figure.legend(handles=[*curves, dot], loc="outside right center", title="direction")
     return figure
 

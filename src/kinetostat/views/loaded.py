@@ -355,7 +355,7 @@ def bars_figure(state: LoadedState) -> "Figure":
                     ha="right" if load < 0.0 else "left", va="center",
                 )  # fmt: skip
             panel.set_yticks(places, [name for name, _ in group])
-            panel.axvline(0.0, color="#444444", linewidth=0.8)
+            panel.axvline(0.0, color=figures.GUIDE_COLOUR, linewidth=0.8)
             panel.set_xlabel(scale.label("load, positive where it pulls"))
             panel.margins(x=0.15)
             panel.set_axisbelow(True)

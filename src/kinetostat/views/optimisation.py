@@ -18,7 +18,7 @@ from kinetostat.display import DASH, ENGINEERING, Display, number
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.late import LateModule
 from kinetostat.machine.saving import as_file
-from kinetostat.studies.optimisation.assessment import DesignVerdict, Outcome, Robustness
+from kinetostat.studies.optimisation.assessment import COMMON_SHARE, DesignVerdict, Outcome, Robustness
 from kinetostat.studies.optimisation.log import ROWS
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
@@ -145,7 +145,8 @@ def scatter_table(robustness: Robustness, display: Display = ENGINEERING) -> Tab
     """Return the scatter of the objectives under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
-    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "reached by 95 %", "worst", "unit"])
+    usual = f"reached by {100.0 * COMMON_SHARE:g} %"
+    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", usual, "worst", "unit"])
     for scatter in robustness.scatters:
         scale = display.scale(scatter.unit)
         nominal, mean, usual, worst = (

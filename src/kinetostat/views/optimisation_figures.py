@@ -7,29 +7,43 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from kinetostat.arrays import Array
 from kinetostat.display import Display, Scale
 from kinetostat.kinetostatics.quantities import plain_name
-from kinetostat.studies.optimisation.assessment import Scatter
+from kinetostat.studies.optimisation.assessment import COMMON_SHARE, Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.views.figures import COLOURS, new_figure
+from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, new_figure
 from kinetostat.views.question import Drawing
 
 BINS = 40
-"""Bars of a histogram: about ten designs each for the usual number of designs."""
+"""Bars of a histogram of scatter: about 25 machines each for the usual 1000."""
 CAPTIONS = {
     "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
     "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",
     "front": "Designs over the objectives; on the front no design is better than another in all objectives.",
     "tolerances": "Scatter of the objectives over machines made to the tolerances from the best design.",
 }
-CEILING = 99.0
-"""Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
+SHOWN_PERCENTILE = 99.0
+"""Percentile of all designs up to which the surroundings of a front are drawn: far designs would squeeze it."""
+FRONT_MARGIN = 0.05
+"""Room between a front and the edge of its panel, as a share of its span: points at the edge are not cut in half."""
 WIDEST_LINEAR_RATIO = 30.0
 """Ratio of the greatest gain to the least beyond which their axis is logarithmic: the least could not be seen."""
 LEAST_SHOWN, GREATEST_SHOWN = -0.05, 1.05
 """Ends of the scale of a variable, in units of the distance of its bounds: an initial design beyond is not drawn."""
+PLACE_OF_VALUES, END_OF_VALUES = 1.04, 1.45
+"""Place at which the value of a variable begins to the right of its scale, and right edge of the panel, in the same
+units: room for a number with its unit."""
+ROOM_BEYOND_BARS = 0.18
+"""Room to both sides of bars for the numbers at their ends, as a share of the range of the bars."""
+ROOM_ABOVE_HISTOGRAM = 1.4
+"""Height of a panel over that of its tallest bar: the legend with three values stands above the bars."""
+PALE_GREY = "#cccccc"
+"""Colour of what stands behind the result: designs beside a front, and the scale of a variable."""
+MIDDLE_GREY = "#777777"
+"""Colour of what explains a scale: the numbers at its ends, and the way from before to after."""
 
 
 def pictures(result: Result) -> dict[str, Drawing]:
@@ -60,9 +74,9 @@ def convergence(log: Log, title: str) -> Figure:
         left.plot(steps, best * scale.factor, color=COLOURS[0], label="best")
         left.set(xlabel=across, ylabel=_axis(objective, scale))
         left.legend()
-        end = best[np.isfinite(best)][-1:] if np.isfinite(best).any() else np.array([np.nan])
+        last_best = next((value for value in best[::-1] if np.isfinite(value)), np.nan)
         for values, colour, label, dash in ((mean, COLOURS[1], "mean", "--"), (best, COLOURS[0], "best", "-")):
-            distance = np.abs(values - end) / np.abs(end)
+            distance = np.abs(values - last_best) / np.abs(last_best)
             right.plot(steps, np.where(distance > 0.0, distance, np.nan), dash, color=colour, label=label)
         right.set(xlabel=across, ylabel="relative distance to the last best", yscale="log")
         for panel in (left, right):
@@ -74,19 +88,20 @@ def comparison(result: Result, title: str) -> Figure:
     """Draw how many times stiffer each direction is, and each variable between its bounds before and after."""
     with new_figure((7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), title) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
-        _gains(left, result)
-        _places(right, result)
+        _draw_gains(left, result)
+        _draw_variables(right, result)
     return figure
 
 
-def _gains(panel: Axes, result: Result) -> None:
+def _draw_gains(panel: Axes, result: Result) -> None:
+    """Draw for each direction how many times stiffer it is, as a bar from 1 (as stiff as before)."""
     compared = [
         direction for direction in result.compliance_changes if np.isfinite(direction.gain) and direction.gain > 0.0
     ]
     places, gains = np.arange(len(compared)), np.array([direction.gain for direction in compared])
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
     panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
-    panel.axvline(1.0, color="#444444", linewidth=0.8)
+    panel.axvline(1.0, color=GUIDE_COLOUR, linewidth=0.8)
     is_wide = gains.size and gains.max() / gains.min() > WIDEST_LINEAR_RATIO
     panel.set(xscale="log" if is_wide else "linear", xlabel="times as stiff as before")
     panel.set_yticks(places, [direction.name.removeprefix("compliance_") for direction in compared])
@@ -98,32 +113,34 @@ def _gains(panel: Axes, result: Result) -> None:
             f"{gain:.3g}", (gain if is_long else max(gain, 1.0), place), (3, 0), textcoords="offset points",
             va="center", fontsize=7, color="white" if is_long else "black",
         )  # fmt: skip
-    panel.margins(x=0.18)
+    panel.margins(x=ROOM_BEYOND_BARS)
 
 
-def _places(panel: Axes, result: Result) -> None:
+def _draw_variables(panel: Axes, result: Result) -> None:
     """Draw each variable on a scale from its lower to its upper bound."""
     space, display = result.problem.space, result.problem.machine.display
     last_choices = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
     before, after = space.initial / last_choices, result.genes / last_choices
     for place, variable in enumerate(space.searched_variables):
-        panel.plot([0.0, 1.0], [place, place], color="#cccccc", linewidth=1.2, zorder=1)
+        panel.plot([0.0, 1.0], [place, place], color=PALE_GREY, linewidth=1.2, zorder=1)
         if LEAST_SHOWN <= before[place] <= GREATEST_SHOWN:
-            panel.plot(before[place], place, "o", color="white", markeredgecolor="#444444", zorder=2)
+            panel.plot(before[place], place, "o", color="white", markeredgecolor=GUIDE_COLOUR, zorder=2)
             panel.annotate(
                 "", (after[place], place), (before[place], place),
-                arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8}, zorder=1,
+                arrowprops={"arrowstyle": "-", "color": MIDDLE_GREY, "linewidth": 0.8}, zorder=1,
             )  # fmt: skip
         panel.plot(after[place], place, "o", color=COLOURS[0], zorder=3)
         value = variable.in_words(float(space.values(result.genes)[place]), display)
-        panel.annotate(value, (1.04, place), va="center", fontsize=7)
+        panel.annotate(value, (PLACE_OF_VALUES, place), va="center", fontsize=7)
         ends = [variable.in_words(0.0 if variable.choices is not None else variable.low, display)]
         ends.append(variable.in_words(variable.high, display))
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
-            panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
+            panel.annotate(
+                text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color=MIDDLE_GREY
+            )
     panel.set_yticks(range(space.size), [variable.name for variable in space.searched_variables])
-    panel.set(xlim=(LEAST_SHOWN, 1.45), xticks=[], xlabel="between its bounds")  # values stand to the right
-    was = Line2D([], [], color="white", marker="o", markeredgecolor="#444444", linestyle="", label="before")
+    panel.set(xlim=(LEAST_SHOWN, END_OF_VALUES), xticks=[], xlabel="between its bounds")
+    was = Line2D([], [], color="white", marker="o", markeredgecolor=GUIDE_COLOUR, linestyle="", label="before")
     best = Line2D([], [], color=COLOURS[0], marker="o", linestyle="", label="best")
     panel.legend(handles=[was, best], loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     panel.set_ylim(space.size - 0.4, -0.7)
@@ -144,7 +161,7 @@ def front(result: Result, title: str) -> Figure:
         for panel, (i, j) in zip(panels, pairs, strict=False):
             x, y = (problem.machine.display.scale(problem.objectives[k].term.unit) for k in (i, j))
             panel.scatter(
-                feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0,
+                feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color=PALE_GREY, linewidths=0,
                 rasterized=True, label="evaluated designs",
             )  # fmt: skip
             panel.plot(best[:, i] * x.factor, best[:, j] * y.factor, "o", markersize=3, color=COLOURS[0], label="front")
@@ -152,10 +169,10 @@ def front(result: Result, title: str) -> Figure:
             panel.plot(*knee, "D", markersize=7, markerfacecolor="none", markeredgecolor=COLOURS[1], label="knee")
             if np.isfinite(result.initial.objectives).all():
                 before = result.initial.objectives[0, [i, j]] * (x.factor, y.factor)
-                panel.plot(*before, "s", color="#444444", markersize=4, label="initial")
+                panel.plot(*before, "s", color=GUIDE_COLOUR, markersize=4, label="initial")
             panel.set(xlabel=_axis(problem.objectives[i], x), ylabel=_axis(problem.objectives[j], y))
-            panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
-            panel.set_ylim(*_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
+            panel.set_xlim(*front_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
+            panel.set_ylim(*front_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
         figure.axes[0].legend(loc="best")
     return figure
 
@@ -173,12 +190,13 @@ def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
     samples = scatter.samples[np.isfinite(scatter.samples)]
     scale = display.scale(scatter.unit)
     panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
-    marks = (("nominal", scatter.nominal, "-"), ("reached by 95 %", scatter.usual, "--"), ("worst", scatter.worst, ":"))
+    usual = f"reached by {100.0 * COMMON_SHARE:g} %"
+    marks = (("nominal", scatter.nominal, "-"), (usual, scatter.usual, "--"), ("worst", scatter.worst, ":"))
     for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
         panel.axvline(value * scale.factor, color=colour, linestyle=dash, label=f"{label}: {value * scale.factor:.6g}")
     panel.set(xlabel=scale.label(scatter.label), ylabel="machines")
     panel.margins(x=0.03)
-    panel.set_ylim(top=panel.get_ylim()[1] * 1.4)
+    panel.set_ylim(top=panel.get_ylim()[1] * ROOM_ABOVE_HISTOGRAM)
     panel.legend(loc="upper left", fontsize=6.5, frameon=True, framealpha=1.0, edgecolor="none")
 
 
@@ -186,9 +204,15 @@ def _axis(objective: Objective, scale: Scale) -> str:
     return scale.label(plain_name(objective.term.label))
 
 
-def _limits(front_values: np.ndarray, every: np.ndarray) -> tuple[float, float]:
-    """Return limits from a little before the front to where most designs are, at most three times its span."""
+def front_limits(front_values: Array, every_value: Array) -> tuple[float, float]:
+    """Return the ends of the axis of an objective: the whole front, and most designs within its span to both sides.
+
+    Args:
+        front_values: values of the objective on the front.
+        every_value: its values in all designs.
+    """
     low, high = float(front_values.min()), float(front_values.max())
     span = (high - low) or abs(high) or 1.0
-    near, far = np.percentile(every, [100.0 - CEILING, CEILING])
-    return max(float(near), low - span) - 0.05 * span, min(float(far), high + span) + 0.05 * span
+    near, far = map(float, np.percentile(every_value, [100.0 - SHOWN_PERCENTILE, SHOWN_PERCENTILE]))
+    margin = FRONT_MARGIN * span
+    return max(min(near, low), low - span) - margin, min(max(far, high), high + span) + margin

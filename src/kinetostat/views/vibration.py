@@ -207,7 +207,7 @@ MODE = (
     ),
     Field("direction", long_name="component in which the tool moves most"),
     Field("modal_mass", long_name="mass that would vibrate there alone, kg or kg m2"),
-    Field("modal_stiffness", long_name="stiffness on which it would, N/m or N m/rad"),
+    Field("modal_stiffness", long_name="stiffness on which it would, N/m or N·m/rad"),
     Field("effective_mass", long_name="share of all mass that answers a shaking base", axes=("shaken",)),
     Field("strain_energy", "strain", long_name="share of strain energy", axes=("spring",), forms=("json", "nc")),
     Field("strain_energy_by_kind", "kinds", forms=("json",)),

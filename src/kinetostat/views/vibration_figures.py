@@ -16,7 +16,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Configuration, Machine, setting_of
 from kinetostat.studies.vibration import DRAWN_MODES, Vibration, frequency_range
 from kinetostat.views.drawing import Points
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, new_figure
+from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, STYLE, new_figure
 from kinetostat.views.loaded import moved_legend, moved_machine
 from kinetostat.views.question import Drawing
 from kinetostat.views.rendering.camera import VIEWPOINTS, axes_towards
@@ -226,6 +226,6 @@ def _draw_axes(panel: Axes, view: ShapeView, length: float, names: str) -> None:
     corner = tuple(view.low - np.array([0.5, 0.4]) * ROOM * view.diagonal)
     for name in names:
         axis = Vector(*AXES[name]) * length
-        panel.plot(*view.project([ZERO, axis], corner), color="#444444", linewidth=0.8)
+        panel.plot(*view.project([ZERO, axis], corner), color=GUIDE_COLOUR, linewidth=0.8)
         (end,) = zip(*view.project([axis * 1.3], corner), strict=True)
         panel.annotate(name, end, ha="center", va="center", size=7)

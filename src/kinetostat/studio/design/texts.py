@@ -14,6 +14,7 @@ from kinetostat.display import DASH, Display, Scale, number
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
+from kinetostat.studies.optimisation.assessment import COMMON_SHARE
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import OBJECTIVE_DIGITS, Progress
 from kinetostat.studio.question_process import figure_html
@@ -105,7 +106,7 @@ def _robustness(progress: Progress, result: dict[str, Any]) -> str:
         spread = scatter["objectives"][aim.term.label]
         rows.append([progress.label(aim), *_exact(progress.scale(aim), *(spread[key] for key in keys))])
     title = f"With tolerances: {scatter['machines']:,} machines"
-    return titled_table(title, ["", "nominal", "mean", "reached by 95 %", "worst"], rows)
+    return titled_table(title, ["", "nominal", "mean", f"reached by {100.0 * COMMON_SHARE:g} %", "worst"], rows)
 
 
 def _remarks(result: dict[str, Any]) -> list[str]:

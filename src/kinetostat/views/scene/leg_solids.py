@@ -130,11 +130,8 @@ def _fork(joint: JointPart, name: str, axis: Vector, stem: Vector, radius: float
     """Return a fork around the pin along `axis`, with its bridge towards `stem`."""
     arm, width = 0.55 * radius, 1.5 * radius
     outline = shapes.fork(2.1 * radius, arm, 2.3 * radius, 0.6 * radius)
-    across = unit(axis.cross(stem))
-    place = upright(joint.point - across * (0.5 * width), across, axis)
-    up = place.rotation.y
-    if up.dot(stem) > 0.0:
-        place = upright(joint.point + across * (0.5 * width), -across, axis)
+    across = unit(stem.cross(axis))
+    place = upright(joint.point - across * (0.5 * width), across, axis)  # y is away from the stem, the bridge at -y
     return Solid(f"{joint.name}/{name}", Extruded(outline, width, 0.12 * radius), "joint", place)
 
 
