@@ -52,9 +52,10 @@ TITLES = {
 """Heads of the rows of the table and of the panels of the figure, by set."""
 NO_END = "no limit"
 """Words for a load that no drive feels."""
+MOST_NAMED_DRIVES = 3
+"""Drives that a sentence names one by one: more names would hide what it says of them."""
 OPEN_SET_REACH = 3.0
-"""Half the width of a panel in units of the greatest or least amount, where a set has no end: one sees that it goes
-on."""
+"""Half the width of a panel in units of the least amount, where a set has no end: one sees that it goes on."""
 PANEL_WIDTH_RATIO = 1.12
 """Width of a panel over that of what it shows: a line at its edge would be taken for the frame."""
 MOVING, TURNING = ("force", "speed", "acceleration"), ("moment", "rate", "angular acceleration")
@@ -85,13 +86,13 @@ def _weakest(answer: Capability) -> str:
 
 def _names(names: tuple[str, ...]) -> str:
     """List names of drives in a phrase; of many, the first one and the number of the others."""
-    if len(names) > 3:
+    if len(names) > MOST_NAMED_DRIVES:
         return f"{names[0]} and {len(names) - 1} others"
-    return " and ".join(([", ".join(names[:-1])] if len(names) > 1 else []) + [names[-1]])
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _along(answer: Capability) -> str:
-    """Return the greatest amounts both ways of the direction that was asked for."""
+    """Return the greatest amounts both ways of the direction that was asked for; one where both are the same."""
     phrases = []
     for part in (part for part in answer.sets if part.least >= 0.0):
         amounts = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
@@ -141,13 +142,13 @@ def _sets_with_planes(answer: Capability, names: Sequence[str]) -> list[tuple[Ca
     for part in answer.sets:
         if part.name not in names:
             continue
-        planes = [pair for pair in combinations(range(3), 2) if _lies_in(part, pair)]
+        planes = [pair for pair in combinations(range(3), 2) if _spans(part, pair)]
         if part.least > 0.0 and np.isfinite(part.least) and planes:
             rows.append((part, planes))
     return rows
 
 
-def _lies_in(part: CapabilitySet, plane: tuple[int, int]) -> bool:
+def _spans(part: CapabilitySet, plane: tuple[int, int]) -> bool:
     """Return whether both axes of a plane are among the directions that a set has."""
     projection = part.directions @ part.directions.T
     return all(abs(projection[axis, axis] - 1.0) < DEPENDENT for axis in plane)
@@ -189,15 +190,16 @@ def _draw_row(
         normals = part.normals[:, list(plane)]
         # Faces that are parallel to the plane bound nothing in it.
         crossing = np.linalg.norm(normals, axis=1) > DEPENDENT * np.linalg.norm(part.normals, axis=1)
-        corners = outline(normals[crossing], part.bounds[crossing], 2.0 * reach) * scale.factor
+        corners = (
+            outline(normals[crossing], part.bounds[crossing], 2.0 * reach) * scale.factor
+        )  # an open side ends outside
         panel.add_patch(patches.Polygon(corners, facecolor=colour, alpha=0.25, edgecolor="none"))
         panel.add_patch(patches.Polygon(corners, facecolor="none", edgecolor=colour, linewidth=1.4))
+        guide = figures.GUIDE_COLOUR
         panel.add_patch(
-            patches.Circle(
-                (0.0, 0.0), part.least * scale.factor, facecolor="none", edgecolor=figures.GUIDE_COLOUR, linestyle="--"
-            )
+            patches.Circle((0.0, 0.0), part.least * scale.factor, facecolor="none", edgecolor=guide, linestyle="--")
         )
-        panel.plot(0.0, 0.0, "+", color=figures.GUIDE_COLOUR, markersize=5)
+        panel.plot(0.0, 0.0, "+", color=guide, markersize=5)
         limit = reach * scale.factor
         panel.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
         panel.locator_params(axis="x", nbins=4)  # five-digit forces run into each other in three panels side by side
@@ -214,23 +216,30 @@ def _finite(value: float) -> float | None:
 SETS = (
     Field("set", "name", long_name="force, moment, speed, rate or acceleration", column="quantity"),
     Field("unit"),
-    Field("least", lambda part: _finite(part.least), long_name="in whichever direction, SI"),
+    Field("least", lambda part: _finite(part.least), long_name="amount that is allowed in whichever direction, SI"),
     Field(
         "greatest",
         lambda part: _finite(part.greatest),
-        long_name="in the best direction, SI; none if endless or not held",
+        long_name="amount that is allowed in the best direction, SI; none if endless or not held",
     ),
     Field("weakest", lambda part: part.weakest, long_name="direction of the least, base axes", forms=("json",)),
-    Field("limited_by", lambda part: list(part.limited_by), long_name="drives at their limits there", forms=("json",)),
-    Field("vertices", lambda part: part.vertices.tolist(), long_name="of the polytope, SI, base axes", forms=("json",)),
+    Field(
+        "limited_by",
+        lambda part: list(part.limited_by),
+        long_name="drives at their limits in the direction of the least",
+        forms=("json",),
+    ),
+    Field(
+        "vertices", lambda part: part.vertices.tolist(), long_name="corners of the set, SI, base axes", forms=("json",)
+    ),
 )
 """Values of each set of loads or speeds."""
 DRIVES = (
     Field("drive", "name"),
-    Field("carried", long_name="load by what counts already, N or N·m"),
-    Field("lower", lambda drive: _finite(drive.lower), long_name="least load, N or N·m"),
-    Field("upper", lambda drive: _finite(drive.upper), long_name="greatest load, N or N·m"),
-    Field("speed", lambda drive: _finite(drive.speed), long_name="greatest speed, m/s or rad/s"),
+    Field("carried", long_name="load of the drive by what counts already, N or N·m"),
+    Field("lower", lambda drive: _finite(drive.lower), long_name="least load that the drive can carry, N or N·m"),
+    Field("upper", lambda drive: _finite(drive.upper), long_name="greatest load that the drive can carry, N or N·m"),
+    Field("speed", lambda drive: _finite(drive.speed), long_name="greatest speed of the drive, m/s or rad/s"),
 )
 """Values of each drive."""
 
