@@ -16,7 +16,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.studies.study_folder import COPY, HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
-from kinetostat.studio.design.progress import Follower, Progress, failure
+from kinetostat.studio.design.progress import Follower, SearchState, failure
 from kinetostat.studio.design.run_panel import convergence
 from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.design.state_folder import Favourites
@@ -65,7 +65,7 @@ def test_plots_and_tables_of_a_search_have_the_units_of_the_machine(tmp_path):
     )
     study = written(text)
     run = Run(1, tmp_path, "small", Stage.DONE)
-    progress = Progress(run, study, 2, 2, 16, [None, 2e-8], [3e-8, 2.5e-8], [[2e-8]])
+    progress = SearchState(run, study, 2, 2, 16, [None, 2e-8], [3e-8, 2.5e-8], [[2e-8]])
     curve = convergence(progress)
     assert curve["label"]["y"] == "compliance z (µm/N)"
     assert curve["lines"][0]["values"] == [None, pytest.approx(0.02)]

@@ -141,7 +141,7 @@ def test_joints_pass_on_what_they_can(case, data, load):
         held = {s.joint.name or s.name: s for s in leg.springs if s.actuated or s.hinge}
         assert set(own) == {joint.name for joint in leg.passive} | set(held)
         for name, spring in held.items():
-            about = own[name].wrench.moved(response.reference - own[name].point)
+            about = own[name].wrench.at_offset(response.reference - own[name].point)
             carries = about.work(spring.joint.twist(response.reference))
             assert carries == pytest.approx(carried[spring.name], abs=BALANCED * largest * max(length, 1.0))
         for joint in leg.passive:

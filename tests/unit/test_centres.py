@@ -84,9 +84,9 @@ def test_referring_agrees_with_twists_and_wrenches(stiffness, offset):
     twist = Twist(Vector(1.0, -2.0, 0.5), Vector(0.3, 0.1, -0.7))
     load = Wrench(*(Vector(*part.tolist()) for part in np.split(stiffness @ twist.components(), 2)))
     arm = Vector(*offset.tolist())
-    there = np.array(load.moved(arm).components())
+    there = np.array(load.at_offset(arm).components())
     found = stiffness_at(stiffness, offset)
-    assert np.allclose(found @ twist.moved(arm).components(), there, rtol=0, atol=1e-12 * np.abs(found).max())
+    assert np.allclose(found @ twist.at_offset(arm).components(), there, rtol=0, atol=1e-12 * np.abs(found).max())
     assert np.allclose(stiffness_at(found, -offset), stiffness, rtol=0, atol=1e-12 * np.abs(found).max())
     assert np.allclose(compliance_at(np.linalg.inv(stiffness), offset) @ found, np.eye(6), atol=1e-6)
 

@@ -21,7 +21,7 @@ def test_the_legs_follow_the_platform(case):
     platform = deflection(response.statics, wrench)
     for leg in (leg for leg in response.configuration.legs if len(leg.stations) > 1):
         last = [link for link in links if link.leg == leg.name][-1]
-        expected = platform.moved(last.end - response.reference).translational.components()
+        expected = platform.at_offset(last.end - response.reference).translational.components()
         size = max(abs(c) for c in (*platform.rotational.components(), *platform.translational.components()))
         assert last.end_motion.translational.components() == pytest.approx(expected, rel=1e-6, abs=1e-9 * size)
 
@@ -48,7 +48,7 @@ def test_a_beam_bends_as_a_cantilever_does():
 
 def test_a_rigid_link_stays_straight_and_displacements_grow_with_the_factor():
     turn = Twist(Vector(0.0, 0.0, 0.01), ZERO)
-    link = DeflectedLink("leg", ZERO, Vector(2.0, 0.0, 0.0), turn, turn.moved(Vector(2.0, 0.0, 0.0)))
+    link = DeflectedLink("leg", ZERO, Vector(2.0, 0.0, 0.0), turn, turn.at_offset(Vector(2.0, 0.0, 0.0)))
     assert link.point(0.5, 1.0).y == pytest.approx(0.01)
     assert link.point(0.5, 100.0).y == pytest.approx(1.0)
 

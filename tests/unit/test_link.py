@@ -199,12 +199,12 @@ def test_a_parallelogram_yields_as_two_bars_do(pair):
 
 @given(parallelograms(), st.floats(-0.2, 0.2))
 def test_a_parallelogram_that_moves_keeps_its_bars_and_turns_nothing(pair, amount):
-    moved, shift = pair.moved(amount)
+    moved, shift = pair.motion_by(amount)
     assert matrix(shift.rotation) == pytest.approx(np.eye(3), abs=FEW)
     for (near, far), (_, before) in zip(moved.bars, pair.bars, strict=True):
         assert (far - near).norm() == pytest.approx((pair.far - pair.near).norm(), rel=FEW)
         assert vector(far) == pytest.approx(vector(shift.apply(before)), abs=FEW)
-    slope = (pair.moved(1e-6)[1].translation - pair.moved(-1e-6)[1].translation) * 5e5
+    slope = (pair.motion_by(1e-6)[1].translation - pair.motion_by(-1e-6)[1].translation) * 5e5
     assert vector(slope) == pytest.approx(vector(pair.freedoms[0].axis), abs=1e-8)
 
 

@@ -41,7 +41,7 @@ def test_components_are_named_rotation_first():
 def test_power_does_not_depend_on_point_or_axes(wrench, twist, offset, turn):
     power = wrench.work(twist)
     assert power == pytest.approx(screw(wrench) @ screw(twist), abs=FEW)
-    assert wrench.moved(offset).work(twist.moved(offset)) == pytest.approx(power, abs=FEW)
+    assert wrench.at_offset(offset).work(twist.at_offset(offset)) == pytest.approx(power, abs=FEW)
     assert wrench.rotated(turn).work(twist.rotated(turn)) == pytest.approx(power, abs=FEW)
 
 
@@ -49,17 +49,17 @@ def test_power_does_not_depend_on_point_or_axes(wrench, twist, offset, turn):
 @given(parts=st.tuples(vectors(), vectors()), first=vectors(FAR), second=vectors(FAR), turn=rotations())
 def test_transport_is_a_group_action(kind, parts, first, second, turn):
     one = kind(*parts)
-    assert near(one.moved(first).moved(second), one.moved(first + second))
-    assert near(one.moved(first).moved(-first), one)
-    assert near(one.moved(ZERO), one)
-    assert near(one.moved(first).rotated(turn), one.rotated(turn).moved(turn.apply(first)))
+    assert near(one.at_offset(first).at_offset(second), one.at_offset(first + second))
+    assert near(one.at_offset(first).at_offset(-first), one)
+    assert near(one.at_offset(ZERO), one)
+    assert near(one.at_offset(first).rotated(turn), one.rotated(turn).at_offset(turn.apply(first)))
 
 
 @given(twists, wrenches, vectors(FAR), rotations())
 def test_transport_is_the_adjoint_matrix(twist, wrench, offset, turn):
     q, d = matrix(turn), vector(offset)
-    assert np.allclose(screw(twist.rotated(turn).moved(offset)), twist_transport(q, d) @ screw(twist), atol=FEW)
-    assert np.allclose(screw(wrench.rotated(turn).moved(offset)), wrench_transport(q, d) @ screw(wrench), atol=FEW)
+    assert np.allclose(screw(twist.rotated(turn).at_offset(offset)), twist_transport(q, d) @ screw(twist), atol=FEW)
+    assert np.allclose(screw(wrench.rotated(turn).at_offset(offset)), wrench_transport(q, d) @ screw(wrench), atol=FEW)
     assert np.allclose(wrench_transport(q, d).T @ twist_transport(q, d), np.eye(6), atol=FEW)
 
 
@@ -74,15 +74,15 @@ def test_screws_are_a_vector_space(a, b, factor):
 @given(unit_vectors(), vectors(), vectors(FAR))
 def test_a_point_on_its_axis_does_not_move(axis, arm, along):
     assert near(rotation_about(axis, axis * along.x), Twist(axis, ZERO))
-    assert near(rotation_about(axis, arm).moved(along), rotation_about(axis, arm + along))
-    assert near(translation_along(axis).moved(arm), translation_along(axis))
+    assert near(rotation_about(axis, arm).at_offset(along), rotation_about(axis, arm + along))
+    assert near(translation_along(axis).at_offset(arm), translation_along(axis))
 
 
 @given(unit_vectors(), vectors(), vectors(FAR))
 def test_a_force_has_its_line(axis, arm, along):
     assert near(force_along(axis, arm + axis * along.x), force_along(axis, arm))
-    assert near(force_along(axis, arm).moved(along), force_along(axis, arm - along))
-    assert near(pure_moment(axis).moved(arm), pure_moment(axis))
+    assert near(force_along(axis, arm).at_offset(along), force_along(axis, arm - along))
+    assert near(pure_moment(axis).at_offset(arm), pure_moment(axis))
 
 
 @given(unit_vectors(), unit_vectors(), vectors(), st.floats(-2, 2))

@@ -19,7 +19,7 @@ from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
-from kinetostat.kinematics.closing import pose_of
+from kinetostat.kinematics.closing import pose_coordinates
 from kinetostat.kinetostatics.response import compliance_at
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
@@ -136,7 +136,7 @@ def model_at_home(machine: Machine) -> ErrorModel:
     pose = {}
     if machine.family.chains is not None:
         chains = machine.chains()
-        home = pose_of(chains.home)
+        home = pose_coordinates(chains.home)
         pose = {f"{POSE}{name}": np.array([float(home[name])]) for name in chains.pose}
     return error_model(machine, pose, 1, np.zeros(6))
 
@@ -212,7 +212,7 @@ def _with_compliances(leg: Leg, factors: dict[str, float]) -> Leg:
     chain: list[Element] = []
     for element in leg.chain:
         if isinstance(element, Spring):
-            names = [name.removeprefix(f"{leg.name} ").replace(".", " ") for name in (element.of, element.name)]
+            names = [name.removeprefix(f"{leg.name} ").replace(".", " ") for name in (element.part_name, element.name)]
             paths = [f"legs.{leg.name}.{name}.compliance" for name in names]
             factor = next((factors[path] for path in paths if path in factors), 1.0)
             element = replace(element, stiffness=element.stiffness / factor)

@@ -405,12 +405,13 @@ def flexible_springs(response: Response, count: int) -> Iterator[tuple[FlexibleS
         count: number of poses.
     """
     of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
-    parts = Counter(spring.of for _, spring in of_legs)
+    parts = Counter(spring.part_name for _, spring in of_legs)
     numbers = zip(of_legs, response.statics.flexibility, response.statics.compliance, strict=True)
     for (leg, spring), twist, compliance in numbers:
         size = stacked_columns([compliance], count)[:, 0]
         if np.isfinite(size).all() and (size > 0.0).any():
-            part = (spring.of if parts[spring.of] == 1 else spring.name).removeprefix(f"{leg} ").replace(".", " ")
+            name = spring.part_name if parts[spring.part_name] == 1 else spring.name
+            part = name.removeprefix(f"{leg} ").replace(".", " ")
             words = f"compliance of the {part} of {leg}, relative"
             path = f"legs.{leg}.{part}.compliance"
             error = MachineError(path=path, kind="share", group="compliances", words=words, leg=leg)

@@ -231,7 +231,7 @@ def _row(leg: Leg, readings: Iterator[ActuatorReading]) -> LegRow:
             reading = next(readings) if element.actuated else None
             if reading is not None:
                 reading = None if is_zero(element.stiffness) else replace(reading, coordinate=row.size)
-            row.add(_kind(element.joint), names.of(element.joint.name or element.of), [element.joint], reading)
+            row.add(_kind(element.joint), names.of(element.joint.name or element.part_name), [element.joint], reading)
         place += 1
     return row
 

@@ -45,7 +45,7 @@ class Screw:
 class Twist(Screw):
     """Angular velocity (rad/s) and velocity of the reference point (m/s), or a small displacement (rad; m)."""
 
-    def moved(self, offset: Vector) -> "Twist":
+    def at_offset(self, offset: Vector) -> "Twist":
         """The same motion referred to the point at `offset` (m) from the present one: v' = v + omega x offset."""
         return Twist(self.rotational, self.translational + self.rotational.cross(offset))
 
@@ -59,7 +59,7 @@ class Twist(Screw):
 class Wrench(Screw):
     """Moment about the reference point (N·m) and force (N)."""
 
-    def moved(self, offset: Vector) -> "Wrench":
+    def at_offset(self, offset: Vector) -> "Wrench":
         """The same load referred to the point at `offset` (m) from the present one: m' = m + force x offset."""
         return Wrench(self.rotational + self.translational.cross(offset), self.translational)
 

@@ -145,8 +145,9 @@ def shares_of(kind: Specimen, form: Form, closed: bool) -> TracedShares:
     for spring, share in zip(springs(response.configuration), compliance_shares(response.statics), strict=True):
         diagonal = [share.entry(i, i) for i in range(6)]
         if not all(is_zero(entry) for entry in diagonal):
-            before = parts.get(str(spring.of))
-            parts[str(spring.of)] = [a + b for a, b in zip(before, diagonal, strict=True)] if before else diagonal
+            name = str(spring.part_name)
+            before = parts.get(name)
+            parts[name] = [a + b for a, b in zip(before, diagonal, strict=True)] if before else diagonal
     results = [result_of(where(accepted, value, math.nan)) for row in parts.values() for value in row]
     return TracedShares(formula_of(traced, columns, results, result_of(response.status), ()), tuple(parts))
 

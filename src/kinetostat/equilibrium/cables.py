@@ -255,7 +255,7 @@ class Cables:
     @cached_property
     def settled(self) -> Mask:
         """Whether the cables of a pose have directions: straight ones always, sagging ones if they find a shape [n]."""
-        return ~np.isnan(self.directions).any(axis=(1, 2))
+        return np.asarray(np.isfinite(self.directions).all(axis=(1, 2)))
 
     @cached_property
     def wrenches(self) -> Array:

@@ -161,7 +161,8 @@ class ElasticLeg:
     @property
     def hinged(self) -> Mask:
         """Whether each coordinate is a flexure hinge, which pulls back to the home pose [coordinates]."""
-        return np.array([spring is not None and not is_zero(spring.returns) for spring in self.springs], dtype=bool)
+        are_hinges = [spring is not None and not is_zero(spring.return_stiffness) for spring in self.springs]
+        return np.array(are_hinges, dtype=bool)
 
     def at(self, rows: Integers) -> "ElasticLeg":
         """The leg at some of n poses [rows]."""

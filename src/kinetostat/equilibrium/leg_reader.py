@@ -264,8 +264,8 @@ class _LegReader:
         if not _is_rigid(spring.stiffness):
             coordinate = self._new_coordinate(spring)
             self._add_motion(twist, coordinate)
-            if self.travels and not is_zero(spring.returns):
-                returning_load = self.units.load(spring, spring.returns) * self.travels[number - 1]
+            if self.travels and not is_zero(spring.return_stiffness):
+                returning_load = self.units.load(spring, spring.return_stiffness) * self.travels[number - 1]
                 self.preload[coordinate] = self.preload[coordinate] + returning_load
 
 

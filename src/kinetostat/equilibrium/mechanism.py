@@ -98,7 +98,7 @@ class Mechanism:
     @property
     def actuators(self) -> tuple[str, ...]:
         """Names of the actuators that can be driven."""
-        return tuple(spring.joint.name or spring.of for spring in self.driven)
+        return tuple(spring.joint.name or spring.part_name for spring in self.driven)
 
     @property
     def twist_units(self) -> Array:
@@ -170,7 +170,7 @@ def _elastic_legs(
     members: Sequence[Member],
 ) -> tuple[ElasticLeg, ...]:
     """All legs with springs, links and drives; `amounts` counts their actuators and growing links."""
-    returning = any(not is_zero(s.returns) for leg in configuration.legs for s in leg.springs)
+    returning = any(not is_zero(s.return_stiffness) for leg in configuration.legs for s in leg.springs)
     travels = _travels(machine, joints, units.count) if returning and joints is not None else {}
     legs = []
     for leg in configuration.legs:

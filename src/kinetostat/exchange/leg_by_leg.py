@@ -250,7 +250,8 @@ class _Chain:
                 about: dict[str, Any] = {"actuated": True} if element.actuated else {}
                 about |= {"preload": float(element.preload)} if element.preload else {}
                 about |= {"acts": element.acts} if element.acts else {}
-                self._add({**self._freedom(element.joint), **about, "stiffness": _stiffness(element)}, element.of)
+                about |= {"stiffness": _stiffness(element)}
+                self._add({**self._freedom(element.joint), **about}, element.part_name)
             elif isinstance(element, Parallelogram):
                 self._add(_parallelogram(element), element.name)
             else:
@@ -287,7 +288,7 @@ class _Chain:
         bodies = (self.joints[-1]["joins"][1] if self.joints else BASE), f"body {len(self.joints) + 1}"
         compliance = compliance_at(self.pending, Vector(*joint["point"])).tolist() if self.pending else []
         if compliance and self.joints:
-            body = self._free_name(self._name(self.pending[0].of))
+            body = self._free_name(self._name(self.pending[0].part_name))
             self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], body]
             bodies = body, bodies[1]
             self.links[body] = {"model": "matrix", "compliance": compliance}

@@ -266,7 +266,7 @@ def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
     return blocks
 
 
-def pose_of(end: Displacement) -> dict[str, Array]:
+def pose_coordinates(end: Displacement) -> dict[str, Array]:
     """Pose coordinates of a placement: P (m) and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll) (rad), arrays [n]."""
     angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _sides(end.rotation).items()}
     return {name: np.asarray(getattr(end.translation, name)) for name in POINT} | angles

@@ -19,7 +19,15 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import ANGLES, Joints, gaps_at, leg_ends, pose_of, squared_distance, units_of
+from kinetostat.kinematics.closing import (
+    ANGLES,
+    Joints,
+    gaps_at,
+    leg_ends,
+    pose_coordinates,
+    squared_distance,
+    units_of,
+)
 from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
@@ -150,7 +158,7 @@ class ByPose:
         for path in (path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"):
             result[path] = np.arctan2(np.sin(result[path]), np.cos(result[path]))
         if set(ANGLES) <= result.keys():
-            pose = pose_of(self._with_unknowns(unknowns).configure().platform)
+            pose = pose_coordinates(self._with_unknowns(unknowns).configure().platform)
             result |= {name: np.broadcast_to(pose[name], (len(unknowns),)) for name in ANGLES}
         return result
 
@@ -212,7 +220,7 @@ class LegByLeg:
     def poses(self, unknowns: Array, goal: Array) -> dict[str, Array]:
         """See `System` [n x unknowns]."""
         joints = self._whole(unknowns, goal)
-        coordinates = pose_of(leg_ends(self.chains, [column(c) for c in joints.T])[0].platform)
+        coordinates = pose_coordinates(leg_ends(self.chains, [column(c) for c in joints.T])[0].platform)
         return {name: np.broadcast_to(coordinates[name], (len(joints),)) for name in self.chains.pose}
 
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:

@@ -63,7 +63,7 @@ def elements(configuration: Configuration) -> list[Element]:
         parts: dict[str, list[tuple[int, Spring]]] = {}
         for spring in leg.springs:
             if spring.stiffness != 0.0:
-                parts.setdefault(spring.of, []).append((number, spring))
+                parts.setdefault(spring.part_name, []).append((number, spring))
             number += 1
         alike = tuple((numbered[0][1].kind, len(numbered)) for numbered in parts.values())
         for part, numbered in parts.items():

@@ -107,7 +107,7 @@ def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
     reactions = []
     for leg, wrench in zip(response.configuration.legs, leg_wrenches(response, load), strict=True):
         for name, point in joint_points(leg):
-            reactions.append(JointReaction(leg.name, name, point, wrench.moved(point - response.reference)))
+            reactions.append(JointReaction(leg.name, name, point, wrench.at_offset(point - response.reference)))
     return reactions
 
 
@@ -247,7 +247,7 @@ def _bodies(leg: Leg, of_joints: Iterator[Twist], of_springs: Iterator[Twist]) -
 
 
 def _twist_at(bodies: Sequence[Twist], reference: Vector, body: int, point: Vector) -> Twist:
-    return bodies[body].moved(point - reference)
+    return bodies[body].at_offset(point - reference)
 
 
 def _points(element: Element) -> tuple[Vector, ...]:

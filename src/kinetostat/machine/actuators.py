@@ -115,7 +115,7 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
         # The coordinate of an actuator depends on its own leg and the platform alone.
         before = actuators_of(replace(configuration, legs=(leg,))) if driven else []
         for number, (place, spring) in enumerate(driven):
-            moved_spring, motion = spring.moved(TRIAL_MOTION)
+            moved_spring, motion = spring.motion_by(TRIAL_MOTION)
             following = [element.displaced(motion) for element in leg.chain[place + 1 :]]
             moved_leg = replace(leg, chain=(*leg.chain[:place], moved_spring, *following))
             after = actuators_of(replace(configuration, platform=motion @ configuration.platform, legs=(moved_leg,)))
@@ -125,7 +125,7 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
 
 def name_of(spring: Spring) -> str:
     """The name of the joint that an actuator drives, or of the part that it is where the joint has none."""
-    return spring.joint.name or spring.of
+    return spring.joint.name or spring.part_name
 
 
 def _next_point(leg: Leg, place: int, end: Vector, other: Vector | None = None) -> Vector:
@@ -294,7 +294,7 @@ def numbers_of_drive(machine: Machine, table: str, spring: Spring) -> Any:
         table: "drives" or "servo".
         spring: the spring of the actuator.
     """
-    numbers, part = machine.tables[table], spring.of
+    numbers, part = machine.tables[table], spring.part_name
     tables = [path for path, _ in machine.family.own_drives if path.startswith(f"{table}.")]
     names = [path.removeprefix(f"{table}.") for path in tables]
     of_leg = [part.leg == name if isinstance(part, PartName) else part.startswith(f"{name} ") for name in names]

@@ -131,7 +131,7 @@ class Joint:
         foot = None if self.foot is None else motion.apply(self.foot)
         return replace(self, axis=motion.rotation.apply(self.axis), point=point, carriage=carriage, foot=foot)
 
-    def moved(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
+    def motion_by(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
         """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""
         if self.point is None:
             travel = self.axis * amount
@@ -163,8 +163,8 @@ class Spring:
         hinge: whether it is a flexure hinge: a joint that resists, where others are free.
         preload: its load where it is not deformed, N or N·m, positive where it pulls its ends together; a flexure hinge
             is not deformed at the home pose.
-        returns: stiffness of a flexure hinge, or of the row of springs that it is, against travel from the home pose,
-            SI.
+        return_stiffness: stiffness of a flexure hinge, or of the row of springs that it is, against travel from the
+            home pose, SI.
         acts: "pulls" or "pushes" if it carries loads of one sign only, as a cable does; otherwise empty.
     """
 
@@ -175,18 +175,18 @@ class Spring:
     actuated: bool = False
     hinge: bool = False
     preload: Scalar = 0.0
-    returns: Scalar = 0.0
+    return_stiffness: Scalar = 0.0
     acts: str = ""
 
     @property
-    def of(self) -> str:
+    def part_name(self) -> str:
         """The part that it stands for."""
         return self.part or self.name
 
     @property
     def kind(self) -> str:
         """The name of that part within its leg; its whole name if no leg is known."""
-        return self.of.kind if isinstance(self.of, PartName) else self.of
+        return self.part_name.kind if isinstance(self.part_name, PartName) else self.part_name
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -212,9 +212,9 @@ class Spring:
         """The spring after a rigid displacement of the whole machine."""
         return replace(self, joint=self.joint.displaced(motion))
 
-    def moved(self, amount: Scalar | Turn) -> tuple["Spring", Displacement]:
+    def motion_by(self, amount: Scalar | Turn) -> tuple["Spring", Displacement]:
         """The spring once its joint has moved by `amount` (rad or m), and how that displaces what follows it."""
-        joint, motion = self.joint.moved(amount)
+        joint, motion = self.joint.motion_by(amount)
         return replace(self, joint=joint), motion
 
 

@@ -247,7 +247,7 @@ class Parallelogram:
         near, far = motion.apply(self.near), motion.apply(self.far)
         return replace(self, near=near, far=far, side=turn(self.side), fixed_normal=normal)
 
-    def moved(self, amount: Scalar) -> tuple["Parallelogram", Displacement]:
+    def motion_by(self, amount: Scalar) -> tuple["Parallelogram", Displacement]:
         """The parallelogram once its far side has run by `amount` (m of arc), and how that displaces what follows."""
         angle = amount * reciprocal((self.far - self.near).norm())
         normal = self.normal

@@ -65,14 +65,15 @@ def springs_in_a_row(spring: Spring, named: Sequence[tuple[str, Scalar]], joint:
     """Springs on one freedom in the place of a spring on it; the first of them is the one that its servo drives.
 
     Args:
-        spring: the spring whose place they take; its `of` knows the leg.
+        spring: the spring whose place they take; its `part_name` knows the leg.
         named: key and stiffness of each part, N/m or N·m/rad.
         joint: name of the joint, which comes before that of the part; empty to leave it out.
     """
     row = []
     for number, (key, stiffness) in enumerate(named):
         title = f"{joint} {label(key)}".strip()
-        name = PartName(spring.of.leg, title) if isinstance(spring.of, PartName) else f"{spring.of} {label(key)}"
+        part = spring.part_name
+        name = PartName(part.leg, title) if isinstance(part, PartName) else f"{part} {label(key)}"
         is_first = number == 0
         row.append(
             replace(

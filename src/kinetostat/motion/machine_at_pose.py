@@ -303,7 +303,7 @@ def _joints_of_leg(number: int, chain: tuple[object, ...]) -> Iterator[LoadedJoi
     last = ""
     for place, element in enumerate(chain):
         mover = element if isinstance(element, Joint) else element.joint if isinstance(element, Spring) else None
-        name = element.of if isinstance(element, Spring) else mover.name if mover else ""
+        name = element.part_name if isinstance(element, Spring) else mover.name if mover else ""
         is_drive = isinstance(element, Spring) and element.actuated
         if mover is not None and name and name != last and (is_drive or isinstance(element, Joint)):
             yield LoadedJoint(name, number, place, mover.point is not None)

@@ -165,7 +165,8 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
     kinds: dict[str, dict[str, float]] = {}
     springs_by_name = {spring.name: spring for spring in springs}
     for name, share in shares.items():
-        part, kind = (springs_by_name[name].of, springs_by_name[name].kind) if name in springs_by_name else (name, name)
+        spring = springs_by_name.get(name)
+        part, kind = (name, name) if spring is None else (spring.part_name, spring.kind)
         parts[part] = parts.get(part, 0.0) + share
         kinds.setdefault(kind, {})[part] = 0.0
     together = {

@@ -20,7 +20,7 @@ from kinetostat.equilibrium.actuation import commanded_state
 from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, state_of, states_at
 from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import Joints, pose_of
+from kinetostat.kinematics.closing import Joints, pose_coordinates
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
@@ -302,7 +302,7 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
 
 def home_coordinates(machine: Machine) -> dict[str, float]:
     """Coordinates of the actuators of a machine written leg by leg at its home pose, by name, m or rad."""
-    home = pose_of(machine.chains().home) if machine.family.chains else {}
+    home = pose_coordinates(machine.chains().home) if machine.family.chains else {}
     pose = {f"{POSE}{name}": float(home[name]) for name in machine.chains().pose} if home else {}
     return {actuator.name: actuator.coordinate for actuator in analyze(changed(machine, pose)).actuators}
 

@@ -185,7 +185,7 @@ def _cable_states(machine: Machine, cables: Cables) -> tuple[CableState, ...]:
         tension = None if math.isnan(tensions_or_nan[number]) else float(tensions_or_nan[number])
         states.append(
             CableState(
-                name=next(spring.of for step in steps for spring in step.element.springs).rpartition(" ")[0],
+                name=next(spring.part_name for step in steps for spring in step.element.springs).rpartition(" ")[0],
                 tension=tension,
                 base_tension=None if tension is None else float(base_tensions[number]),
                 reserve=None if tension is None else min(tension - least, most - tension),

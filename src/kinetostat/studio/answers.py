@@ -147,7 +147,7 @@ def report(request: ReportRequest) -> Report:
     state = state_of(request.machine)
     analysis = analyze(state)
     placed_legs = () if analysis.status in PLACELESS else state.configuration.legs
-    legs = {str(spring.of): leg.name for leg in placed_legs for spring in leg.springs}
+    legs = {str(spring.part_name): leg.name for leg in placed_legs for spring in leg.springs}
     loaded, refused = _at_rest(state) if request.machine.loaded else (None, "")
     if loaded is None:
         solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)

@@ -381,7 +381,7 @@ def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
         for place, spring in enumerate(leg.springs, first):
             if spring is not None and spring.actuated:
                 turning = spring.joint.point is not None
-                yield Drive(spring.of, turning, shapes[place] * (1.0 if turning else length) / np.sqrt(joule))
+                yield Drive(spring.part_name, turning, shapes[place] * (1.0 if turning else length) / np.sqrt(joule))
 
 
 def tool_motions(equations: Balance) -> Array:

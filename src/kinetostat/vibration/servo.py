@@ -110,7 +110,7 @@ def servo_loops(state: MachineState) -> dict[str, ServoLoop]:
                 "and joint, which a servo loop needs: give it one."
             )
         square = float(rotor_turns(spring, drive)) ** 2
-        loops[spring.of] = ServoLoop(
+        loops[spring.part_name] = ServoLoop(
             transmission=stiffness,
             inertia=square * drive.rotor_inertia,
             friction=square * drive.rotor_damping,

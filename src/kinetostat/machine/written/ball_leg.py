@@ -93,7 +93,7 @@ class BallLeg:
                 opposite = replace(opposite, placement=_place_at(place.axis, place.point, motion, following))
                 following = motion @ place.motion
             else:
-                following = following @ joint.moved(amount)[1]
+                following = following @ joint.motion_by(amount)[1]
             amounts.append(opposite)
         return ClosedLeg(amounts[::-1], leg.closure, leg.gap)
 
@@ -113,7 +113,7 @@ class BallLeg:
         end = goal - fixed
         square = _square(end)
         amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
-        moved = single.moved(amount)[1]
+        moved = single.motion_by(amount)[1]
         shrink = reciprocal(sqrt(square))
         start = single.axis * self.aligned if self.aligned else (moved.apply(centre) - fixed) * shrink
         turns, gap = self._pair(pair, start, end * shrink, centre - fixed)
@@ -129,11 +129,11 @@ class BallLeg:
         start = centre - fixed
         square = _square(start)
         backward_amount, limits = to_distance(single, goal, centre, fixed, square)
-        end = single.moved(backward_amount)[1].apply(goal) - fixed
+        end = single.motion_by(backward_amount)[1].apply(goal) - fixed
         shrink = reciprocal(sqrt(square))
         turns, gap = self._pair(pair, start * shrink, end * shrink, centre - fixed)
         amount = _opposite(backward_amount)
-        moved = single.moved(amount)[1]
+        moved = single.motion_by(amount)[1]
         turns = [_after(moved, turn) for turn in turns]
         amounts = [_with_placement(amount, single, moved, moved), *turns]
         return amounts, _place(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap

@@ -135,7 +135,7 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 placed, motion = _with_line(placed, revolute.point, revolute.axis), revolute.motion
                 chain.append(placed)
                 continue
-            placed, moved = placed.moved(amount)
+            placed, moved = placed.motion_by(amount)
             if mover.point is None:  # a slide or a parallelogram, which turns nothing
                 motion, home = Displacement(motion.rotation, motion.translation + moved.translation), ZERO
             elif not is_zero(mover.pitch):  # a screw
@@ -144,7 +144,7 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
                 if mover.point is home:  # about the point of the revolute before it
                     placed = _with_line(placed, centre)
                 home, centre = mover.point, placed.mover.point
-                turn = motion.rotation @ step.element.moved(amount)[1].rotation
+                turn = motion.rotation @ step.element.motion_by(amount)[1].rotation
                 motion = Displacement(turn, centre - turn.apply(home))
         chain.append(placed)
     return chain, motion
@@ -206,7 +206,7 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mappi
         row = [*springs_in_a_row(row[0], [(key, getattr(parts, key)) for key in joint.series], joint.name)]
     if not joint.actuated:
         whole = reduce(series, [each.stiffness for each in row])
-        row = [replace(each, returns=whole) for each in row]
+        row = [replace(each, return_stiffness=whole) for each in row]
     rods = [rod_of(leg.name, joint, row[0], data, plan, tables)] if joint.rod else []
     return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate([*row, *rods])), *steps[place + 1 :]]
 

@@ -25,7 +25,7 @@ OBJECTIVE_DIGITS = 9
 
 
 @dataclass(frozen=True)
-class Progress:
+class SearchState:
     """The state of a search; numbers are SI.
 
     Attributes:
@@ -90,18 +90,18 @@ class Follower:
         self._last: Record = {}
         self._place = 0
 
-    def progress(self, run: Run) -> Progress:
+    def progress(self, run: Run) -> SearchState:
         """Read what is new, and return the state of the search."""
         new, self._place = read_history(self._folder, self._place)
         self._records += [{key: record.get(key) for key in ("best", "mean", "designs")} for record in new]
         self._last = new[-1] if new else self._last
         result = None if run.stage.active else _result(self._folder)
         if not self._records:
-            return Progress(run, self.problem, total=self._total, result=result)
+            return SearchState(run, self.problem, total=self._total, result=result)
         log = kept_log(self.problem, self._folder, self._last)
         several = len(self.problem.objectives) > 1
         front = front_of(log) if several else best_feasible(log)
-        return Progress(
+        return SearchState(
             run=run,
             problem=self.problem,
             steps=len(self._records),

@@ -14,7 +14,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.design.progress import Follower, Progress, failure
+from kinetostat.studio.design.progress import Follower, SearchState, failure
 from kinetostat.studio.design.runs import UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.design.texts import result_text
 from kinetostat.studio.elements import (
@@ -60,7 +60,7 @@ class Searches:
 
     runs: list[Run]
     follower: Follower | None = None
-    progress: Progress | None = None
+    progress: SearchState | None = None
     problem: str = ""
 
 
@@ -77,7 +77,7 @@ class RunPanel:
         self._runs, self._load = runs, load
         self._lane = Lane(self._read_searches, self._deliver)
         self._follower: Follower | None = None
-        self._progress: Progress | None = None
+        self._progress: SearchState | None = None
         self._shown: object = None  # search, stage and number of steps that the page shows
         self._place: int | None = None  # of the design that was loaded last, in the front
         with ui.element("div").classes("design-head"):
@@ -164,7 +164,7 @@ class RunPanel:
         if options != self.choice.options or chosen != self.choice.value:
             self.choice.set_options(options, value=chosen)
 
-    def _offer(self, progress: Progress | None) -> None:
+    def _offer(self, progress: SearchState | None) -> None:
         """Enable what can be done with a search in this stage."""
         stage = progress.run.stage if progress else None
         several = progress is not None and len(progress.problem.objectives) > 1
@@ -176,7 +176,7 @@ class RunPanel:
         self.curve.set_visibility(progress is not None and not several)
         self.front.reveal(several)
 
-    def _draw(self, progress: Progress) -> None:
+    def _draw(self, progress: SearchState) -> None:
         if len(progress.problem.objectives) > 1:
             self.front.show(progress, self._place)
         elif progress.steps:
@@ -220,7 +220,7 @@ class RunPanel:
         self.refresh()
 
 
-def convergence(progress: Progress) -> dict[str, object]:
+def convergence(progress: SearchState) -> dict[str, object]:
     """Return the only objective over the steps, best and mean, as `CurveView` draws it: in the units of the machine."""
     objective = progress.problem.objectives[0]
     factor = progress.scale(objective).factor
@@ -239,7 +239,7 @@ def convergence(progress: Progress) -> dict[str, object]:
     }
 
 
-def _status_line(progress: Progress) -> str:
+def _status_line(progress: SearchState) -> str:
     """Say in a line how far a search is, and how good its best design."""
     work = str(progress.run.stage)
     if progress.run.stage is Stage.RUNNING and not progress.steps:
@@ -261,7 +261,7 @@ class FrontPanel:
             pick: called with the place of the design that was clicked.
         """
         self._pick = pick
-        self._progress: Progress | None = None
+        self._progress: SearchState | None = None
         self._chosen: int | None = None
         self._is_ready = False  # whether the choices are complete, so that a change of one is a wish
         with ui.element("div").classes("front-plot") as self.plot:
@@ -284,7 +284,7 @@ class FrontPanel:
         self.rows.set_visibility(several)
         self.without.set_visibility(not several)
 
-    def show(self, progress: Progress, chosen: int | None) -> None:
+    def show(self, progress: SearchState, chosen: int | None) -> None:
         """Show the front of a search with several objectives; `chosen` is the place of the design that was loaded."""
         self._progress, self._chosen = progress, chosen
         names = {k: objective.term.label for k, objective in enumerate(progress.problem.objectives)}
@@ -333,7 +333,7 @@ def _in_units(values: Sequence[float], scales: Sequence[Scale]) -> list[float]:
     return [value * scale.factor for value, scale in zip(values, scales, strict=True)]
 
 
-def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[str]]]:
+def _table(progress: SearchState) -> tuple[list[str], list[list[float]], list[list[str]]]:
     """Return names of columns, numbers to sort by, and texts: the objectives first, then the variables."""
     space, display, aims = progress.problem.space, progress.problem.machine.display, progress.problem.objectives
     designs = [] if progress.genes is None else space.values(progress.genes).tolist()

@@ -16,7 +16,7 @@ from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.optimisation.assessment import COMMON_SHARE
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studio.design.progress import OBJECTIVE_DIGITS, Progress
+from kinetostat.studio.design.progress import OBJECTIVE_DIGITS, SearchState
 from kinetostat.studio.question_process import figure_html
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, titled_table
 from kinetostat.views.comparison import (
@@ -32,7 +32,7 @@ from kinetostat.views.comparison import (
 from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, sensitivity_text
 
 
-def result_text(progress: Progress) -> str:
+def result_text(progress: SearchState) -> str:
     """Return all tables of a search that has ended, or the best design so far of one that has not, as HTML."""
     result = progress.result
     if result is None:
@@ -45,7 +45,7 @@ def result_text(progress: Progress) -> str:
     return "".join(parts + [paragraph(line) for line in _remarks(result)])
 
 
-def _so_far(progress: Progress) -> str:
+def _so_far(progress: SearchState) -> str:
     if not progress.objectives:
         return paragraph("No feasible design has been found so far." if progress.steps else "The search is starting.")
     if len(progress.problem.objectives) > 1:
@@ -60,7 +60,7 @@ def _so_far(progress: Progress) -> str:
     return titled_table("Best so far", ["", "best"], rows)
 
 
-def _objectives(progress: Progress, result: dict[str, Any], best: str) -> str:
+def _objectives(progress: SearchState, result: dict[str, Any], best: str) -> str:
     problem, rows = progress.problem, []
     for aim in problem.objectives:
         before, after = (design["objectives"][aim.term.label] for design in (result["initial"], result))
@@ -97,7 +97,7 @@ def _directions(result: dict[str, Any]) -> str:
     return heading(title) + gains("stiffness gain", [row for row in rows if row[1] is not None])
 
 
-def _robustness(progress: Progress, result: dict[str, Any]) -> str:
+def _robustness(progress: SearchState, result: dict[str, Any]) -> str:
     scatter = result["robustness"]
     if scatter is None:
         return ""
