@@ -6,7 +6,7 @@ Sentences and plain data are in `guideline_sentences`; what is printed or drawn 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -50,9 +50,11 @@ from kinetostat.tolerances import NO_ROLE
 MOST_GUIDELINE_POSES = 10_000
 """Poses of a grid at most, because whole responses of all of them are kept in memory."""
 EXCESS = 0.01
-"""An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid."""
+"""An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid: one
+per cent, because stiffnesses of parts are seldom known better."""
 LEAST_INFLUENCE = 1e-3
-"""Percent per percent below which a parameter counts as without effect on a direction."""
+"""Percent per percent below which a parameter counts as without effect on a direction: far above round-off, and so
+little that twice the parameter changes a stiffness by a thousandth."""
 REASON_WITHOUT_AXES = "as axes of joints, whose errors are a matter of tolerances: `kinetostat sensitivity` shows them"
 """The reason why directions are no parameters of the design."""
 NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
@@ -61,7 +63,7 @@ NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
 
 @dataclass(frozen=True, eq=False)
 class Roles(ImmutableAnswer):
-    """The effect of each element on each direction, pose by pose; NaN if the direction is rigid or free or has no pose.
+    """The effect of each element on each direction, pose by pose; NaN where it is rigid or free.
 
     Attributes:
         shares: share of the element in each entry of the diagonal of C, 0 to 1 [elements x components x poses].
@@ -84,7 +86,7 @@ class ParameterEffect(ImmutableAnswer):
         percents: percent by which each direction gets stiffer per percent more of the parameter, or per 0.01 rad more
             of an angle; NaN where rigid or free.
         stiffer, softer: share of the poses of the grid at which each direction gets stiffer, and softer, by more than
-            round-off; empty without a grid.
+            `LEAST_INFLUENCE`; empty without a grid.
         turning: whether the parameter is an angle.
     """
 
@@ -188,7 +190,11 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     names = machine.family.component_names
     if sensitivities.status is not Status.OK:
         return Guidelines(
-            state, sensitivities.status, sensitivities.message, names, loads_left_out=sensitivities.loads_left_out
+            state=state,
+            status=sensitivities.status,
+            message=sensitivities.message,
+            components=names,
+            loads_left_out=sensitivities.loads_left_out,
         )
     kept, response = list(machine.family.components), state.free
     single_elements = elements(response.configuration)
@@ -226,7 +232,7 @@ def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
     for _, parameter in axes:
         if not parameter.path.startswith("pose."):
             known = ", ".join(path for path in values(machine) if path.startswith("pose."))
-            raise InputError(f"{parameter.path} is not a coordinate of the pose; --over takes {known}.")
+            raise InputError(f"{parameter.path} is not a coordinate of the pose; ranges (--over) are of {known}.")
     grid = grid_of(axes)
     if grid.size > MOST_GUIDELINE_POSES:
         raise InputError(
@@ -235,40 +241,41 @@ def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
     return grid
 
 
-def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int]) -> Roles:
+def roles_at(response: Response, elastic_elements: Sequence[Element], kept: Sequence[int]) -> Roles:
     """Compute the roles of elements.
 
     Args:
         response: response at one pose, or at many as arrays.
-        elements: the elements.
+        elastic_elements: the elements.
         kept: numbers of those of rx ry rz x y z, 0 to 5, that the machine has.
     """
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # the diagonal of C is 0 in rigid directions, infinite in free ones
         diagonal = without_rounding(response.compliance.diagonal(), response)[kept]
         bounded = np.isfinite(diagonal)
-        diagonal = np.where((diagonal > 0.0) & bounded, diagonal, math.nan)
+        is_compliant = (diagonal > 0.0) & bounded
+        compliance = np.where(is_compliant, diagonal, math.nan)  # so that what is divided by it is NaN elsewhere, too
         shares, rigid, gains = [], [], []
-        for element in elements:
+        for element in elastic_elements:
+            # The part of a rigid element is that of a compliance of 1: it has a role, but no share.
             part = without_rounding(element_share(response, element), response)[kept]
-            has_role = part / np.where(np.isfinite(diagonal), diagonal, 1.0) > NO_ROLE
-            factor = 1.0 / rigid_from(response, element, EXCESS)[kept]
-            rigid.append(np.where(bounded, np.where(has_role, factor, 0.0), math.nan))
-            share = 0.0 if element.stiffness == math.inf else part / diagonal
-            shares.append(np.where(share > NO_ROLE, share, diagonal * 0.0))
-            gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / diagonal)
+            has_role = part / np.where(is_compliant, diagonal, 1.0) > NO_ROLE
+            shares.append(np.where(has_role & (element.stiffness != math.inf), part, 0.0) / compliance)
+            factor = np.where(has_role, 1.0 / rigid_from(response, element, EXCESS)[kept], 0.0)
+            rigid.append(np.where(bounded, factor, math.nan))
+            gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / compliance)
     none = np.zeros((0, *np.shape(diagonal)))
     return Roles(*(np.stack(np.broadcast_arrays(*rows)) if rows else none for rows in (shares, rigid, gains)))
 
 
 def roles_over(
-    machine: Machine, grid: Points, elements: Sequence[Element], kept: Sequence[int], progress: Progress
+    machine: Machine, grid: Points, elastic_elements: Sequence[Element], kept: Sequence[int], progress: Progress
 ) -> tuple[Roles, tuple[int, int]]:
     """Compute roles at the poses of a grid that have an answer.
 
     Args:
         machine: the machine, with the values that do not vary.
         grid: the poses.
-        elements, kept: as for `roles_at`.
+        elastic_elements, kept: as for `roles_at`.
         progress: receives how far the work is.
 
     Returns:
@@ -277,11 +284,11 @@ def roles_over(
     response = responses(machine, grid)
     progress(1, 2)
     has_answer = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
-    roles = roles_at(response, elements, kept)
+    roles = roles_at(response, elastic_elements, kept)
     progress(2, 2)
-    shape = (len(elements), len(kept), grid.size)
-    part = [np.broadcast_to(rows, shape)[:, :, has_answer] for rows in (roles.shares, roles.rigid, roles.gains)]
-    return Roles(*part), (int(has_answer.sum()), grid.size)
+    shape = (len(elastic_elements), len(kept), grid.size)
+    answered = [np.broadcast_to(rows, shape)[:, :, has_answer] for rows in (roles.shares, roles.rigid, roles.gains)]
+    return Roles(*answered), (int(has_answer.sum()), grid.size)
 
 
 def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
@@ -301,12 +308,14 @@ def stiffening(state: MachineState, element: Element, factors: Array) -> Array:
         return rigid / without_rounding(diagonal_with(response, element, 1.0 / factors), response)[kept]
 
 
-def equations_of_k(response: Response, elements: Sequence[Element], kept: Sequence[int]) -> dict[str, Array] | None:
+def equations_of_k(
+    response: Response, single_elements: Sequence[Element], kept: Sequence[int]
+) -> dict[str, Array] | None:
     """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is not such a sum.
 
-    Arguments as for `roles_at`, at one pose.
+    Arguments as for `roles_at`, at one pose, but with each link as an element of its own.
     """
-    by_element = stiffness_equations(response, elements)
+    by_element = stiffness_equations(response, single_elements)
     if by_element is None:
         return None
     rows = np.array([[float(matrix.entry(i, i)) for i in kept] for matrix in by_element.values()])
@@ -320,17 +329,17 @@ def effects_of_parameters(sensitivities: Sensitivity, compliant: Mask) -> list[P
         sensitivities: sensitivities of the diagonal of C.
         compliant: whether each direction is neither rigid nor free.
     """
-    machine, by_path = sensitivities.machine, parameters_by_path(sensitivities.machine)
+    by_path, numbers = parameters_by_path(sensitivities.machine), values(sensitivities.machine)
     entries: dict[str, list[Array]] = {}
     for influence in sensitivities.parameters:
         if designed(by_path[influence.path]):
             row = np.where(compliant, -influence.percents, math.nan)
-            entries.setdefault(_path_of_element(machine, influence.path), []).append(row)
+            entries.setdefault(_path_of_element(influence.path, by_path, numbers), []).append(row)
     rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
     zero = np.where(compliant, 0.0, math.nan)
     for path in sensitivities.without_influence:
         if designed(by_path[path]):
-            rows.setdefault(_path_of_element(machine, path), zero)
+            rows.setdefault(_path_of_element(path, by_path, numbers), zero)
     return strongest_first(
         [ParameterEffect(path, row, turning=by_path[path].quantity.kind == "angle") for path, row in rows.items()]
     )
@@ -352,14 +361,13 @@ def parameters_by_path(machine: Machine) -> dict[str, Parameter]:
     return {parameter.path: parameter for parameter in parameters(machine.family)}
 
 
-def _path_of_element(machine: Machine, path: str) -> str:
+def _path_of_element(path: str, by_path: Mapping[str, Parameter], numbers: Mapping[str, float]) -> str:
     """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
-    field = path.rpartition(".")[0]
-    parameter = parameters_by_path(machine).get(field)
-    numbers = values(machine)
+    path_of_field = path.rpartition(".")[0]
+    parameter = by_path.get(path_of_field)
     if parameter is None or not (parameter.quantity.stiff and parameter.quantity.per_leg):
         return path
-    return field if len({numbers[leaf] for leaf in parameter.leaves}) == 1 else path
+    return path_of_field if len({numbers[leaf] for leaf in parameter.leaves}) == 1 else path
 
 
 def with_signs_over_grid(
@@ -367,9 +375,10 @@ def with_signs_over_grid(
 ) -> list[ParameterEffect]:
     """Add to each effect at which share of the poses of a grid it stiffens a direction, and at which it softens it."""
     machine, by_path = state.machine, parameters_by_path(state.machine)
-    paths = [leaf for effect in effects for leaf in by_path[effect.path].leaves]
+    varied = dict.fromkeys(leaf for effect in effects for leaf in by_path[effect.path].leaves)
+    row_of_leaf = {leaf: row for row, leaf in enumerate(varied)}
     names = [f"compliance_{name}" for name in machine.family.component_names]
-    answer = evaluate_gradient(machine, grid, names, paths)
+    answer = evaluate_gradient(machine, grid, names, list(row_of_leaf))
     has_answer = answer.status == Status.OK
     if not has_answer.any():
         return list(effects)
@@ -377,7 +386,7 @@ def with_signs_over_grid(
     signed = []
     for effect in effects:
         leaves = by_path[effect.path].leaves
-        rows = [paths.index(leaf) for leaf in leaves]
+        rows = [row_of_leaf[leaf] for leaf in leaves]
         sizes = np.array([measure_of(by_path[leaf].quantity.kind, numbers[leaf], length)[0] for leaf in leaves])
         percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
         change = -np.nansum(percents, axis=1)
