@@ -6,7 +6,7 @@ from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.analysis_parts import clean_matrix, clean_screw
+from kinetostat.studies.cleaning import clean_matrix, clean_screw
 from kinetostat.validation.comparison import validate
 from kinetostat.views.answers import plain_of
 from machines import load_without_limits

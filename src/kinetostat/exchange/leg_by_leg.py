@@ -31,7 +31,7 @@ from kinetostat.spec.document import Document, toml_key, toml_pairs, toml_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import LARGEST_OTHER, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
-from kinetostat.studies.analysis_parts import clean_screw
+from kinetostat.studies.cleaning import clean_screw
 from kinetostat.studies.identification.fitted_values import identified_machine
 from kinetostat.studies.identification.identification import Identification
 

@@ -44,17 +44,10 @@ from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.analysis_parts import (
-    Along,
-    Indices,
-    LoadCase,
-    clean_matrix,
-    clean_statics,
-    indices_of,
-    load_case,
-    stiffness_along,
-)
+from kinetostat.studies.analysis_parts import Indices, LoadCase, indices_of, load_case
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
+from kinetostat.studies.cleaning import clean_matrix, clean_statics
+from kinetostat.studies.directions import DirectionalStiffness, stiffness_along
 from kinetostat.tolerances import (
     CLOSING_ROUND_OFF,
     FREE_COMPONENT,
@@ -137,7 +130,7 @@ class Analysis(AnswerInState):
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
-    directions: tuple[Along, ...] = ()
+    directions: tuple[DirectionalStiffness, ...] = ()
     requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
@@ -217,7 +210,7 @@ class Analysis(AnswerInState):
         return pd.DataFrame(rows, names, ["part", "stiffness", *shares])
 
     @checked
-    def along(self, direction: Sequence[float]) -> Along:
+    def along(self, direction: Sequence[float]) -> DirectionalStiffness:
         """Stiffness along and about a direction, in the axes of K and C.
 
         Raises:

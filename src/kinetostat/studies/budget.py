@@ -40,9 +40,9 @@ from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
 from kinetostat.studies.allocation import Allocation, allocation_for, reach_of
-from kinetostat.studies.analysis_parts import unit_direction
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.datasets import GridQuestion, grid_question
+from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import NO_EFFECT
 

@@ -28,7 +28,7 @@ from kinetostat.motion.rigid import plan_of
 from kinetostat.numerics.polytopes import reach_along, vertices
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import ImmutableAnswer
-from kinetostat.studies.analysis_parts import unit_direction
+from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
 

@@ -23,7 +23,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.analysis_parts import unit_direction
+from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
 from kinetostat.vibration.modes import Modes

@@ -23,7 +23,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, positive
-from kinetostat.studies.analysis_parts import unit_direction
+from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.studies.vibration import Vibration, frequency_ends, modes

@@ -32,8 +32,8 @@ from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import ImmutableAnswer
-from kinetostat.studies.analysis_parts import clean_matrix, clean_screw, clean_statics
 from kinetostat.studies.attribution import Softest, softest
+from kinetostat.studies.cleaning import clean_matrix, clean_screw, clean_statics
 from kinetostat.tolerances import LEAST_DIVISOR, ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."

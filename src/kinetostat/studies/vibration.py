@@ -24,8 +24,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import ImmutableAnswer
-from kinetostat.studies.analysis_parts import unit_direction
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
+from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
 from kinetostat.studies.tool_receptance import read_tool
 from kinetostat.tolerances import EQUAL_FREQUENCIES

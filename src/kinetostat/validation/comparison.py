@@ -25,7 +25,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.installation import extra_command
-from kinetostat.studies.analysis_parts import clean_matrix
+from kinetostat.studies.cleaning import clean_matrix
 from kinetostat.tolerances import AGREED, RIGID_BLOCK_OF_ENGINE, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.vibration.modes import frequencies

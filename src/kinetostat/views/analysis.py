@@ -19,7 +19,7 @@ from kinetostat.machine.machine import Machine, pose_of
 from kinetostat.machine.parameters import POSE, shown, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import AXES, Analysis, analyze
-from kinetostat.studies.analysis_parts import indices_json
+from kinetostat.studies.analysis_parts import Indices
 from kinetostat.views import analysis_tables as free
 from kinetostat.views.analysis_tables import first_lines
 from kinetostat.views.forward import actuator_coordinates
@@ -133,11 +133,30 @@ def _platform(analysis: Analysis) -> dict[str, Any]:
     return {"position": position, "rotation": rotation}
 
 
+def _indices_json(indices: Indices) -> dict[str, Any]:
+    """The indices as plain data, for the JSON of an analysis."""
+    compliances = (indices.principal_compliances or {}).items()
+    stiffnesses = {"free": indices.free or {}, "guided": indices.guided or {}}
+    return {
+        "principal_compliances": {
+            block: {"values": c.compliances, "directions": c.directions} for block, c in compliances
+        }
+        or None,
+        "principal_stiffnesses": {
+            kind: {block: {"values": k.stiffnesses, "directions": k.directions} for block, k in blocks.items()}
+            for kind, blocks in stiffnesses.items()
+        },
+        "stiffness_condition": indices.stiffness_condition,
+        "centres": indices.centres,
+        "eigenscrews": indices.eigenscrews,
+    }
+
+
 def _index(key: str, analysis: Analysis) -> Any:
     """Return one of the indices: None where there are none, NaN (null in JSON) where this one has no value."""
     if analysis.indices is None:
         return None
-    value = indices_json(analysis.indices)[key]
+    value = _indices_json(analysis.indices)[key]
     return math.nan if value is None else value
 
 

@@ -18,8 +18,9 @@ from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.machine.machine import pose_of
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.analysis_parts import Along, LoadCase
+from kinetostat.studies.analysis_parts import LoadCase
 from kinetostat.studies.attribution import Softest, by_part, largest_contributors
+from kinetostat.studies.directions import DirectionalStiffness
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
 from kinetostat.units import load_unit, motion_unit
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -201,7 +202,7 @@ def principal_table(analysis: Analysis) -> FittedTable:
     return table
 
 
-def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> FittedTable:
+def along_table(along: Sequence[DirectionalStiffness], display: Display = ENGINEERING) -> FittedTable:
     """Return the stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
     title = f"Stiffness along and about directions ({display.names(['N/m', 'N·m/rad'])})"

@@ -152,6 +152,17 @@ def front_of(log: Log) -> Integers:
     return candidates[front[np.argsort(signed[front, 0], kind="stable")]]
 
 
+def best_designs(log: Log) -> tuple[Integers, int]:
+    """Return the Pareto-optimal designs and the place of their knee; of one objective the best design alone, place 0.
+
+    The first is empty where no design is feasible.
+    """
+    if len(log.problem.objectives) == 1:
+        return best_feasible(log), 0
+    front = front_of(log)
+    return front, knee_of(log, front) if len(front) else 0
+
+
 def knee_of(log: Log, front: Integers) -> int:
     """Return the place of the knee of a front: farthest from the plane through its ends, towards the better side.
 

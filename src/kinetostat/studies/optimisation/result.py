@@ -22,7 +22,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.validation import LONGEST_MACHINE_NAME
 from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict, Outcome, Robustness, robustness_of
-from kinetostat.studies.optimisation.log import Log, best_feasible, front_of, knee_of
+from kinetostat.studies.optimisation.log import Log, best_designs
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.slopes import Ridge, Surveyor, at_bounds, find_ridges
 from kinetostat.studies.quantities import uncounted_loads
@@ -57,8 +57,8 @@ class VariableInfluence:
     Attributes:
         name: the name of the variable.
         slopes: derivatives of each objective by it, SI; where an objective has a kink, of the part that decides.
-        percents: percent by which each objective changes per percent of the variable, of an angle per 0.01 rad; NaN
-            where one of them is 0.
+        percents: change of each objective in percent if the variable grows by 1 %, and an angle by 0.01 rad. NaN where
+            the objective or the variable is 0.
         bound: "lower" or "upper" if the variable is at that bound, else nothing.
     """
 
@@ -130,7 +130,8 @@ class Result(Immutable):
     @property
     def message(self) -> str:
         """The outcome of the search in a sentence."""
-        reasons = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in self.counts.items() if verdict)
+        rejected = [pair for pair in self.counts.items() if pair[0] is not DesignVerdict.FEASIBLE]
+        reasons = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in rejected)
         if not self.solved:
             return INFEASIBLE.format(reasons)
         sentence = f"{self.log.count:,} designs judged, {self.counts[DesignVerdict.FEASIBLE]:,} of them feasible"
@@ -157,10 +158,9 @@ def machine_of_design(problem: Problem, genes: Array) -> Machine:
 
 def result_of(assess: Assessor, log: Log) -> Result:
     """Return the result of a search: its best designs, compared with the machine as it was, and explained."""
-    problem, several = assess.problem, len(assess.problem.objectives) > 1
-    front = front_of(log) if several else best_feasible(log)
-    initial = assess(_as_it_is(problem))
-    result = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
+    front, knee = best_designs(log)
+    initial = assess(_as_it_is(assess.problem))
+    result = Result(problem=assess.problem, log=log, initial=initial, front=front, knee=knee)
     return _explain(assess, result) if result.solved else result
 
 
@@ -204,10 +204,11 @@ def _compliance_changes(problem: Problem, machine: Machine) -> list[ComplianceCh
     answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), names)
     reached = answers.status == Status.OK
     worst = {name: answers.values[name].max(axis=1, where=reached, initial=-np.inf) for name in names}
-    return [
-        ComplianceChange(name, QUANTITIES[name].unit, *np.where(reached.any(axis=1), worst[name], np.nan).tolist())
-        for name in names
-    ]
+    changes = []
+    for name in names:
+        before, after = np.where(reached.any(axis=1), worst[name], np.nan).tolist()  # NaN of a design without any pose
+        changes.append(ComplianceChange(name=name, unit=QUANTITIES[name].unit, before=before, after=after))
+    return changes
 
 
 def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[VariableInfluence]:
@@ -215,7 +216,7 @@ def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Variab
     surveyed, bounds, design = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
     if not surveyed.sound:
         return []
-    terms = [surveyed.term(objective.term, objective.sign > 0) for objective in problem.objectives]
+    terms = [surveyed.term(objective.term, high_is_bad=objective.sign > 0) for objective in problem.objectives]
     levels = np.array([level for level, _ in terms])
     influences = []
     for place, number in enumerate(survey.free):

@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
-from kinetostat.studies.analysis_parts import three_numbers
+from kinetostat.studies.directions import three_numbers
 from kinetostat.studies.optimisation.space import PoseSet
 from kinetostat.studies.quantities import refuse_absent
 

@@ -13,7 +13,7 @@ from kinetostat.display import Scale, number, with_unit
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
+from kinetostat.studies.optimisation.log import best_designs
 from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import machine_of_design
 from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_problem
@@ -65,17 +65,27 @@ class SearchState:
     def exact(self, objective: Objective, value: float) -> str:
         """Return the value of an objective with all its digits and its unit; a sum of several kinds has none."""
         scale = self.scale(objective)
-        return with_unit(number(value * scale.factor, digits=OBJECTIVE_DIGITS), scale.unit.replace("SI", "1"))
+        unit = "1" if scale.unit == "SI" else scale.unit  # sums of several kinds have the unit "SI" in tables
+        return with_unit(number(value * scale.factor, digits=OBJECTIVE_DIGITS), unit)
 
     def design(self, place: int) -> Machine:
-        """Return the design at a place of the front as a machine; with one objective, place 0 is the best design."""
+        """Return the design at a place of the front as a machine; with one objective, place 0 is the best design.
+
+        Raises:
+            IndexError: the front has no such place.
+        """
         if self.genes is None or not 0 <= place < len(self.genes):
             raise IndexError(place)
         return machine_of_design(self.problem, self.genes[place])
 
 
 class Follower:
-    """Reads the records that a search adds to its folder, each once."""
+    """Reads the records that a search adds to its folder, each once.
+
+    Attributes:
+        number: number of the search.
+        problem: the problem that it solves.
+    """
 
     def __init__(self, run: Run) -> None:
         """Follow a search from its beginning.
@@ -87,20 +97,20 @@ class Follower:
         self.problem = stored_problem(run.folder)
         self._total = steps_of(self.problem)
         self._records: list[Record] = []
-        self._last: Record = {}
-        self._place = 0
+        self._last_record: Record = {}
+        self._bytes_read = 0
 
     def progress(self, run: Run) -> SearchState:
         """Read what is new, and return the state of the search."""
-        new, self._place = read_history(self._folder, self._place)
+        new, self._bytes_read = read_history(self._folder, self._bytes_read)
         self._records += [{key: record.get(key) for key in ("best", "mean", "designs")} for record in new]
-        self._last = new[-1] if new else self._last
+        self._last_record = new[-1] if new else self._last_record
         result = None if run.stage.active else _result(self._folder)
         if not self._records:
-            return SearchState(run, self.problem, total=self._total, result=result)
-        log = kept_log(self.problem, self._folder, self._last)
+            return SearchState(run=run, problem=self.problem, total=self._total, result=result)
+        log = kept_log(self.problem, self._folder, self._last_record)
+        front, knee = best_designs(log)
         several = len(self.problem.objectives) > 1
-        front = front_of(log) if several else best_feasible(log)
         return SearchState(
             run=run,
             problem=self.problem,
@@ -111,7 +121,7 @@ class Follower:
             mean=[] if several else [record["mean"] for record in self._records],
             objectives=log.outcome(front).objectives.tolist(),
             genes=log.genes(front),
-            knee=knee_of(log, front) if several and len(front) else 0,
+            knee=knee,
             result=result,
         )
 
