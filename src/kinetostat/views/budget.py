@@ -39,8 +39,8 @@ from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
 MOST_LISTED_PARTS = 12
 """Single tolerances that are listed, which fill a screen; all of them with --full, and in JSON."""
-PER_METRE = 1e-6
-"""Ratios are read in µm/m."""
+MICROMETRE_PER_METRE = 1e-6
+"""Unit in which tolerances that are ratios are shown: that of the lengths of scales and screws."""
 SAME_TOLERANCE = 0.01
 """Change of a tolerance, as a share of it, up to which it is kept: nobody writes it on a drawing."""
 
@@ -81,13 +81,18 @@ def _allocation_sentence(answer: Budget, allocation: Allocation) -> str:
 def _tables(answer: Budget, full: bool) -> Iterator[FittedTable]:
     yield _sizes_table(answer, full)
     if answer.shares.any():
-        texts = {line.about: line.text for line in answer.tolerances}
+        texts = _text_by_line(answer)
         counts = {line: str(sum(part.line == line for part in answer.parts)) for line in texts}
         yield _sums_table(answer, "line", "lines of [tolerances]", {"tolerance": texts, "numbers": counts})
         yield _sums_table(answer, "leg", "legs", {})
         yield _parts_table(answer, full)
     if answer.allocation is not None:
         yield _allocation_table(answer, answer.allocation)
+
+
+def _text_by_line(answer: Budget) -> dict[str, str]:
+    """Return the text of each line of [tolerances], such as "0.05 mm", by what the line is about."""
+    return {line.about: line.text for line in answer.tolerances}
 
 
 def _shown_measures(answer: Budget, full: bool) -> list[str]:
@@ -100,8 +105,10 @@ def _shown_measures(answer: Budget, full: bool) -> list[str]:
     shown = []
     for name, unit in units.items():
         is_component = name not in ("parasitic rotation", "parasitic position")
-        is_nothing = greatest[name] <= ROUND_OFF_SHARE * max(greatest[other] for other in units if units[other] == unit)
-        if not name.startswith("parasitic ") or not (is_nothing or (is_component and not full)):
+        largest = max(greatest[other] for other in units if units[other] == unit)
+        is_round_off = greatest[name] <= ROUND_OFF_SHARE * largest
+        is_hidden = name.startswith("parasitic ") and (is_round_off or (is_component and not full))
+        if not is_hidden:
             shown.append(name)
     return shown
 
@@ -117,8 +124,8 @@ def _sizes_table(answer: Budget, full: bool) -> FittedTable:
     for name in _shown_measures(answer, full):
         place = answer.measures.index(name)
         scale = display.deflection(answer.units[place])
-        sizes = [float(np.nanmax(answer.size(s, name))) for s in statistics]
-        clean = [size if size > ROUND_OFF_SHARE * sizes[-1] else 0.0 for size in sizes]
+        sizes = {s: float(np.nanmax(answer.size(s, name))) for s in statistics}
+        clean = [size if size > ROUND_OFF_SHARE * sizes["worst"] else 0.0 for size in sizes.values()]
         cells = [number(size * scale.factor, digits=DRAWN_DIGITS) for size in clean]
         if many:
             everywhere = float(answer.spread.everywhere[place]) * scale.factor
@@ -127,17 +134,17 @@ def _sizes_table(answer: Budget, full: bool) -> FittedTable:
     return table
 
 
-def _shares_table(answer: Budget, what: str, *heads: str) -> FittedTable:
+def _shares_table(answer: Budget, subject: str, *heads: str) -> FittedTable:
     """Return a table of contributions without rows yet."""
-    table = text_table(f"Contributions to the variance: {what}", *heads)
+    table = text_table(f"Contributions to the variance: {subject}", *heads)
     for name in ranked_by(answer):
         table.add_column(f"{name}\n%", justify="right", no_wrap=True)
     return table
 
 
-def _sums_table(answer: Budget, key: str, what: str, notes: dict[str, dict[str, str]]) -> FittedTable:
+def _sums_table(answer: Budget, key: str, subject: str, notes: dict[str, dict[str, str]]) -> FittedTable:
     """Return the shares of lines or legs, the largest first; notes by name stand in columns between."""
-    table = _shares_table(answer, what, key, *notes)
+    table = _shares_table(answer, subject, key, *notes)
     by_measure = [answer.shares_by(key, name) for name in ranked_by(answer)]
     for name in answer.shares_by(key):
         table.add_row(name, *(note[name] for note in notes.values()), *(_percent(each[name]) for each in by_measure))
@@ -168,7 +175,7 @@ def _percent(share: float) -> str:
 def _tolerance_text(kind: str, limit: float, display: Display) -> str:
     """Return a tolerance with its unit, "0.05 mm"."""
     if kind == "share":
-        return f"{number(limit / PER_METRE, digits=display.digits)} µm/m"
+        return f"{number(limit / MICROMETRE_PER_METRE, digits=display.digits)} µm/m"
     return display.show(limit, "m" if kind == "length" else "rad")
 
 
@@ -176,10 +183,10 @@ def _allocation_table(answer: Budget, allocation: Allocation) -> FittedTable:
     rule = "root of the sum of squares" if allocation.by == "rss" else "worst case"
     where = "along the direction" if allocation.measure == "along" else "at the tool point"
     wanted = answer.machine.display.show_deflection(allocation.wanted, "m")
-    table = text_table(f"Tolerances of least cost for {wanted} {where} ({rule})", "line", "now", "least cost", "so")
+    table = text_table(f"Tolerances of least cost for {wanted} {where} ({rule})", "line", "now", "least cost", "advice")
     table.add_column("factor", justify="right", no_wrap=True)
     table.add_column("cost\n%", justify="right", no_wrap=True)
-    texts = {line.about: line.text for line in answer.tolerances}
+    texts = _text_by_line(answer)
     for place in np.argsort(allocation.factors, kind="stable"):
         line, factor = allocation.lines[place], float(allocation.factors[place])
         cost = 100.0 * float(allocation.costs[place]) / factor / max(allocation.cost, LEAST_DIVISOR)
@@ -246,7 +253,7 @@ BUDGET = Description(
     fields=(
         NAME,
         MESSAGE,
-        Field("tolerances", lambda answer: {line.about: line.text for line in answer.tolerances}),
+        Field("tolerances", _text_by_line),
         Field("measures", lambda answer: dict(zip(answer.measures, answer.units, strict=True))),
         Field("leading_measure", "leading"),
         Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
@@ -288,6 +295,7 @@ def _errors_table(answer: PossibleErrors, _full: bool) -> Iterator[FittedTable]:
 
 
 def _line_about(answer: PossibleErrors, error: Any) -> str | None:
+    """Return the last line of [tolerances] about a number, which replaces those before it; None if none is."""
     lines = [line for line in answer.machine.tolerances.values() if is_about(line.about, error) and line.of(error.kind)]
     return f"{lines[-1].about}: {lines[-1].text}" if lines else None
 
@@ -313,14 +321,30 @@ def _ask(
     machine: Machine,
     poses: Any = None,
     ranges: Sequence[str] = (),
+    along: Sequence[float] = (),
+    samples: int = 0,
+    exact: int = 0,
+    allocate: float | str | None = None,
+    by: str = "rss",
+    seed: int = 0,
     list_errors: bool = False,
     progress: Progress = silent,
-    **options: Any,
 ) -> Budget | PossibleErrors:
     """Answer the command, whose tolerances are in the machine."""
     if list_errors:
         return possible_errors(machine)
-    return budget(machine, poses, ranges, None, progress=progress, **options)
+    return budget(
+        machine,
+        poses,
+        ranges,
+        along=along,
+        samples=samples,
+        exact=exact,
+        allocate=allocate,
+        by=by,
+        seed=seed,
+        progress=progress,
+    )
 
 
 BUDGET_QUESTION = Question(

@@ -4,7 +4,7 @@ Nothing is computed here.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
 from kinetostat.views.data_forms import columns_csv
-from kinetostat.views.loaded import KINDS_OF_LOADS
+from kinetostat.views.loaded import KINDS_OF_LOADS, use_of_limit
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LAW_TOLERANCE,
@@ -44,7 +44,10 @@ else:
     figures = LateModule("kinetostat.views.figures")
 
 ROOM_ABOVE_CURVE = 1.15
-"""Height of a panel with a single curve over its greatest value; it begins at zero, so that heights can be compared."""
+"""Upper end of a panel with a single curve over the greatest value of the curve. The axis begins at zero, so that
+heights can be compared."""
+PANEL_HEIGHT, ROOM_FOR_TITLE = 2.0, 0.7
+"""Height of a row of panels, and of title and notes, inches."""
 
 
 def _lines(answer: Elevation) -> Lines:
@@ -99,8 +102,7 @@ def _forces_sentence(answer: Elevation) -> str:
     if not np.isfinite(answer.limit_use).any():
         return f"{text} The file limits no load of actuators."
     use = float(np.nanmax(answer.limit_use))
-    passed = " of its limit, which it passes" if use > 1.0 else " of its limit at most"
-    return f"{text} An actuator uses {number(100.0 * use, digits=3)} %{passed}."
+    return f"{text} An actuator uses {use_of_limit(use)}{'' if use > 1.0 else ' at most'}."
 
 
 def _reversals_sentence(answer: Elevation) -> str:
@@ -204,17 +206,19 @@ def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
 
 def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> "Figure":
     """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each."""
-    panels = _panels(answer)
-    rows = -(-len(panels) // 2)
+    contents = _panel_contents(answer)
+    rows = -(-len(contents) // 2)
     heights = answer.machine.display.scale("rad")
     notes = setting_of(answer.machine), "dotted lines: loads reverse" if answer.reversals else ""
-    with figures.new_figure((7.0, 0.7 + 2.0 * rows), title.format(answer.machine.name), *notes) as figure:
-        axes = figure.subplots(rows, 2, squeeze=False, sharex=True).flat
-        for panel, content in zip(axes, panels, strict=False):
+    with figures.new_figure(
+        (7.0, ROOM_FOR_TITLE + PANEL_HEIGHT * rows), title.format(answer.machine.name), *notes
+    ) as figure:
+        panels = list(figure.subplots(rows, 2, squeeze=False, sharex=True).flat)
+        for panel, content in zip(panels, contents, strict=False):
             _draw_panel(panel, answer, content, heights.factor)
-        for unused in list(figure.axes)[len(panels) :]:
+        for unused in panels[len(contents) :]:
             unused.set_visible(False)
-        for panel in list(figure.axes)[max(0, len(panels) - 2) : len(panels)]:
+        for panel in panels[max(0, len(contents) - 2) : len(contents)]:  # the last of both columns
             panel.set_xlabel(heights.label("elevation"))
             panel.tick_params(labelbottom=True)
     return figure
@@ -237,29 +241,36 @@ class PanelContent:
     fitting: bool = False
 
 
-def _panels(answer: Elevation) -> list[PanelContent]:
+def _panel_contents(answer: Elevation) -> list[PanelContent]:
     """List the panels in which something is known."""
     commands = answer.corrections.command
-    motions = answer.components, component_units(answer.components), answer.displacement.T
-    loads = answer.actuators, map(load_unit, answer.turning), answer.loads.T
-    corrections = commands.actuators, commands.units, commands.corrections.T
-    motion_rows, load_rows, correction_rows = (
-        list(zip(*columns, strict=True)) for columns in (motions, loads, corrections)
-    )
+    motion_units, load_units = component_units(answer.components), [load_unit(turns) for turns in answer.turning]
 
-    def of_unit(unit: str, rows: list[Any]) -> dict[str, Array]:
-        return {name: values for name, unit_of_values, values in rows if unit_of_values == unit}
+    def motions(unit: str) -> dict[str, Array]:
+        return _curves(unit, answer.components, motion_units, answer.displacement)
 
-    panels = [
-        PanelContent("displacement", "m", of_unit("m", motion_rows), fitting=True),
-        PanelContent("rotation", "rad", of_unit("rad", motion_rows), fitting=True),
+    def loads(unit: str) -> dict[str, Array]:
+        return _curves(unit, answer.actuators, load_units, answer.loads)
+
+    def corrections(unit: str) -> dict[str, Array]:
+        return _curves(unit, commands.actuators, commands.units, commands.corrections)
+
+    contents = [
+        PanelContent("displacement", "m", motions("m"), fitting=True),
+        PanelContent("rotation", "rad", motions("rad"), fitting=True),
         PanelContent("first frequency", "Hz", {"": answer.frequency}),
-        PanelContent("force, pulling", "N", of_unit("N", load_rows)),
-        PanelContent("moment", "N·m", of_unit("N·m", load_rows)),
+        PanelContent("force, pulling", "N", loads("N")),
+        PanelContent("moment", "N·m", loads("N·m")),
         PanelContent("error, 95 %", "m", {} if answer.budget is None else {"": answer.error}, fitting=True),
-        *(PanelContent("correction", unit, of_unit(unit, correction_rows), fitting=True) for unit in ("m", "rad")),
+        PanelContent("correction", "m", corrections("m"), fitting=True),
+        PanelContent("correction", "rad", corrections("rad"), fitting=True),
     ]
-    return [panel for panel in panels if any(np.isfinite(values).any() for values in panel.curves.values())]
+    return [content for content in contents if any(np.isfinite(values).any() for values in content.curves.values())]
+
+
+def _curves(unit: str, names: Sequence[str], units: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns of a table [elevations x names] that have a unit, by name."""
+    return {name: values for name, of_values, values in zip(names, units, table.T, strict=True) if of_values == unit}
 
 
 def _draw_panel(panel: "Axes", answer: Elevation, content: PanelContent, angle_factor: float) -> None:

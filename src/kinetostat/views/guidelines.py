@@ -372,7 +372,11 @@ ELEMENT = (
     Field("compliance_share", unit="1", long_name="share of the diagonal of C", axes=DIRECTIONS),
     Field("rigid_from_factor", unit="1", long_name="multiple of the stiffness from which it is rigid", axes=DIRECTIONS),
     Field("rigid_from", long_name="stiffness from which it is rigid, SI", axes=DIRECTIONS),
-    Field("rigid_from_per_actuator", long_name="that as a multiple of an actuator's", axes=DIRECTIONS),
+    Field(
+        "rigid_from_per_actuator",
+        long_name="stiffness from which it is rigid, as a multiple of an actuator's",
+        axes=DIRECTIONS,
+    ),
     Field("doubling_lowers_compliance", unit="1", long_name="share that doubling gains", axes=DIRECTIONS),
     Field("over_grid", lambda row: row.get("over_grid"), forms=("json",), optional=True),
 )

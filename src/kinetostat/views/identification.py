@@ -15,6 +15,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.identification.fit import Tell
 from kinetostat.studies.identification.fitted_values import (
+    NOMINAL_ANGLES,
     FirmwareNumbers,
     firmware_numbers,
     klipper_text,
@@ -35,13 +36,12 @@ RATIO, SHARE = Scale(1e6, "ppm"), Scale(1e2, "%")
 MOST_LISTED_OUTLIERS = MOST_LISTED_POSES = 40
 """Greatest number of rows of the table of outliers, and of that of poses to measure next: those of a screen."""
 NOT_EXPLAINED = 1.5
-"""Residuals over their standard deviations from which something else must be said to move the tool."""
+"""Residuals over their standard deviations beyond which something that is not fitted must move the tool: by chance they
+are half more than expected in a few small fits only."""
 NOT_SEEN = "not seen"
 """Word in the place of an interval that has no end."""
 MEASURED_KINDS = {"length": ("positions and distances", "m"), "angle": ("angles", "rad")}
 """Kinds of measured values, each with its words and its SI unit."""
-USUAL_TOWER_ANGLES = (210.0, 330.0, 90.0)
-"""Angles of the towers of a printer, deg, from which firmware counts."""
 
 
 def _record(answer: Identification) -> FitRecord:
@@ -50,11 +50,13 @@ def _record(answer: Identification) -> FitRecord:
 
 def _fit_lines(record: FitRecord) -> Lines:
     unseen_count = len(record.unknowns) - record.rank
-    text = (
-        f"{len(record.unknowns)} unknowns from {record.values} values at {record.poses} poses; {record.rank} "
-        f"combinations are seen{f', {unseen_count} are not' if unseen_count else ''}"
-    )
-    text += f"; {len(record.outliers)} values are set aside as outliers." if record.outliers else "."
+    text = f"{len(record.unknowns)} unknowns from {record.values} values at {record.poses} poses; "
+    text += f"{record.rank} combinations are seen"
+    if unseen_count:
+        text += f", {unseen_count} are not"
+    if record.outliers:
+        text += f"; {len(record.outliers)} values are set aside as outliers"
+    text += "."
     if record.known and record.scatter > NOT_EXPLAINED:
         text += (
             f" The residuals are {number(record.scatter, digits=2)} times as large as the standard deviations say: the "
@@ -169,23 +171,24 @@ def _firmware_table(numbers: FirmwareNumbers) -> FittedTable:
     """Return the numbers of a printer's controller: words of Klipper, letters of M665 and M666, and values."""
     heads = ("Klipper", "Marlin", "RepRapFirmware", "value", "±")
     table = text_table("In the words of firmware (mm, deg)", *heads, numeric=("value", "±"))
-    halves, words_of_scale = numbers.halves, ("rotation_distance, factor", "1 / M92", "1 / M92")
-    (marlin, height), (reprap, homed) = numbers.marlin_endstops, numbers.reprap_endstops
-    angles = zip("abc", "XYZ", USUAL_TOWER_ANGLES, strict=True)
-    endstops = zip("abc", "XYZ", marlin, reprap, strict=True)
-    rows = [
-        ("delta_radius", "M665 R", "M665 R"),
-        *((f"arm_length {tower}", "M665 L", "M665 L") for tower in "abc"),
-        *((f"angle {tower} - {usual:g}", f"M665 {letter}", f"M665 {letter}") for tower, letter, usual in angles),
-        *((f"position_endstop {t}, change", f"M666 {x} {m:+.4f}", f"M666 {x} {r:+.4f}") for t, x, m, r in endstops),
-    ]
-    values = [numbers.radius, *numbers.rods, *numbers.angles, *numbers.raised]
-    widths = [*halves["radius"], *halves["rods"], *halves["angles"], *halves["raised"]]
-    for words, value, half in zip(rows, values, widths, strict=True):
-        table.add_row(*words, *number_and_uncertainty(value, half))
-    table.add_row("", f"M665 H {height:+.4f}", f"M665 H {homed:+.4f}", "", "")
+    halves = numbers.halves
+    (marlin, marlin_height), (reprap, reprap_height) = numbers.marlin_endstops, numbers.reprap_endstops
+
+    def add(klipper: str, marlin_word: str, reprap_word: str, value: float, half: float) -> None:
+        table.add_row(klipper, marlin_word, reprap_word, *number_and_uncertainty(value, half))
+
+    add("delta_radius", "M665 R", "M665 R", numbers.radius, halves["radius"][0])
+    for tower, rod, half in zip("abc", numbers.rods, halves["rods"], strict=True):
+        add(f"arm_length {tower}", "M665 L", "M665 L", rod, half)
+    columns = "abc", "XYZ", NOMINAL_ANGLES, numbers.angles, halves["angles"]
+    for tower, letter, nominal, angle, half in zip(*columns, strict=True):
+        add(f"angle {tower} - {nominal:g}", f"M665 {letter}", f"M665 {letter}", angle, half)
+    for place, (tower, letter) in enumerate(zip("abc", "XYZ", strict=True)):
+        changes = (f"M666 {letter} {endstops[place]:+.4f}" for endstops in (marlin, reprap))
+        add(f"position_endstop {tower}, change", *changes, numbers.raised[place], halves["raised"][place])
+    table.add_row("", f"M665 H {marlin_height:+.4f}", f"M665 H {reprap_height:+.4f}", "", "")
     if any(halves["scale"]):
-        table.add_row(*words_of_scale, *number_and_uncertainty(numbers.scale, halves["scale"][0]))
+        add("rotation_distance, factor", "1 / M92", "1 / M92", numbers.scale, halves["scale"][0])
     return table
 
 
@@ -268,19 +271,28 @@ def _ask(
     bounds: Sequence[str] = (),
     ties: Sequence[str] = (),
     no_outliers: bool = False,
+    frame: bool = False,
+    target: bool = False,
+    sigma: str = "",
+    sigma_angle: str = "",
+    more: int = 0,
     progress: Tell = lambda *_: None,
-    **options: Any,
 ) -> Identification:
+    """Answer the command, whose sizes by group or path are texts "what=size"."""
     return identify(
         machine,
         data,
         fit or (() if ties else USUALLY_FITTED),
+        frame=frame,
+        target=target,
+        sigma=sigma,
+        sigma_angle=sigma_angle,
         priors=_sizes(priors, "--prior"),
         bounds=_sizes(bounds, "--bound"),
         ties=_sizes(ties, "--tie", "NAME=PATTERN", "rod_length=geometry.rod_length.*"),
         robust=not no_outliers,
+        more=more,
         tell=progress,
-        **options,
     )
 
 

@@ -55,6 +55,11 @@ SIGNS = (
 """Meaning of the signs of loads, which stands beside their tables."""
 UNLOADED_COLOUR = "#9a9a9a"
 """Colour of the machine without its loads, behind the loaded one."""
+CURVES_WIDTH, CURVES_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.8, 0.7
+"""Width of the figure of a growing load, with the legends to the right of its panels; height of each panel; and room
+for title and labels, inches."""
+BARS_WIDTH, ROOM_FOR_SCALE = 4.6, 0.6
+"""Width of the panels of bars beside the names of legs, and height of the labels below each panel, inches."""
 BAR_HEIGHT = 0.24
 """Height of the figure for each bar, inches: names of legs stand line by line beside them."""
 LEAST_NAME_WIDTH = 2.0
@@ -125,12 +130,18 @@ def actuator_sentence(state: LoadedState) -> str:
             parts.append(f"the greatest {kind} of an actuator is {size} ({hardest.name}{direction})")
     if not parts:
         return ""
-    text, use = "; ".join(parts), state.limit_use
-    if use is None:
-        use_text = "the file limits no load of actuators"
-    else:
-        use_text = f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
-    return f"{text[0].upper()}{text[1:]}; {use_text}."
+    use = state.limit_use
+    text = "; ".join([*parts, "the file limits no load of actuators" if use is None else use_of_limit(use)])
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def use_of_limit(use: float) -> str:
+    """Say how much of its limit the load of an actuator is, and whether it passes the limit.
+
+    Args:
+        use: the load over its limit.
+    """
+    return f"{number(100.0 * use, digits=3)} % of its limit" + (", which it passes" if use > 1.0 else "")
 
 
 def actuator_springs(state: LoadedState) -> list[SpringState]:
@@ -145,12 +156,13 @@ def actuator_springs(state: LoadedState) -> list[SpringState]:
 def displacement_table(state: LoadedState) -> FittedTable:
     """Return the displacement of the tool under its loads, beside that of linear equations."""
     display, units = state.machine.display, component_units(state.components)
-    scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
-    table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
-    for what, values in (("under load", state.displacement), ("to first order", state.linear)):
+    scales = [display.deflection(unit) for unit in units]
+    names_of_units = ", ".join(dict.fromkeys(scale.unit for scale in scales))
+    table = numeric_table(f"Displacement of the tool point ({names_of_units})", "", state.components)
+    for row, values in (("under load", state.displacement), ("to first order", state.linear)):
         if values is not None:
-            shown = (display.show_deflection(v, unit).split()[0] for v, unit in zip(values, units, strict=True))
-            table.add_row(what, *shown)
+            cells = (number(v * s.factor, "free", display.digits) for v, s in zip(values, scales, strict=True))
+            table.add_row(row, *cells)
     return table
 
 
@@ -242,7 +254,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "F
     turning = {spring.name: spring.turning for spring in state.springs}
     kinds = [turns for turns, _ in KINDS_OF_LOADS if turns in turning.values()]
     with figures.new_figure(
-        (6.6, 0.7 + 1.8 * (2 + len(kinds))),
+        (CURVES_WIDTH, ROOM_FOR_TITLE + CURVES_HEIGHT * (2 + len(kinds))),
         title.format(machine.name),
         setting_of(machine, []),
         "thin lines: to first order" if state.linear is not None else "",
@@ -268,19 +280,19 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
     """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed."""
     machine, response = state.machine, state.state.free
     motions, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
-    draw, factor = moved_machine(machine, response, motions, state.slack_legs)
+    draw, factor = overlay_of_motion(machine, response, motions, state.slack_legs)
     with mpl.rc_context(figures.STYLE):
         figure = drawing.views_of(
             response.configuration,
             lambda panel, across, up: draw(panel, lambda points: drawing.flat(points, across, up)),
         )
-        moved_legend(figure, named, f"{setting_of(machine, [])}\n{drawn_larger(factor)}", bool(state.slack_legs))
+        legend_of_overlay(figure, named, f"{setting_of(machine, [])}\n{drawn_larger(factor)}", bool(state.slack_legs))
         figures.set_title(figure, title.format(machine.name))
         layout.fix_layout(figure)
     return figure
 
 
-def moved_machine(
+def overlay_of_motion(
     machine: Machine, response: Response, motions: Deflection, slack_legs: Sequence[str] = ()
 ) -> tuple[Callable[["Axes", Projection], None], float]:
     """Return a function that draws a moved machine over the machine at its pose, and the factor of exaggeration.
@@ -313,7 +325,7 @@ def moved_machine(
     return draw, factor
 
 
-def moved_legend(figure: "Figure", named: tuple[str, str], setting: str, slack: bool = False) -> None:
+def legend_of_overlay(figure: "Figure", named: tuple[str, str], setting: str, slack: bool = False) -> None:
     """Name the grey and the blue machine of a figure below it, and the setting for which it holds.
 
     Args:
@@ -340,7 +352,8 @@ def bars_figure(state: LoadedState) -> "Figure":
     }
     groups = {turns: group for turns, group in by_kind.items() if group}
     name_width = max(LEAST_NAME_WIDTH, layout.width_of(name for name, _ in shown))
-    with figures.new_figure((name_width + 4.6, 0.6 * len(groups) + BAR_HEIGHT * len(shown))) as figure:
+    size = name_width + BARS_WIDTH, ROOM_FOR_SCALE * len(groups) + BAR_HEIGHT * len(shown)
+    with figures.new_figure(size) as figure:
         heights = [len(group) + 1 for group in groups.values()]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
         for panel, (turns, group) in zip(panels, groups.items(), strict=True):

@@ -12,6 +12,7 @@ from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
+from kinetostat.vibration.receptance import ASSUMED_RATIO
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import tool_sentence
@@ -57,7 +58,8 @@ def _lines(answer: Lobes) -> Lines:
     if answer.tool is not None:
         lines.append(("Tool", tool_sentence(answer.tool, answer.machine.display)))
     if answer.assumed:
-        lines.append(("Damping", "Damping is assumed: 2 % of critical in every mode; give a table [damping]."))
+        ratio = number(100.0 * ASSUMED_RATIO)
+        lines.append(("Damping", f"Damping is assumed: {ratio} % of critical in every mode; give a table [damping]."))
     return lines
 
 

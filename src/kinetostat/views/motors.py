@@ -214,7 +214,7 @@ MOTORS = Description(
                 Field("peak", long_name="share of the peak torque limit that is used"),
                 Field("continuous", long_name="share of the continuous torque limit that is used"),
                 Field("speed", long_name="share of the greatest speed that is used"),
-                Field("inertia_ratio", long_name="of the load to the rotor"),
+                Field("inertia_ratio", unit="1", long_name="inertia of the load over that of the rotor"),
                 Field("drive", long_name="drive with the least reserve", column="worst_drive"),
                 Field("source"),
             ),

@@ -13,7 +13,7 @@ from kinetostat.display import DASH, number
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.control import Servo, servo
-from kinetostat.vibration.receptance import along, receptance
+from kinetostat.vibration.receptance import ASSUMED_RATIO, along, receptance
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import RESPONSE, drawn_directions
@@ -28,7 +28,7 @@ else:
 RIGID = "rigid"
 """Word for a stiffness without end."""
 SAME_SHARE = 1e-9
-"""Relative difference of two stiffnesses that is round-off."""
+"""Relative difference up to which two stiffnesses are the same: beyond round-off, and below any digit shown."""
 
 
 def _share_at_rest(drive: dict[str, Any]) -> float:
@@ -53,7 +53,8 @@ def _lines(answer: Servo) -> Lines:
         loss = f"{softest['name']} loses most by its loop: it {verb} {static} at 0 Hz"
         yield "Drives", f"{loss}; its transmission has {transmission}."
     if answer.assumed:
-        yield "Damping", "The machine's own damping is assumed: 2 % in every mode; give a table [damping]."
+        ratio = number(100.0 * ASSUMED_RATIO)
+        yield "Damping", f"The machine's own damping is assumed: {ratio} % in every mode; give a table [damping]."
 
 
 def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
@@ -63,11 +64,15 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Free stiffness of the tool", "", columns)
     rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=True)
     for name, motors_still, static, (least, frequency) in rows:
-        unit = "N·m/rad" if name in COMPONENTS[:3] else "N/m"
+        unit = _stiffness_unit(name in COMPONENTS[:3])
         stiffnesses = (_stiffness(answer, value, unit) for value in (motors_still, static, least))
         table.add_row(name, *stiffnesses, DASH if math.isinf(least) else number(frequency, digits=3))
     yield table
     yield _table_of_drives(answer)
+
+
+def _stiffness_unit(turning: bool) -> str:
+    return "N·m/rad" if turning else "N/m"
 
 
 def _stiffness(answer: Servo, value: float, unit: str) -> str:
@@ -92,7 +97,7 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
     return [
         {
             "name": str(drive.name),
-            "unit": "N·m/rad" if drive.turning else "N/m",
+            "unit": _stiffness_unit(drive.turning),
             **vars(loop),
             "static": loop.static_stiffness,
         }
@@ -100,22 +105,28 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
     ]
 
 
+def _finite(value: float) -> float | None:
+    """Return a number for files, in which None stands for an infinite one."""
+    return None if math.isinf(value) else value
+
+
 def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
-    """Return the numbers of each drive for files, in which None stands for an infinite number."""
+    """Return the numbers of each drive for files."""
     return [
-        {key: None if isinstance(value, float) and math.isinf(value) else value for key, value in drive.items()}
+        {key: _finite(value) if isinstance(value, float) else value for key, value in drive.items()}
         for drive in _drives(answer)
     ]
 
 
 def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
-    rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=False)
+    # Without loops there are names but no numbers.
+    rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=answer.loops is not None)
     return [
         {
             "component": name,
-            "motors_still": None if math.isinf(motors_still) else motors_still,
-            "static": None if math.isinf(static) else static,
-            "least": None if math.isinf(least) else least,
+            "motors_still": _finite(motors_still),
+            "static": _finite(static),
+            "least": _finite(least),
             "least_at": None if math.isinf(least) else frequency,
         }
         for name, motors_still, static, (least, frequency) in rows
@@ -165,28 +176,28 @@ def servo_figure(answer: Servo, title: str = "{}: stiffness with servo loops clo
 
 
 STIFFNESS = tuple(
-    Field(key, long_name=meaning)
-    for key, meaning in (
-        ("component", "of rx ry rz x y z"),
-        ("motors_still", "free stiffness with motors that stand still, N/m or N·m/rad"),
-        ("static", "free stiffness at 0 Hz with loops closed, N/m or N·m/rad; none where rigid"),
-        ("least", "least dynamic stiffness, N/m or N·m/rad; none where rigid"),
-        ("least_at", "frequency of the least, Hz"),
+    Field(key, unit=unit, long_name=meaning)
+    for key, unit, meaning in (
+        ("component", "", "component of the motion of the tool: rx ry rz x y z"),
+        ("motors_still", "", "free stiffness with motors that stand still, N/m or N·m/rad"),
+        ("static", "", "free stiffness at 0 Hz with loops closed, N/m or N·m/rad; none where rigid"),
+        ("least", "", "least dynamic stiffness, N/m or N·m/rad; none where rigid"),
+        ("least_at", "Hz", "frequency of the least dynamic stiffness"),
     )
 )
 DRIVE = tuple(
-    Field(key, long_name=meaning, column=f"drive_{key}")
-    for key, meaning in (
-        ("name", "of the drive"),
-        ("unit", "of its stiffnesses"),
-        ("transmission", "stiffness between motor and joint"),
-        ("static", "stiffness at 0 Hz with its loop closed; none where rigid"),
-        ("inertia", "of its rotor at the joint, kg or kg·m²"),
-        ("friction", "viscous friction of its rotor at the joint, N·s/m or N·m·s/rad"),
-        ("velocity_gain", "at the joint, N·s/m or N·m·s/rad"),
-        ("position_gain", "1/s"),
-        ("integral_time", "s; 0 without an integral part"),
-        ("at_load", "share of the position that is measured behind the transmission"),
+    Field(key, unit=unit, long_name=meaning, column=f"drive_{key}")
+    for key, unit, meaning in (
+        ("name", "", "name of the drive"),
+        ("unit", "", "unit of the stiffnesses of the drive"),
+        ("transmission", "", "stiffness between motor and joint, N/m or N·m/rad"),
+        ("static", "", "stiffness at 0 Hz with the loop closed, N/m or N·m/rad; none where rigid"),
+        ("inertia", "", "inertia of the rotor at the joint, kg or kg·m²"),
+        ("friction", "", "viscous friction of the rotor at the joint, N·s/m or N·m·s/rad"),
+        ("velocity_gain", "", "gain of the velocity loop at the joint, N·s/m or N·m·s/rad"),
+        ("position_gain", "1/s", "gain of the position loop"),
+        ("integral_time", "s", "integral time of the velocity loop; 0 without an integral part"),
+        ("at_load", "1", "share of the position that is measured behind the transmission"),
     )
 )
 SERVO = Description(

@@ -109,7 +109,10 @@ TENSIONS = Description(
                 Field("reserve", unit="N", long_name="distance of the tension from the nearer bound"),
                 Field("length", unit="m", long_name="unstretched length to the drum side of its pulley"),
                 Field("sag", unit="m", long_name="greatest distance from the line of its ends"),
-                Field("stiffness_share", long_name="share of a straight cable's stiffness along that line"),
+                Field(
+                    "stiffness_share",
+                    long_name="stiffness along the line of its ends as a share of that of a straight cable",
+                ),
             ),
         ),
     ),
