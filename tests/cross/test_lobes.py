@@ -57,9 +57,9 @@ def grown(machine, ways, force, width, period):
     """The factor by which a disturbance of the machine's tool grows from edge to edge."""
     vibration = modes(machine)
     solution = vibration.solution
-    assert solution.ringing == len(solution.squares)
+    assert solution.ringing == len(solution.inverse_squares)
     return growth(
-        solution.squares,
+        solution.inverse_squares,
         vibration.damping.ratio,
         ways @ solution.tool[3:],
         lambda share: PRESSURE * width * force(share),

@@ -258,7 +258,7 @@ def test_equal_frequencies_of_a_symmetric_hexapod_have_a_plane_of_shapes():
     """A turn of the machine by 120 degrees takes the shapes of a pair to combinations of the two: T T^T stays."""
     answer = vibration(cubic(0.03, density=3.0))
     turn = np.kron(np.eye(2), [[-0.5, -np.sqrt(0.75), 0.0], [np.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]])
-    squares = answer.squares
+    squares = answer.inverse_squares
     pairs = [(i, i + 1) for i in range(5) if squares[i + 1] == pytest.approx(squares[i], rel=1e-12)]
     assert len(pairs) == 2
     for pair in pairs:

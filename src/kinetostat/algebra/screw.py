@@ -46,12 +46,12 @@ class Twist(Screw):
     """Angular velocity (rad/s) and velocity of the reference point (m/s), or a small displacement (rad; m)."""
 
     def at_offset(self, offset: Vector) -> "Twist":
-        """The same motion referred to the point at `offset` (m) from the present one: v' = v + omega x offset."""
+        """The same motion at the point whose vector from the present one is `offset` (m): v' = v + omega x offset."""
         return Twist(self.rotational, self.translational + self.rotational.cross(offset))
 
     @property
     def slides(self) -> bool:
-        """Whether it is a pure translation by form."""
+        """Whether it is a translation by form: its angular part is exactly zero, not only small."""
         return all(is_zero(c) for c in self.rotational.components())
 
 
@@ -60,16 +60,23 @@ class Wrench(Screw):
     """Moment about the reference point (N·m) and force (N)."""
 
     def at_offset(self, offset: Vector) -> "Wrench":
-        """The same load referred to the point at `offset` (m) from the present one: m' = m + force x offset."""
+        """The same load about the point whose vector from the present one is `offset` (m): m' = m + force x offset."""
         return Wrench(self.rotational + self.translational.cross(offset), self.translational)
 
     def work(self, twist: Twist) -> Scalar:
-        """Reciprocal product: the power (W) of this wrench on that twist, both at one point in the same axes."""
+        """Reciprocal product: the power (W) of this wrench on that twist, or its work (J) on a small displacement.
+
+        Both screws are at one point and in the same axes.
+        """
         return self.rotational.dot(twist.rotational) + self.translational.dot(twist.translational)
 
 
+NO_MOTION = Twist(ZERO, ZERO)
+NO_WRENCH = Wrench(ZERO, ZERO)
+
+
 def rotation_about(axis: Vector, arm: Vector) -> Twist:
-    """Unit twist of a revolute with unit direction `axis`, at the point that lies at `arm` (m) from the joint."""
+    """Unit twist of a revolute with unit direction `axis`, at the point whose vector from the joint is `arm` (m)."""
     return Twist(axis, axis.cross(arm))
 
 
@@ -79,10 +86,10 @@ def translation_along(axis: Vector) -> Twist:
 
 
 def force_along(axis: Vector, arm: Vector) -> Wrench:
-    """Unit force along the unit vector `axis` through the point at `arm` (m) from the reference point."""
+    """Unit force along the unit vector `axis`, through the point whose vector from the reference point is `arm` (m)."""
     return Wrench(arm.cross(axis), axis)
 
 
 def pure_moment(axis: Vector) -> Wrench:
-    """Moment about the vector `axis`; the same at every point."""
+    """Moment of the direction and size of the vector `axis`, unit or not; the same at every point."""
     return Wrench(axis, ZERO)

@@ -9,10 +9,10 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 from collections.abc import Sequence
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, larger, reciprocal, total, where
-from kinetostat.algebra.screw import Screw, Twist, Wrench
+from kinetostat.algebra.screw import NO_MOTION, Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import (
     INFINITE,
@@ -26,9 +26,6 @@ from kinetostat.kinetostatics.leg import (
 )
 from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNFELT, UNREACHED_COMPONENT
-
-NO_MOTION = Twist(ZERO, ZERO)
-
 
 Motion = tuple[Twist, Scalar]
 """A twist xi (per unit of a load) and a compliance s (of that load): the share s xi xi^T of C."""

@@ -14,10 +14,10 @@ from functools import cache
 from itertools import combinations
 
 from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, where
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import NO_MOTION, Twist, Wrench
 from kinetostat.algebra.solve import Conjugated, conjugate, right_inverse
 from kinetostat.algebra.symmetric import SIZE
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.leg import INFINITE, combine, free_springs_as_joints
 from kinetostat.machine.leg import Leg, Spring
@@ -182,7 +182,7 @@ def wrench_faces(
     carried = list(carried) or [0.0] * len(bounds)
     faces = []
     for mix in _circuits(drives):
-        lower, upper, normal = 0.0, 0.0, Twist(ZERO, ZERO)
+        lower, upper, normal = 0.0, 0.0, NO_MOTION
         for drive, amount in mix:
             low, high = bounds[drive]
             ends = _times(amount, low), _times(amount, high)

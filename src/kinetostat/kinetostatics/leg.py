@@ -21,9 +21,9 @@ from kinetostat.algebra.scalar import (
     weighted,
     where,
 )
-from kinetostat.algebra.screw import Screw, Wrench
+from kinetostat.algebra.screw import NO_WRENCH, Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
@@ -32,8 +32,6 @@ AnyScrew = TypeVar("AnyScrew", bound=Screw)
 
 INFINITE = float("inf")
 """Compliance of what is free, and stiffness of what is rigid."""
-NOTHING = Wrench(ZERO, ZERO)
-"""The wrench of a spring that never carries a load."""
 
 Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
@@ -208,7 +206,7 @@ def leg_resistance(leg: LegScrews) -> Resistance:
     if not springwise:
         leg = free_springs_as_joints(leg)
     if not leg.wrenches:
-        return Resistance([(NOTHING, 0.0)] * len(leg.loads), [])
+        return Resistance([(NO_WRENCH, 0.0)] * len(leg.loads), [])
     if springwise and len(leg.loads) == 1 and is_one(leg.loads[0][0]):
         action = [(leg.wrenches[0], reciprocal(leg.compliance[0]))]
         return Resistance(action, action)
@@ -243,7 +241,7 @@ def _by_springs(leg: LegScrews, modes: Modes) -> Resistance:
     ]
     rigid = [(w, where(d > 0.0, 0.0, INFINITE)) for w, d in zip(modes.wrenches, modes.compliance, strict=True)]
     return Resistance(
-        shares, shares + [(_either(independent, NOTHING, w), where(independent, 0.0, k)) for w, k in rigid]
+        shares, shares + [(_either(independent, NO_WRENCH, w), where(independent, 0.0, k)) for w, k in rigid]
     )
 
 

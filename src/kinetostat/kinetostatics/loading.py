@@ -17,7 +17,7 @@ from math import isinf
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, total, weighted
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import NO_MOTION, NO_WRENCH, Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array, Integers
@@ -92,7 +92,7 @@ def leg_wrenches(response: Response, load: Wrench) -> list[Wrench]:
 
 def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
     """The sum of wrenches at one point."""
-    result = Wrench(ZERO, ZERO)
+    result = NO_WRENCH
     for wrench in wrenches:
         result = result + wrench
     return result
@@ -239,7 +239,7 @@ def _bodies(leg: Leg, of_joints: Iterator[Twist], of_springs: Iterator[Twist]) -
         leg: the leg.
         of_joints, of_springs: motions of its passive joints and of its springs, in order.
     """
-    motions = [Twist(ZERO, ZERO)]
+    motions = [NO_MOTION]
     for element in leg.chain:
         parts = [next(of_joints) for _ in element.freedoms] + [next(of_springs) for _ in element.springs]
         motions.append(motions[-1] + _sum(parts))
@@ -259,7 +259,7 @@ def _points(element: Element) -> tuple[Vector, ...]:
 
 
 def _sum(twists: Sequence[Twist]) -> Twist:
-    result = Twist(ZERO, ZERO)
+    result = NO_MOTION
     for twist in twists:
         result = result + twist
     return result

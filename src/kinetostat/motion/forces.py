@@ -10,7 +10,7 @@ Source: theory (90)-(93). Units are those of `rigid`: forces in N, moments in N 
 from collections.abc import Sequence
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, sqrt, total, where
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import NO_WRENCH, Twist, Wrench
 from kinetostat.algebra.solve import Row, complement, right_inverse
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
@@ -20,7 +20,6 @@ from kinetostat.motion.rigid import MassPoint, RigidLeg, RigidMachine
 PARTS = ("weight", "inertia", "process", "friction", "springs")
 """Parts of what drives must do: against the weight of all parts, to accelerate masses and rotors, against the loads on
 the platform, against friction of joints and drives, and against flexure hinges."""
-NOTHING = Wrench(ZERO, ZERO)
 STANDSTILL_RATE = 1e-12
 """Rate of a joint, rad/s or in lengths of the machine per second, up to which it stands still: Coulomb friction is as
 large at any speed, that of round-off included."""
@@ -109,7 +108,7 @@ def _demand(
     rows, carried = [], []
     for number, leg in enumerate(machine.legs):
         wrenches = of_legs[number] if of_legs else ()
-        beyond = [NOTHING]
+        beyond = [NO_WRENCH]
         row = list(of_coordinates[number]) if of_coordinates else [0.0] * len(leg.rates_by_twist)
         for motion in reversed(range(len(leg.screws))):
             load = beyond[0]
@@ -122,7 +121,7 @@ def _demand(
             beyond.insert(0, load)
         rows.append(row)
         carried.append(tuple(beyond[:-1]))
-    whole = NOTHING
+    whole = NO_WRENCH
     for wrench in platform:
         whole = whole + wrench
     return ForceDemand(whole, tuple(rows), tuple(carried))
@@ -155,7 +154,7 @@ def weight(machine: RigidMachine) -> ForceDemand:
 
 def process(machine: RigidMachine) -> ForceDemand:
     """Return the demand of the loads of the file on the platform."""
-    return _demand(machine, [NOTHING - machine.process])
+    return _demand(machine, [NO_WRENCH - machine.process])
 
 
 def hinges(machine: RigidMachine) -> ForceDemand:
@@ -280,7 +279,7 @@ def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Sc
         demand: the sum of all demands.
         forces: forces of the drives.
     """
-    leg_demands, imbalance = [], NOTHING - demand.platform
+    leg_demands, imbalance = [], NO_WRENCH - demand.platform
     for leg, row in zip(machine.legs, demand.legs, strict=True):
         of_drives = [0.0] * leg.passive + [forces[number] for number in leg.drives]
         differences = [force - driving for force, driving in zip(row, of_drives, strict=True)]

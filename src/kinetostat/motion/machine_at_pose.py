@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
 from kinetostat.algebra.scalar import Scalar, total
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import NO_MOTION, NO_WRENCH, Twist, Wrench
 from kinetostat.algebra.solve import Row, dual_basis
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
@@ -19,7 +19,6 @@ from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import (
-    NOTHING,
     PARTS,
     DriveStatics,
     ForceDemand,
@@ -32,7 +31,6 @@ from kinetostat.motion.forces import (
     weight,
 )
 from kinetostat.motion.rates import (
-    STILL,
     BodyMotion,
     Coordinates,
     LegMotion,
@@ -239,7 +237,7 @@ def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
     rigid, shrink = placed.rigid, 1.0 / placed.rigid.length
     rows: list[list[Scalar]] = [[0.0] * 6 for _ in rigid.drives]
     for way in placed.statics.ways:
-        motion = machine_motion(rigid, BodyMotion(Twist(Vector(*way[:3]), Vector(*way[3:])), STILL))
+        motion = machine_motion(rigid, BodyMotion(Twist(Vector(*way[:3]), Vector(*way[3:])), NO_MOTION))
         forces = drive_forces(rigid, placed.statics, inertia(rigid, _from_rest(motion)))
         rows = [[a - b * f for a, b in zip(row, way, strict=True)] for row, f in zip(rows, forces, strict=True)]
     levers = [1.0 if drive.slides else rigid.length for drive in rigid.drives]
@@ -252,10 +250,15 @@ def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
 def _from_rest(motion: MachineMotion) -> MachineMotion:
     """Return the motion from rest whose accelerations are the rates of another one."""
     legs = tuple(
-        LegMotion([0.0] * len(leg.rates), leg.rates, tuple(BodyMotion(STILL, body.twist) for body in leg.bodies), STILL)
+        LegMotion(
+            [0.0] * len(leg.rates),
+            leg.rates,
+            tuple(BodyMotion(NO_MOTION, body.twist) for body in leg.bodies),
+            NO_MOTION,
+        )
         for leg in motion.legs
     )
-    return MachineMotion(BodyMotion(STILL, motion.platform.twist), legs)
+    return MachineMotion(BodyMotion(NO_MOTION, motion.platform.twist), legs)
 
 
 def _work(demand: ForceDemand, motion: MachineMotion) -> Scalar:
@@ -360,7 +363,7 @@ def tool_wrench(placed: MachineAtPose, direction: PoseRates) -> list[Scalar]:
     """
     motion, demand_by_part = forces_along(placed, direction)
     demand = _sum_of(demand_by_part)
-    whole = list((NOTHING - demand.platform).components())
+    whole = list((NO_WRENCH - demand.platform).components())
     for leg, leg_motion, forces in zip(placed.rigid.legs, motion.legs, demand.legs, strict=True):
         row = list(forces)
         for place, number in enumerate(leg.drives, leg.passive):

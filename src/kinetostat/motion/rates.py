@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from kinetostat.algebra.jet import Jet
 from kinetostat.algebra.scalar import Scalar, sqrt, total
-from kinetostat.algebra.screw import Twist
+from kinetostat.algebra.screw import NO_MOTION, Twist
 from kinetostat.algebra.solve import Row, dual_basis
 from kinetostat.algebra.vector import Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.frozen import dataclass
@@ -20,8 +20,6 @@ from kinetostat.kinematics.closing import ANGLES, POINT, placement_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values, with_values
 from kinetostat.motion.rigid import RigidLeg, RigidMachine
-
-STILL = Twist(ZERO, ZERO)
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,7 @@ def leg_motion(leg: RigidLeg, platform: BodyMotion, real_motion: LegMotion | Non
     twists = _sums_along(leg, leg.screws, rates)
     real_twists = twists if real_motion is None else [body.twist for body in real_motion.bodies]
     carried_screws = zip(real_twists, leg.screws, leg.coordinates, strict=False)  # one twist more, that of the end
-    screw_rates = [bracket(twist, screw) if place >= 0 else STILL for twist, screw, place in carried_screws]
+    screw_rates = [bracket(twist, screw) if place >= 0 else NO_MOTION for twist, screw, place in carried_screws]
     drifts = _sums_along(leg, screw_rates, rates)
     to_follow = platform.change - drifts[-1]
     change = [_product(row, to_follow) for row in leg.rates_by_twist]
@@ -155,7 +153,7 @@ def leg_motion(leg: RigidLeg, platform: BodyMotion, real_motion: LegMotion | Non
 
 def _sums_along(leg: RigidLeg, screws: Sequence[Twist], rates: Row) -> list[Twist]:
     """Return for each k the sum of the first k screws, each times the rate of its coordinate, if it has one."""
-    sums = [STILL]
+    sums = [NO_MOTION]
     for screw, place in zip(screws, leg.coordinates, strict=True):
         sums.append(sums[-1] + screw * rates[place] if place >= 0 else sums[-1])
     return sums
@@ -253,7 +251,7 @@ def motion_along(
     """
     units = {name: (1.0 / machine.length if name in POINT else 1.0) for name in coordinates.names}
     twist = _sum(coordinates.unit_twists, [direction.rates[name] * units[name] for name in coordinates.names])
-    forced = _forced_change(machine, machine_motion(machine, BodyMotion(twist, STILL), real_motion))
+    forced = _forced_change(machine, machine_motion(machine, BodyMotion(twist, NO_MOTION), real_motion))
     real_twist = twist if real_motion is None else real_motion.platform.twist
     speed = real_twist.translational + real_twist.rotational.cross(coordinates.arm)
     axis_turning = _axis_turning(coordinates, twist, real_twist)
@@ -280,7 +278,7 @@ def _forced_change(machine: RigidMachine, motion: MachineMotion) -> Twist:
     ]
     independent = [drifts[number] for number in machine.plan.independent]
     if not independent:
-        return STILL
+        return NO_MOTION
     return _sum([list(row) for row in zip(*machine.constraint_twists, strict=True)], independent)
 
 

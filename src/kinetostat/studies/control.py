@@ -27,7 +27,7 @@ from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.vibration import HIGHEST, Vibration, modes
 from kinetostat.tolerances import UNFELT
 from kinetostat.vibration.modes import Modes
-from kinetostat.vibration.receptance import Equations
+from kinetostat.vibration.receptance import StateSpaceMatrices
 from kinetostat.vibration.receptance import state_space as equations_of
 from kinetostat.vibration.servo import ClosedLoops, least_damped_pole
 
@@ -209,7 +209,7 @@ class StateSpace(ImmutableAnswer):
     """
 
     machine: Machine
-    equations: Equations
+    equations: StateSpaceMatrices
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     frequencies: tuple[float, ...]
@@ -281,4 +281,4 @@ def _ports(
     known |= {drive.name: (turning if drive.turning else sliding, drive.motion) for drive in solution.drives}
     names = [choice(name, known, what) for name in (tool if wanted is None else wanted)]
     ports = tuple(Port(name, known[name][0]) for name in names)
-    return ports, np.array([known[name][1] for name in names]).reshape(len(names), len(solution.squares))
+    return ports, np.array([known[name][1] for name in names]).reshape(len(names), len(solution.inverse_squares))

@@ -317,7 +317,7 @@ def _modes_of(state: MachineState) -> Vibration:
     solution = solved_modes(equations)
     if solution is None:
         return Vibration(state, Status.SINGULAR, TOO_DIFFERENT, names)
-    if not solution.squares.size:
+    if not solution.inverse_squares.size:
         return Vibration(state, Status.OK, NOTHING_RINGS, names)
     return _vibration(state, equations, solution)
 
@@ -389,7 +389,7 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
     effective, springs = effective_masses(equations, solution), springs_of(response.configuration)
     result = []
     for k in range(solution.ringing)[shown]:
-        omega = 1.0 / math.sqrt(solution.squares[k])
+        omega = 1.0 / math.sqrt(solution.inverse_squares[k])
         twist = solution.tool[:, k] * omega  # of a modal mass of 1 kg
         sizes = np.abs(twist) * np.array([length] * 3 + [1.0] * 3)
         largest = max(parts, key=lambda part: sizes[part])

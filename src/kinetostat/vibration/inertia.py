@@ -42,7 +42,7 @@ class PartRates:
 def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
     """Return the inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None if it has none."""
     entries = masses.inertia[:, number]
-    if all(is_zero(entry) for entry in entries.flat) if entries.dtype == object else not entries.any():
+    if all(map(is_zero, entries.flat)) if entries.dtype == object else not entries.any():  # of traced ones by form
         return None
     rows = np.stack([entries[:, list(row)] for row in TENSOR_ROWS], axis=1)
     return np.asarray(motion.rotation @ rows @ np.swapaxes(motion.rotation, 1, 2))
@@ -74,8 +74,17 @@ def platform_rates(masses: Masses, platform: Motions) -> list[PartRates]:
 
 
 def mass_matrices(masses: Masses, rates: Sequence[PartRates], length: Array) -> Iterator[tuple[str, Array]]:
-    """Give mass matrices of parts with their names, which add up to that of all [n x coordinates x coordinates]."""
-    for name, part, uncoupled in zip(masses.names, rates, _columns(masses.uncoupled, length), strict=True):
+    """Give the mass matrices of parts, which add up to that of all.
+
+    Args:
+        masses: the masses.
+        rates: the motion of each.
+        length: unit of length of the mechanism, m [n].
+
+    Returns:
+        The name of a part, and its matrix [n x coordinates x coordinates].
+    """
+    for name, part, uncoupled in zip(masses.names, rates, (masses.uncoupled * length[:, None]).T, strict=True):
         matrix = np.swapaxes(part.velocity, 1, 2) @ part.velocity * uncoupled[:, None, None]
         if part.tensor is not None:
             rotary = np.swapaxes(part.angular, 1, 2) @ part.tensor @ part.angular
@@ -88,7 +97,7 @@ def mass_matrices(masses: Masses, rates: Sequence[PartRates], length: Array) -> 
 
 
 def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
-    """Return twice the kinetic energy of some masses in a motion of their coordinates."""
+    """Return twice the kinetic energy of some masses in a motion of their coordinates; see `mass_matrices`."""
     along_motion = [
         replace(part, velocity=(part.velocity @ motion)[..., None], angular=(part.angular @ motion)[..., None])
         for part in rates
@@ -96,26 +105,22 @@ def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length:
     return total([matrix[0, 0, 0] for _, matrix in mass_matrices(masses, along_motion, length)])
 
 
-def _columns(amounts: Array, length: Array) -> Array:
-    return np.swapaxes(amounts * length[:, None], 0, 1)
-
-
 def platform_inertia(masses: Masses, platform: Motions, length: Array) -> Array:
-    """Return the mass matrix of the platform by its twist, at the origin [n x 6 x 6].
+    """Return the mass matrix of the platform by its twist, at the origin [n x 6 x 6]; `length` as in `mass_matrices`.
 
-    It follows from the mass, the moment of the masses and their tensor.
+    It is the sum of the `mass_matrices` of `platform_rates`, without products with zeros and ones, for which traced
+    programs would pay. No mass of the platform is a bar, so that no two are coupled.
     """
     count = len(length)
-    tensor, moment, mass = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros(count)
-    if masses.mass.dtype == object or platform.translation.dtype == object:
-        tensor, moment, mass = tensor.astype(object), moment.astype(object), mass.astype(object)
-    for number, uncoupled in enumerate(_columns(masses.uncoupled, length)):
+    kind = object if masses.mass.dtype == object or platform.translation.dtype == object else float
+    tensor, first_moment, mass = (np.zeros(shape).astype(kind) for shape in ((count, 3, 3), (count, 3), count))
+    for number, uncoupled in enumerate((masses.uncoupled * length[:, None]).T):
         point = platform.point(masses.point[:, number])
         lever = skew_of(point)
         tensor = tensor - lever @ lever * uncoupled[:, None, None]
-        moment, mass = moment + point * uncoupled[:, None], mass + uncoupled
-        own_tensor = tensor_of(masses, number, platform)
-        tensor = tensor if own_tensor is None else tensor + own_tensor * length[:, None, None]
-    coupling, diagonal = skew_of(moment), np.eye(3) * mass[:, None, None]
+        first_moment, mass = first_moment + point * uncoupled[:, None], mass + uncoupled
+        tensor_of_mass = tensor_of(masses, number, platform)
+        tensor = tensor if tensor_of_mass is None else tensor + tensor_of_mass * length[:, None, None]
+    coupling, diagonal = skew_of(first_moment), np.eye(3) * mass[:, None, None]
     rows = np.concatenate([tensor, coupling], axis=2), np.concatenate([-coupling, diagonal], axis=2)
     return np.concatenate(rows, axis=1)

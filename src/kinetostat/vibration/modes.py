@@ -49,14 +49,14 @@ class Modes:
     """The natural vibrations at one pose, from the lowest frequency; motions without mass come last.
 
     Attributes:
-        squares: 1 / omega² of each mode, s² [m]; 0 where nothing has mass.
+        inverse_squares: 1 / omega² of each mode, s² [m]; 0 where nothing has mass.
         shapes: rates of the twist of the platform along its ways, and of all coordinates of the legs, scaled to
             a strain energy of one half [coordinates x m].
         tool: twist of the tool point in each, base axes, of the same scale: rad and m per root of a joule [6 x m].
         drives: the actuators that deflect.
     """
 
-    squares: Array
+    inverse_squares: Array
     shapes: Array
     tool: Array
     drives: tuple[Drive, ...] = ()
@@ -64,12 +64,12 @@ class Modes:
     @property
     def ringing(self) -> int:
         """Number of modes that have mass, and so a frequency."""
-        return int((self.squares > 0.0).sum())
+        return int((self.inverse_squares > 0.0).sum())
 
     @property
     def frequencies(self) -> Array:
         """Natural frequencies, Hz [ringing]."""
-        return np.asarray(0.5 / np.pi / np.sqrt(self.squares[: self.ringing]))
+        return np.asarray(0.5 / np.pi / np.sqrt(self.inverse_squares[: self.ringing]))
 
 
 def mass_matrix(equations: Balance) -> Array:
@@ -122,12 +122,12 @@ class ModesOfPoses:
 
     Attributes:
         rows: numbers of the poses [k].
-        squares: as in `Modes` [k x m].
+        inverse_squares: as in `Modes` [k x m].
         shapes: as in `Modes` [k x coordinates x m].
     """
 
     rows: Integers
-    squares: Array
+    inverse_squares: Array
     shapes: Array
 
 
@@ -153,15 +153,16 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
         transposed = np.swapaxes(factors, 1, 2)
         scaled_mass = factors @ mass_within[holds] @ transposed
         if shaped:
-            squares, axes = np.linalg.eigh(scaled_mass)
+            inverse_squares, axes = np.linalg.eigh(scaled_mass)
             shapes = _over_coordinates(transposed @ axes[:, :, ::-1], [part[holds] for part in basis])
         else:
-            squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), starts[-1], 0))
-        squares = squares[:, ::-1]
+            inverse_squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), starts[-1], 0))
+        inverse_squares = inverse_squares[:, ::-1]
         motion_sizes = np.trace(factors @ unit_within[holds] @ transposed, axis1=1, axis2=2)
         round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * motion_sizes
-        squares = np.where(squares > np.maximum(UNRESISTED * squares[:, :1], round_off[:, None]), squares, 0.0)
-        yield ModesOfPoses(rows[holds], squares, shapes)
+        has_mass = inverse_squares > np.maximum(UNRESISTED * inverse_squares[:, :1], round_off[:, None])
+        inverse_squares = np.where(has_mass, inverse_squares, 0.0)
+        yield ModesOfPoses(rows[holds], inverse_squares, shapes)
 
 
 def _allowed_motions(
@@ -315,10 +316,10 @@ def _without_momentum(idle: Array, mass: Array) -> Array:
     return np.asarray(np.where(has_mass[:, :, None], momenta / sizes[:, :, None], motions))
 
 
-def hertz(squares: Array) -> Array:
+def hertz(inverse_squares: Array) -> Array:
     """Return frequencies of 1 / omega² in descending order [n x m]; infinite where nothing has mass."""
-    has_mass = squares > UNRESISTED * squares[:, :1]
-    return np.where(has_mass, 0.5 / np.pi / np.sqrt(np.where(has_mass, squares, 1.0)), np.inf)
+    has_mass = inverse_squares > UNRESISTED * inverse_squares[:, :1]
+    return np.where(has_mass, 0.5 / np.pi / np.sqrt(np.where(has_mass, inverse_squares, 1.0)), np.inf)
 
 
 def frequencies(equations: Balance, count: int = MODES) -> Array:
@@ -328,9 +329,9 @@ def frequencies(equations: Balance, count: int = MODES) -> Array:
     """
     result = np.full((len(equations.residual), count), np.nan)
     for part in solved_modes(equations, shaped=False):
-        present = min(count, part.squares.shape[1])
+        present = min(count, part.inverse_squares.shape[1])
         result[part.rows] = np.inf
-        result[part.rows, :present] = hertz(part.squares[:, :present])
+        result[part.rows, :present] = hertz(part.inverse_squares[:, :present])
     return result
 
 
@@ -343,11 +344,11 @@ def modes(equations: Balance) -> Modes | None:
     if part is None:
         return None
     motions = tool_motions(equations)
-    shapes = _settled_shapes(part.squares[0], part.shapes[0], motions, float(equations.mechanism.length[0]))
-    return Modes(part.squares[0], shapes, motions @ shapes, tuple(_drives(equations, shapes)))
+    shapes = _settled_shapes(part.inverse_squares[0], part.shapes[0], motions, float(equations.mechanism.length[0]))
+    return Modes(part.inverse_squares[0], shapes, motions @ shapes, tuple(_drives(equations, shapes)))
 
 
-def _settled_shapes(squares: Array, shapes: Array, motions: Array, length: float) -> Array:
+def _settled_shapes(inverse_squares: Array, shapes: Array, motions: Array, length: float) -> Array:
     """Return the same modes with what is arbitrary in them settled, so that round-off does not decide it.
 
     Of modes of equal frequency the first moves the tool along the first component, x y z rx ry rz, along which they
@@ -355,14 +356,14 @@ def _settled_shapes(squares: Array, shapes: Array, motions: Array, length: float
     its own to the positive side.
 
     Args:
-        squares, shapes: as in `Modes`, of one pose.
+        inverse_squares, shapes: as in `Modes`, of one pose.
         motions: see `tool_motions`.
         length: length of the machine, by which turns are compared with displacements, m.
     """
     result = shapes.copy()
     translations_first = np.roll(motions * np.array([length] * 3 + [1.0] * 3)[:, None], 3, axis=0)
-    borders = np.flatnonzero(squares[:-1] - squares[1:] > EQUAL_STIFFNESSES * squares[:-1]) + 1
-    for first, last in pairwise([0, *borders.tolist(), len(squares)]):
+    borders = np.flatnonzero(inverse_squares[:-1] - inverse_squares[1:] > EQUAL_STIFFNESSES * inverse_squares[:-1]) + 1
+    for first, last in pairwise([0, *borders.tolist(), len(inverse_squares)]):
         for place in range(first, last):
             of_equals = translations_first @ result[:, place:last]
             sizes = np.linalg.norm(of_equals, axis=1)

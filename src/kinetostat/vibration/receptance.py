@@ -7,8 +7,6 @@ without mass as springs do; so the receptance at no frequency is the compliance.
 Source: theory (59)-(62) and (108). SI, base axes, at the tool point.
 """
 
-from typing import Any
-
 import numpy as np
 
 from kinetostat.arrays import Array, Complex
@@ -28,6 +26,8 @@ together may lie between two of the tool's."""
 class Damper:
     """Damping of the modes.
 
+    Shapes of modes have a strain energy of one half, so that the stiffness of each is 1 and its mass 1 / omega².
+
     Attributes:
         friction: friction of joints and rotors, and Rayleigh's damping, between the modes [m x m], s.
         ratio: damping ratio that every mode has besides.
@@ -39,7 +39,7 @@ class Damper:
     def ratios(self, modes: Modes) -> Array:
         """Damping ratio of each mode with mass, all its damping counted, for light damping [ringing]."""
         count = modes.ringing
-        roots = np.sqrt(modes.squares[:count])
+        roots = np.sqrt(modes.inverse_squares[:count])  # 1 / omega, s
         return np.asarray(self.ratio + 0.5 * np.diagonal(self.friction)[:count] / roots)
 
 
@@ -53,7 +53,7 @@ def damper(equations: Balance, modes: Modes, ratio: float, per_mass: float, per_
         per_mass, per_stiffness: Rayleigh's factors, 1/s and s.
     """
     friction = modes.shapes.T @ damping_matrix(equations)[0] @ modes.shapes
-    rayleigh = per_mass * modes.squares + per_stiffness * np.ones_like(modes.squares)
+    rayleigh = per_mass * modes.inverse_squares + per_stiffness * np.ones_like(modes.inverse_squares)
     return Damper(friction + np.diag(rayleigh), ratio)
 
 
@@ -66,13 +66,13 @@ def receptance(modes: Modes, damping: Damper, frequencies: Array) -> Complex:
         frequencies: Hz [frequencies].
     """
     rates = 2.0 * np.pi * np.asarray(frequencies, dtype=float)[:, None]
-    roots = np.sqrt(modes.squares)
-    diagonal = 1.0 - rates**2 * modes.squares + 2.0j * damping.ratio * rates * roots
+    roots = np.sqrt(modes.inverse_squares)  # 1 / omega, s
+    diagonal = 1.0 - rates**2 * modes.inverse_squares + 2.0j * damping.ratio * rates * roots
     if not damping.friction.any():
         return np.asarray(np.einsum("ik,fk,jk->fij", modes.tool, 1.0 / diagonal, modes.tool))
-    whole = 1.0j * rates[:, :, None] * damping.friction + diagonal[:, :, None] * np.eye(len(roots))
+    coupled = 1.0j * rates[:, :, None] * damping.friction + diagonal[:, :, None] * np.eye(len(roots))
     tools = np.broadcast_to(modes.tool.T, (len(rates), *modes.tool.T.shape))
-    return np.asarray(modes.tool @ np.linalg.solve(whole, tools))
+    return np.asarray(modes.tool @ np.linalg.solve(coupled, tools))
 
 
 def along(receptances: Complex, direction: Array) -> Complex:
@@ -117,7 +117,8 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     """Couple a tool to a machine: motion of its tip per wrench on it, rad and m per N·m and N [n x 6 x 6].
 
     The holder is held at its flange, which is the tool point of the machine: there both move alike and push each other.
-    Components that the tool does not give for its tip are those of the flange, where a wrench then acts on the machine.
+    In components that the tool lacks at its tip, the tip is taken to be the flange: motion and wrench are then those of
+    the machine there. Receptances are symmetric (Maxwell), so that `tip_flange` serves in both directions.
 
     Args:
         machine: receptance of the machine at the tool point, base axes [n x 6 x 6].
@@ -146,17 +147,17 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     return result
 
 
-def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Any:
+def _interpolate(tool: FreeTool, values: Complex, frequencies: Array) -> Complex:
     """Return values at frequencies between those of a tool, along straight lines [n x ...]."""
     place = np.clip(np.searchsorted(tool.frequencies, frequencies) - 1, 0, len(tool.frequencies) - 2)
     start, end = tool.frequencies[place], tool.frequencies[place + 1]
     share = ((frequencies - start) / (end - start))[:, None, None]
-    return (1.0 - share) * values[place] + share * values[place + 1]
+    return np.asarray((1.0 - share) * values[place] + share * values[place + 1])
 
 
 @dataclass(frozen=True)
-class Equations:
-    """The matrices of a state space.
+class StateSpaceMatrices:
+    """The matrices of a state space: x' = a x + b u, y = c x + d u, with states x, inputs u and outputs y.
 
     Attributes:
         a: rates of the states by the states, 1/s [states x states].
@@ -173,37 +174,34 @@ class Equations:
     states: tuple[str, ...]
 
 
-def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, count: int | None = None) -> Equations:
-    """Write the vibrations of a machine as equations of first order.
+def state_space(
+    modes: Modes, damping: Damper, inputs: Array, outputs: Array, count: int | None = None
+) -> StateSpaceMatrices:
+    """Write the vibrations of a machine as equations of first order, theory (61) and (62).
 
     Args:
         modes: modes at the pose.
         damping: damping of the modes.
-        inputs: motion in each mode of each point and direction in which a force acts [inputs x m], SI per root of a
-            joule.
-        outputs: motion in each mode of each point and direction whose motion is an output [outputs x m].
+        inputs: motion in each mode of each point and direction in which a force acts [inputs x m], m or rad per root of
+            a joule.
+        outputs: motion in each mode of each point and direction whose motion is an output [outputs x m], the same way.
         count: number of the lowest modes that become states; all that have mass if None. The others follow at once,
             without friction, and what they add to the compliance stays in D.
     """
     with_mass = modes.ringing
     size = with_mass if count is None else min(count, with_mass)
     friction = damping.friction
-    # Along the principal directions of the friction among motions without mass, some creep, and the others are free.
-    sizes, directions = np.linalg.eigh(friction[with_mass:, with_mass:])
-    sizes, directions = sizes[::-1], directions[:, ::-1]
-    creeping = sizes[sizes > UNRESISTED * float(np.abs(friction).max())]
-    creep, free = np.split(directions, [len(creeping)], axis=1)
-    without_mass = with_mass + np.arange(len(sizes))
+    creeping, creep, free = _motions_without_mass(friction, with_mass)
     # What follows at once: modes with mass that are no states, and motions without mass that no friction slows.
     direct_inputs, direct_outputs = (
-        np.concatenate([rows[:, size:with_mass], rows[:, without_mass] @ free], axis=1) for rows in (inputs, outputs)
+        np.concatenate([rows[:, size:with_mass], rows[:, with_mass:] @ free], axis=1) for rows in (inputs, outputs)
     )
-    # Amplitudes are scaled to the kinetic energy, so that the mass matrix of the modes is 1.
-    roots, creep_count = np.sqrt(modes.squares[:size]), len(creeping)
+    # Amplitudes are scaled to the kinetic energy by 1 / omega, so that the mass matrix of the modes is 1.
+    roots, creep_count = np.sqrt(modes.inverse_squares[:size]), len(creeping)
     coupling = creep.T @ friction[with_mass:, :size] / roots
     by_creep = coupling.T / creeping
     mode_friction = friction[:size, :size] / np.outer(roots, roots) + np.diag(2.0 * damping.ratio / roots)
-    mode_forces, creep_forces = inputs[:, :size].T / roots[:, None], creep.T @ inputs[:, without_mass].T
+    mode_forces, creep_forces = inputs[:, :size].T / roots[:, None], creep.T @ inputs[:, with_mass:].T
     rates_by_states = [
         [np.zeros((size, size)), np.eye(size), np.zeros((size, creep_count))],
         [-np.diag(1.0 / roots**2), by_creep @ coupling - mode_friction, by_creep],
@@ -217,14 +215,32 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
     outputs_by_states = [
         outputs[:, :size] / roots,
         np.zeros((len(outputs), size)),
-        outputs[:, without_mass] @ creep,
+        outputs[:, with_mass:] @ creep,
     ]
     states = [f"{kind} of mode {k + 1}" for kind in ("amplitude", "speed") for k in range(size)]
     states += [f"creeping motion {k + 1}" for k in range(creep_count)]
-    return Equations(
+    return StateSpaceMatrices(
         a=np.block(rates_by_states),
         b=np.vstack(rates_by_inputs),
         c=np.hstack(outputs_by_states),
         d=direct_outputs @ direct_inputs.T,
         states=tuple(states),
     )
+
+
+def _motions_without_mass(friction: Array, with_mass: int) -> tuple[Array, Array, Array]:
+    """Split motions without mass along the principal directions of their friction: some creep, the others are free.
+
+    Args:
+        friction: friction between the modes [m x m], s.
+        with_mass: number of the modes with mass, which come first.
+
+    Returns:
+        The friction of each creeping motion, s, from the greatest; their directions, and those of the others, as
+        columns over the modes without mass.
+    """
+    sizes, directions = np.linalg.eigh(friction[with_mass:, with_mass:])
+    sizes, directions = sizes[::-1], directions[:, ::-1]
+    creeping = sizes[sizes > UNRESISTED * float(np.abs(friction).max())]
+    creep, free = np.split(directions, [len(creeping)], axis=1)
+    return creeping, creep, free

@@ -241,8 +241,8 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
     constraints = np.concatenate([conditions, motions_left_out(equations, mass)], axis=1)
     columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
     for part in solved_modes(equations):
-        known = min(most, part.squares.shape[1])
-        squares, shapes = part.squares[:, :known], part.shapes[:, :, :known]
+        known = min(most, part.inverse_squares.shape[1])
+        squares, shapes = part.inverse_squares[:, :known], part.shapes[:, :, :known]
         # Along allowed motions mu K y = M y; across them, the forces of the constraints balance the difference.
         imbalance = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes
         forces = np.linalg.pinv(np.swapaxes(constraints[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ imbalance

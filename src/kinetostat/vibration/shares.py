@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from kinetostat.algebra.screw import Twist, Wrench
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.screw import NO_WRENCH, Twist
+from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, loaded_links
 from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
@@ -35,29 +35,32 @@ def strain_shares(equations: Balance, shapes: Array) -> dict[str, Array]:
     """Return shares of the strain energy by spring [modes]; wrenches and weights that turn have the rest."""
     elastic, geometric, _ = tangent_matrices(equations)
     shares: dict[str, Array] = {}
-    for leg, first in zip(equations.mechanism.legs, starts_of(equations), strict=False):
+    for leg, first in zip(equations.mechanism.legs, starts_of(equations)[:-1], strict=True):
         for number, spring in enumerate(leg.springs):
             if spring is not None:
                 place = first + number
                 amount = elastic[0, place, place] * shapes[place] ** 2
                 shares[spring.name] = shares.get(spring.name, 0.0) + amount
+    # The rest is the work of loads whose directions turn with the motion.
     turning = np.einsum("ik,ij,jk->k", shapes, geometric[0], shapes)
     return shares | ({TURNING_LOADS: turning} if np.abs(turning).max(initial=0.0) > 0.0 else {})
 
 
 def kinetic_shares(equations: Balance, solution: Modes) -> dict[str, Array]:
     """Return shares of the kinetic energy by part, of all modes with mass [modes]."""
-    squares = solution.squares[: solution.ringing]
+    inverse_squares = solution.inverse_squares[: solution.ringing]
     shares: dict[str, Array] = {}
 
     def add(name: str, matrix: Array, motions: Array) -> None:
-        shares[name] = shares.get(name, 0.0) + np.einsum("ik,ij,jk->k", motions, matrix, motions) / squares
+        shares[name] = shares.get(name, 0.0) + np.einsum("ik,ij,jk->k", motions, matrix, motions) / inverse_squares
 
     for masses, rates, motions, leg in _moving_parts(equations, solution):
         for name, matrix in mass_matrices(masses, rates, equations.mechanism.length):
             add(name, matrix[0], motions)
-        for number, spring in enumerate(leg.springs if leg else ()):
-            if leg and spring is not None and leg.rotors[0, number]:
+        if leg is None:
+            continue
+        for number, spring in enumerate(leg.springs):
+            if spring is not None and leg.rotors[0, number]:
                 rotor = leg.rotors[:, number] * equations.mechanism.length
                 add(f"rotor of {spring.name}", rotor[None], motions[number : number + 1])
     return shares
@@ -69,7 +72,7 @@ def effective_masses(equations: Balance, solution: Modes) -> list[tuple[float, f
     for masses, rates, motions, _ in _moving_parts(equations, solution):
         for mass, part in zip(masses.mass[0], rates, strict=True):
             momentum, moving_mass = momentum + mass * (part.velocity[0] @ motions), moving_mass + mass
-    scaled = momentum**2 / np.sqrt(solution.squares[: solution.ringing]) ** 2 * float(equations.mechanism.length[0])
+    scaled = momentum**2 / solution.inverse_squares[: solution.ringing] * float(equations.mechanism.length[0])
     shares = scaled / moving_mass if moving_mass else scaled
     return [(float(x), float(y), float(z)) for x, y, z in shares.T]
 
@@ -114,7 +117,7 @@ def small_motions(response: Response, equations: Balance, solution: Modes, numbe
     joule = float(equations.mechanism.force[0] * equations.mechanism.length[0])
     tool = (solution.tool[:, number] * amount * math.sqrt(joule)).tolist()
     return Deflection(
-        Wrench(ZERO, ZERO),
+        NO_WRENCH,
         Twist(Vector(*tool[:3]), Vector(*tool[3:])),
         tuple(
             replace(
