@@ -156,8 +156,8 @@ def test_commanded_coordinates_bring_the_loaded_tool_to_its_pose():
     settings = ["load.force=[6e3, 1e4, -1.6e4]", "tool.mass=20 kg", GRAVITY]
     machine = load_without_limits("hexapod", settings)
     answer = command(machine)
-    assert answer.before[0] > 1e-4
-    assert answer.left[0] < 1e-12
+    assert answer.distance_uncorrected[0] > 1e-4
+    assert answer.distance_corrected[0] < 1e-12
     ideal = forward(machine, dict(zip(answer.actuators, answer.coordinates[0].tolist(), strict=True))).present
     state = under_load(machine.with_values(ideal.pose))
     turned = Rotation.from_rotvec(np.array(state.displacement[:3])) * Rotation.from_matrix(ideal.rotation)
@@ -173,7 +173,7 @@ def test_commands_for_many_poses_are_those_for_each(tmp_path):
     for i in range(2):
         alone = command(machine.with_values(x=poses["x"][i], z=poses["z"][i]))
         assert answer.coordinates[i] == pytest.approx(alone.coordinates[0], abs=1e-14)
-    assert (answer.left[:2] < 1e-3 * answer.before[:2]).all()
+    assert (answer.distance_corrected[:2] < 1e-3 * answer.distance_uncorrected[:2]).all()
 
 
 @pytest.mark.parametrize("name", ["passive-leg-4dof-driven", "passive-leg-5dof-driven", "passive-leg-3dof-pu-driven"])

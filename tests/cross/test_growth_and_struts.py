@@ -121,8 +121,8 @@ def test_sections_of_machines_leg_by_leg_say_how_their_links_grow():
 def test_commands_take_growth_back():
     machine = load("hexapod", warmed("legs"))
     answer = command(machine)
-    assert answer.before[0] > 1e-5
-    assert answer.left[0] < 1e-12
+    assert answer.distance_uncorrected[0] > 1e-5
+    assert answer.distance_corrected[0] < 1e-12
     assert answer.coordinates[0] == pytest.approx(answer.unloaded[0] / (1.0 + GROWTH), rel=3e-7)
 
 

@@ -33,6 +33,7 @@ from kinetostat.machine.parameters import POSE, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.poses import PoseColumns, given_poses
@@ -42,28 +43,25 @@ POSES_IN_SLAB = Way.ANY_MACHINE.slab
 """Number of poses that are solved together: as many as of any other states of rest."""
 
 
-@dataclass(frozen=True)
-class ActuatorTargets:
+@dataclass(frozen=True, eq=False)
+class CommandedPoses:
     """Coordinates at which actuators of a loaded machine must stand at n poses; NaN where there is no state of rest.
 
     Attributes:
-        actuators: the actuators that can be commanded.
         coordinates: coordinates that bring the tool to its pose, or as near as they can, m or rad [n x actuators].
         unloaded: coordinates of the actuators at the pose without loads, m or rad [n x actuators].
-        before: distance of the tool point from its pose without a correction, m [n].
-        left: distance of the tool point from its pose with the correction, m [n]; no actuator can lessen it.
-        turned: angle by which the platform is still turned with the correction, rad [n].
-        rates: motion of the tool point per unit of each coordinate [n x 3 x actuators].
+        distance_uncorrected: distance of the tool point from its pose without a correction, m [n].
+        distance_corrected: distance of the tool point from its pose with the correction, m [n]; no actuator can lessen
+            it.
+        rotation_corrected: angle of the platform from its pose with the correction, rad [n].
         status: `Status` codes [n]: OK with coordinates, otherwise why there are none.
     """
 
-    actuators: tuple[Actuator, ...]
     coordinates: Array
     unloaded: Array
-    before: Array
-    left: Array
-    turned: Array
-    rates: Array
+    distance_uncorrected: Array
+    distance_corrected: Array
+    rotation_corrected: Array
     status: Integers
 
     @property
@@ -76,6 +74,23 @@ class ActuatorTargets:
         """Differences of the coordinates from those without loads, m or rad [n x actuators]."""
         return self.coordinates - self.unloaded
 
+
+ARRAYS_OF_POSES = [field.name for field in fields(CommandedPoses)]
+"""Names of the arrays of `CommandedPoses`, whose first axis are the poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorTargets(CommandedPoses):
+    """The commanded poses with the motion of the tool by each actuator.
+
+    Attributes:
+        actuators: the actuators that can be commanded.
+        rates: motion of the tool point per unit of each coordinate [n x 3 x actuators].
+    """
+
+    actuators: tuple[Actuator, ...]
+    rates: Array
+
     def split(self, count: int) -> tuple["ActuatorTargets", "ActuatorTargets"]:
         """The answer at the first `count` poses, and that at the others."""
         parts = slice(count), slice(count, None)
@@ -83,7 +98,7 @@ class ActuatorTargets:
         return first, others
 
 
-TARGET_ARRAYS = [field.name for field in fields(ActuatorTargets)][1:]
+TARGET_ARRAYS = [*ARRAYS_OF_POSES, "rates"]
 """Names of the arrays of `ActuatorTargets`, whose first axis are the poses."""
 
 
@@ -130,9 +145,9 @@ def _empty_targets(actuators: tuple[Actuator, ...], status: Integers) -> Actuato
         actuators=actuators,
         coordinates=np.full((count, size), np.nan),
         unloaded=np.full((count, size), np.nan),
-        before=np.full(count, np.nan),
-        left=np.full(count, np.nan),
-        turned=np.full(count, np.nan),
+        distance_uncorrected=np.full(count, np.nan),
+        distance_corrected=np.full(count, np.nan),
+        rotation_corrected=np.full(count, np.nan),
         rates=np.full((count, 3, size), np.nan),
         status=status,
     )
@@ -172,7 +187,7 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
     commanded = commanded_state(mechanism)
     equations = commanded.solution.balance
     stable = commanded.solution.settled & stabilities(equations).stable
-    left = np.linalg.norm(commanded.error[:, 3:], axis=1) * length
+    distance = np.linalg.norm(commanded.error[:, 3:], axis=1) * length
 
     def where_stable(array: Array) -> Array:
         return np.where(stable.reshape(-1, *[1] * (array.ndim - 1)), array, np.nan)
@@ -181,9 +196,9 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
         actuators=tuple(actuators),
         coordinates=where_stable(unloaded + equations.state.amounts * units),
         unloaded=where_stable(unloaded),
-        before=where_stable(np.linalg.norm(commanded.first_error[:, 3:], axis=1) * length),
-        left=where_stable(np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)),
-        turned=where_stable(np.linalg.norm(commanded.error[:, :3], axis=1)),
+        distance_uncorrected=where_stable(np.linalg.norm(commanded.first_error[:, 3:], axis=1) * length),
+        distance_corrected=where_stable(np.where(distance > ROUND_OFF_OF_ENTRY * length, distance, 0.0)),
+        rotation_corrected=where_stable(np.linalg.norm(commanded.error[:, :3], axis=1)),
         rates=where_stable(commanded.rates[:, 3:] * (length[:, None] / units)[:, None]),
         status=np.where(stable, Status.OK, status).astype(np.int64),
     )
@@ -200,11 +215,9 @@ def _actuators(
         actuators = actuators_of(response.configuration)
         senses = stacked_columns(senses_of(response.configuration), count)
         return actuators, stacked_columns([actuator.coordinate for actuator in actuators], count), senses
-    # A coordinate that counts from the home pose depends on the geometry there, which seldom varies: one home for all.
-    tables = {path: column for path, column in columns.items() if path.split(".")[0] in machine.family.tables}
-    geometry = {path: column for path, column in tables.items() if not path.startswith("pose.")}
-    homes = [{path: float(column[i]) for path, column in geometry.items()} for i in range(count if geometry else 1)]
-    actuators_at_homes = [joint_actuators(with_values(machine, home).chains(), leg_names(machine)) for home in homes]
+    actuators_at_homes = [
+        joint_actuators(home.chains(), leg_names(machine)) for home in _homes(machine, columns, count)
+    ]
     actuators_at_home = actuators_at_homes[0]
     placed = [actuator.at(joints.coordinates) for actuator in actuators_at_home]
     signs = np.array([[actuator.sign for actuator in row] for row in actuators_at_homes])
@@ -214,8 +227,17 @@ def _actuators(
     return placed, stacked_columns([actuator.coordinate for actuator in placed], count) + offsets, senses
 
 
+def _homes(machine: Machine, columns: Mapping[str, Array], count: int) -> list[Machine]:
+    """The machines from whose home poses coordinates count: one for all poses unless the geometry varies with them."""
+    varied = {path: column for path, column in columns.items() if path.split(".")[0] in machine.family.tables}
+    geometry = {path: column for path, column in varied.items() if not path.startswith(POSE)}
+    rows = range(count if geometry else 1)
+    return [with_values(machine, {path: float(column[row]) for path, column in geometry.items()}) for row in rows]
+
+
+@former_names(before="distance_uncorrected", left="distance_corrected", turned="rotation_corrected")
 @dataclass(frozen=True, eq=False)
-class Command(ImmutableAnswer):
+class Command(CommandedPoses, ImmutableAnswer):
     """Coordinates of the actuators that put the loaded tool where an unloaded machine would have it.
 
     Attributes:
@@ -223,12 +245,6 @@ class Command(ImmutableAnswer):
         poses: the poses that are wanted; None for the pose of the machine alone.
         actuators: names of the actuators.
         units: unit of each coordinate, "m" or "rad".
-        coordinates: coordinates to command, m or rad [poses x actuators]; NaN where there is no state of rest.
-        unloaded: coordinates of the actuators at the pose without loads, m or rad [poses x actuators].
-        before: distance of the tool point from its pose without a correction, m [poses].
-        left: distance of the tool point from its pose with the correction, m [poses]: no actuator can change it.
-        turned: angle by which the platform is still turned with the correction, rad [poses].
-        status: `Status` codes [poses]: OK with coordinates, otherwise why there are none.
         message: the answer in a sentence.
     """
 
@@ -236,23 +252,7 @@ class Command(ImmutableAnswer):
     poses: PoseColumns | None
     actuators: tuple[str, ...]
     units: tuple[str, ...]
-    coordinates: Array
-    unloaded: Array
-    before: Array
-    left: Array
-    turned: Array
-    status: Integers
     message: str
-
-    @property
-    def settled(self) -> Mask:
-        """Whether the machine comes to rest [poses]."""
-        return self.status == Status.OK
-
-    @property
-    def corrections(self) -> Array:
-        """Differences of the coordinates from those without loads, m or rad [poses x actuators]."""
-        return self.coordinates - self.unloaded
 
     def __repr__(self) -> str:
         return f"<Command of {self.machine.name!r}: {len(self.coordinates)} poses>"
@@ -310,6 +310,7 @@ def home_coordinates(machine: Machine) -> dict[str, float]:
 def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
     """Refuse a machine as drawn, whose numbers are not those that the fit has found."""
     if record.numbers is None:
+        # The fit of a family in closed form writes the machine as built leg by leg: the family itself is the drawing.
         drawn = record.family == machine.family.name and machine.family.chains is None
     else:
         numbers = values(machine)
@@ -351,12 +352,7 @@ def command_of(machine: Machine, poses: PoseColumns | None, answer: ActuatorTarg
         poses=poses,
         actuators=tuple(actuator.name for actuator in answer.actuators),
         units=tuple(actuator.unit for actuator in answer.actuators),
-        coordinates=answer.coordinates,
-        unloaded=answer.unloaded,
-        before=answer.before,
-        left=answer.left,
-        turned=answer.turned,
-        status=answer.status,
+        **{name: getattr(answer, name) for name in ARRAYS_OF_POSES},
         message=f"{_message(machine, leaves, answer)}{limits} {doubt}".rstrip(),
     )
 
@@ -366,9 +362,11 @@ def _message(machine: Machine, columns: Mapping[str, Array], answer: ActuatorTar
     without = "" if settled.all() else without_command(machine, columns, answer.status)
     if not settled.any():
         return without
+    corrected, uncorrected = (
+        show(float(np.nanmax(distances)), "m") for distances in (answer.distance_corrected, answer.distance_uncorrected)
+    )
     return (
-        f"Commanded so, the tool point is off by at most {show(float(np.nanmax(answer.left)), 'm')}; without a "
-        f"correction by {show(float(np.nanmax(answer.before)), 'm')}. {without}"
+        f"Commanded so, the tool point is off by at most {corrected}; without a correction by {uncorrected}. {without}"
     ).rstrip()
 
 
@@ -401,8 +399,9 @@ def _limits_passed(machine: Machine, columns: Mapping[str, Array], settled: Mask
     names, rows = [limit.name for limit in limits_set(machine.tables["limits"])], np.flatnonzero(settled)
     if not (names and rows.size):
         return ""
-    path, number = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
-    placed = {path: np.full(len(settled), number), **columns}
+    # The table of poses needs a column also where nothing varies: one coordinate of the pose, as it is.
+    coordinate, number = next((path, value) for path, value in values(machine).items() if path.startswith(POSE))
+    placed = {coordinate: np.full(len(settled), number), **columns}
     limits_first_passed = first_limit_passed(machine, {path: column[rows] for path, column in placed.items()}, names)
     places = np.flatnonzero(limits_first_passed >= 0)
     if not places.size:

@@ -26,6 +26,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.commanding import (
     ActuatorTargets,
     Command,
@@ -171,6 +172,7 @@ def _with_harmonics(terms: Sequence[Term], axis: int, harmonics: int) -> tuple[T
     return tuple((*term[:axis], wave, *term[axis + 1 :]) for term in terms for wave in waves)
 
 
+@former_names(before="error_uncorrected", left="error_of_exact")
 @dataclass(frozen=True, eq=False)
 class CorrectionTable(ImmutableAnswer):
     """Corrections of the actuators' coordinates over a grid.
@@ -179,8 +181,8 @@ class CorrectionTable(ImmutableAnswer):
         command: coordinates with and without loads at each point, the last axis fastest.
         fields: fields of the axes.
         axes: values along each, SI.
-        before: the largest error of the tool point without corrections, at points and middles of cells, m.
-        left: the largest error that exact commands leave, m: what no actuator of the machine can change.
+        error_uncorrected: the largest error of the tool point without corrections, at points and middles of cells, m.
+        error_of_exact: the largest error that exact commands leave, m: what no actuator of the machine can change.
         error: the largest further error by interpolation, at the middles of cells, m; NaN if no cell is complete.
         unknown: number of cells with a corner or middle without a command.
         law: the shortest law of the corrections.
@@ -193,8 +195,8 @@ class CorrectionTable(ImmutableAnswer):
     command: Command
     fields: tuple[Parameter, ...]
     axes: tuple[Array, ...]
-    before: float
-    left: float
+    error_uncorrected: float
+    error_of_exact: float
     error: float
     unknown: int
     law: Law
@@ -278,10 +280,11 @@ def _table_of(
     errors = _errors(cells, _at_middles(nodes.corrections, grid.shape))
     largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
     unknown = int((~np.isfinite(errors)).sum())
-    before, left = (
-        float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)]))) for name in ("before", "left")
+    uncorrected, of_exact = (
+        float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)])))
+        for name in ("distance_uncorrected", "distance_corrected")
     )
-    tolerance = GOOD_ENOUGH * before if wanted is None else wanted
+    tolerance = GOOD_ENOUGH * uncorrected if wanted is None else wanted
 
     def error(law: Law) -> float:
         ends = [_errors(nodes, law.at(points)), _errors(cells, law.at(points_of_cells))]
@@ -296,15 +299,15 @@ def _table_of(
         command=command_of(machine, PoseColumns(fields, points, {}), nodes),
         fields=fields,
         axes=axes,
-        before=before,
-        left=left,
+        error_uncorrected=uncorrected,
+        error_of_exact=of_exact,
         error=largest,
         unknown=unknown,
         law=law,
         law_error=law_error,
         tolerance=tolerance,
-        exact=law_error <= EXACT_LAW * before,
-        message=_message(machine, before, left, largest, missing),
+        exact=law_error <= EXACT_LAW * uncorrected,
+        message=_message(machine, uncorrected, of_exact, largest, missing),
     )
 
 
@@ -329,16 +332,16 @@ def _errors(solved: ActuatorTargets, corrections: Array) -> Array:
     return np.asarray(np.linalg.norm(distance, axis=1))
 
 
-def _message(machine: Machine, before: float, left: float, error: float, missing: str) -> str:
+def _message(machine: Machine, uncorrected: float, of_exact: float, error: float, missing: str) -> str:
     show = machine.display.show_deflection
-    if not before:
+    if not uncorrected:
         return (
             "No load moves the tool, so that there is nothing to correct; give [load] a force, or gravity and masses."
         )
-    sentences = [f"Without corrections the tool point is off by at most {show(before, 'm')}."]
+    sentences = [f"Without corrections the tool point is off by at most {show(uncorrected, 'm')}."]
     if np.isfinite(error):
         sentences.append(
             f"Interpolated linearly, the table leaves at most {show(error, 'm')} (at the middles of its cells)"
-            + (f", beside the {show(left, 'm')} that no actuator can change." if left > 0.0 else ".")
+            + (f", beside the {show(of_exact, 'm')} that no actuator can change." if of_exact > 0.0 else ".")
         )
     return " ".join([*sentences, missing]).rstrip()

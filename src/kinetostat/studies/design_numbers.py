@@ -37,6 +37,8 @@ BUILT_ERROR = "built_error"
 """A number beside the quantities: the error that 95 % of the machines within the tolerances of a file do not exceed."""
 DISPLACEMENT = "displacement"
 """A number beside the quantities: the distance that the tool point moves, whose components are this group."""
+NUMBERS_BESIDE_QUANTITIES = (DISPLACEMENT, BUILT_ERROR)
+"""Numbers of a design that `evaluate` does not know; both are lengths, of which less is better."""
 USUAL_QUANTITIES = ("compliance", "singularity_margin")
 """Quantities over poses, if none is named."""
 
@@ -129,15 +131,20 @@ def _index_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
 
 def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
     """Numbers that only designs have whose files give masses, a cut, loads or tolerances."""
-    numbers_of_designs = [_at_pose(analysis.state) for analysis in analyses]
-    for name, unit, better in (
-        ("first natural frequency", "Hz", Better.MORE),
-        ("stable width of cut", "m", Better.MORE),
-        ("displacement under load", "m", Better.LESS),
-        ("error as built, 95 %", "m", Better.LESS),
-    ):
-        values_of_designs = tuple(numbers.get(name) for numbers in numbers_of_designs)
-        yield DesignRow("loads and vibration", name, unit, better, values_of_designs)
+    rows: list[tuple[str, str, Better, Callable[[Machine], str]]] = [
+        ("first natural frequency", "Hz", Better.MORE, _name_of_frequency),
+        ("stable width of cut", "m", Better.MORE, lambda _: "stable_width"),
+        (
+            "displacement under load",
+            "m",
+            Better.LESS,
+            lambda machine: DISPLACEMENT if platform_is_loaded(machine) else "",
+        ),
+        ("error as built, 95 %", "m", Better.LESS, lambda machine: BUILT_ERROR if machine.tolerances else ""),
+    ]
+    for title, unit, better, name_of in rows:
+        numbers = tuple(_at_pose(analysis.state, name_of(analysis.state.machine)) for analysis in analyses)
+        yield DesignRow("loads and vibration", title, unit, better, numbers)
 
 
 def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> Iterator[DesignRow]:
@@ -155,6 +162,7 @@ def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> I
 
 def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
     diagonal = analysis.compliance_diagonal if group == "compliance" else analysis.stiffness_diagonal
+    # The diagonal is empty where the analysis has no matrices.
     return dict(zip(analysis.components, diagonal, strict=False)).get(name)
 
 
@@ -173,32 +181,28 @@ def _number_or_none(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _at_pose(state: MachineState) -> dict[str, float | None]:
-    """First frequency, stable width, displacement and error as built, as far as the file gives what they need."""
-    machine, result = state.machine, dict[str, float | None]()
-    if state.status is not Status.OK:
-        return result
-    point = point_of_file(machine)
-    frequency = "loaded_frequency_1" if machine.loaded else "frequency_1"
-    names_by_row = {"first natural frequency": frequency, "stable width of cut": "stable_width"}
-    if platform_is_loaded(machine):
-        names_by_row["displacement under load"] = DISPLACEMENT
-    if machine.tolerances:
-        names_by_row["error as built, 95 %"] = BUILT_ERROR
-    for row, name in names_by_row.items():
-        try:
-            refuse_absent(state, _quantities_of(machine, name))
-        except InputError:  # the file gives no masses or no cut: the row has a dash
-            continue
-        result[row] = _number_or_none(_numbers_of(machine, point, [name])[0][name][0])
-    return result
+def _name_of_frequency(machine: Machine) -> str:
+    return "loaded_frequency_1" if machine.loaded else "frequency_1"
+
+
+def _at_pose(state: MachineState, name: str) -> float | None:
+    """A number of a machine at its pose; None without a name, or where the file does not give what the number needs."""
+    if not name or state.status is not Status.OK:
+        return None
+    machine = state.machine
+    try:
+        refuse_absent(state, _quantities_of(machine, name))
+    except InputError:  # the file gives no masses or no cut: the row has a dash
+        return None
+    numbers, _ = _numbers_of(machine, point_of_file(machine), [name])
+    return _number_or_none(numbers[name][0])
 
 
 def _quantities_of(machine: Machine, name: str) -> list[str]:
     """The quantities from which a number of a design is computed."""
-    return (
-        [] if name == BUILT_ERROR else resolve_quantities([name], machine.family.component_names, cable_count(machine))
-    )
+    if name == BUILT_ERROR:
+        return []
+    return resolve_quantities([name], machine.family.component_names, cable_count(machine))
 
 
 def _names_by_design(
@@ -225,7 +229,7 @@ def _names_by_design(
             except InputError as error:
                 refusals.append(error)
                 continue
-            result[place] += [name] if name == BUILT_ERROR else [*([DISPLACEMENT] * (name == DISPLACEMENT)), *members]
+            result[place] += [name, *members] if name in NUMBERS_BESIDE_QUANTITIES else members
         if len(refusals) == len(analyses):
             raise refusals[0]
     return [[*dict.fromkeys(names)] for names in result]
@@ -235,14 +239,15 @@ def _numbers_of(
     machine: Machine, points: Points, names: Sequence[str], progress: Progress = silent
 ) -> tuple[dict[str, Array], Array]:
     """Numbers at points by name [points], NaN where there is none, and whether each point has a result [points]."""
-    quantities = [name for name in names if name not in (DISPLACEMENT, BUILT_ERROR)]
+    quantities = [name for name in names if name not in NUMBERS_BESIDE_QUANTITIES]
     if DISPLACEMENT in names:
         quantities += _quantities_of(machine, DISPLACEMENT)
     evaluation = evaluate(machine, points, [*dict.fromkeys(quantities)] or ["singularity_margin"], progress)
     answered, result = evaluation.status == Status.OK, dict[str, Array]()
     for name in names:
         if name == DISPLACEMENT:
-            translations = [each for each in _quantities_of(machine, DISPLACEMENT) if not each[-2:].startswith("r")]
+            components = {each: QUANTITIES[each].components for each in _quantities_of(machine, DISPLACEMENT)}
+            translations = [each for each, (component,) in components.items() if not component.startswith("r")]
             result[name] = np.linalg.norm([evaluation.values[each] for each in translations], axis=0)
         elif name == BUILT_ERROR:
             result[name] = np.full(points.size, np.nan)
@@ -256,7 +261,7 @@ def _numbers_of(
 
 def _unit_and_better(name: str) -> tuple[str, Better | None]:
     """The unit of a number, and whether less or more of it is better."""
-    if name in (DISPLACEMENT, BUILT_ERROR):
+    if name in NUMBERS_BESIDE_QUANTITIES:
         return "m", Better.LESS
     quantity = QUANTITIES[name]
     return quantity.unit, Better(quantity.better) if quantity.better else None

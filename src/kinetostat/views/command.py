@@ -57,7 +57,10 @@ def _poses_table(answer: Command) -> FittedTable:
         if answer.settled[i]:
             pairs = zip(row, answer.units, strict=True)
             cells = [coordinate_text(float(value), unit, display) for value, unit in pairs]
-            cells += [display.show_deflection(float(errors[i]), "m") for errors in (answer.before, answer.left)]
+            cells += [
+                display.show_deflection(float(errors[i]), "m")
+                for errors in (answer.distance_uncorrected, answer.distance_corrected)
+            ]
         status = [] if all_settled else [Status(int(answer.status[i])).phrase]
         table.add_row(str(i + 1), *cells, *status)
     return table
@@ -90,9 +93,9 @@ COMMAND = Description(
         Field("units"),
         Field("coordinates"),
         Field("unloaded"),
-        Field("error_before", "before"),
-        Field("error_left", "left"),
-        Field("rotation_left", "turned"),
+        Field("error_before", "distance_uncorrected"),
+        Field("error_left", "distance_corrected"),
+        Field("rotation_left", "rotation_corrected"),
         Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
     ),
     lines=lambda answer: [("Commands", answer.message)],
@@ -106,7 +109,7 @@ COMMAND = Description(
 def correction_lines(answer: CorrectionTable) -> Lines:
     """Say what corrections take away, and how short their law is."""
     yield "Corrections", answer.message
-    if not answer.before:
+    if not answer.error_uncorrected:
         return
     law, display = answer.law, answer.machine.display
     error, wanted = (display.show_deflection(value, "m") for value in (answer.law_error, answer.tolerance))
@@ -130,7 +133,7 @@ def correction_lines(answer: CorrectionTable) -> Lines:
 
 def correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTable]:
     """Give the least and largest correction of each actuator, and the coefficients of the law."""
-    if not answer.before:
+    if not answer.error_uncorrected:
         return
     commands, display = answer.command, answer.machine.display
     ranges = numeric_table("Corrections: what is added to each actuator", "actuator", ["least", "largest"])
@@ -202,8 +205,8 @@ CORRECTIONS = Description(
         Field("units", "command.units"),
         Field("corrections"),
         Field("coordinates", lambda answer: answer.command.coordinates.reshape(answer.corrections.shape)),
-        Field("error_before", "before"),
-        Field("error_left", "left"),
+        Field("error_before", "error_uncorrected"),
+        Field("error_left", "error_of_exact"),
         Field("error_of_table", "error"),
         Field("cells_unknown", "unknown"),
         Field("law", law_fields),

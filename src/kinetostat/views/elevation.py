@@ -72,7 +72,7 @@ def _lines(answer: Elevation) -> Lines:
         size = f"{display.show_deflection(float(answer.error[place]), 'm')} {_elevation_text(answer, place)}"
         yield "As built", f"95 % of all machines are off by at most {size}; kinetostat budget says by what."
     yield from correction_lines(answer.corrections)
-    if answer.corrections.before:
+    if answer.corrections.error_uncorrected:
         yield "Angle", "gravity_angle is 90 deg - elevation."
 
 
