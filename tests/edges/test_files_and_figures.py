@@ -22,7 +22,7 @@ from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import save_figure
 from kinetostat.views.grid_figures import contour_maps, grid_curves
-from kinetostat.views.guidelines import guideline_figures
+from kinetostat.views.guideline_figures import guideline_figures
 from kinetostat.views.layout import _CachedTightBox
 from kinetostat.views.map_scales import levels_of
 from kinetostat.views.sensitivity import sensitivity_figure

@@ -31,12 +31,12 @@ SECONDS_TO_ANSWER = 3600
 """Processor time of a question, s: an hour, after which nobody waits in front of a page."""
 MEMORY_TO_ANSWER = 4 << 30
 """Address space of the process, bytes: that of a large map with room to spare; a hostile one ends there."""
-SHOWN = "shown.html"
-"""The answer as the page shows it."""
-ANSWER = "answer"
+ANSWER_PAGE = "shown.html"
+"""File of the answer as the page shows it."""
+ANSWER_STEM = "answer"
 """Stem of the names of the answer's other files."""
 MACHINE_FILE = "machine.toml"
-SENT = "sent"
+UPLOAD_FOLDER = "sent"
 """Folder of the files that were sent, within that of the process."""
 
 
@@ -47,9 +47,10 @@ def label_of(option: Option) -> str:
 
 def in_words_of_the_page(question: Question, text: str) -> str:
     """Return a text in which options have their names on the page, not those of the command line or of Python."""
+    # The longest flag first, because a shorter one may be its beginning.
     for option in sorted(question.options, key=lambda option: -len(option.flag)):
         text = text.replace(option.flag, f'"{label_of(option)}"')
-        if text.startswith(f"{option.name} "):
+        if text.startswith(f"{option.name} "):  # messages begin with the name of the argument in Python
             text = label_of(option) + text.removeprefix(option.name)
     return text
 
@@ -82,7 +83,7 @@ def _value(option: Option, text: str) -> Any:
     if option.choices:
         return choice(text, option.choices, label_of(option))
     if option.kind == "file":
-        return Path(SENT) / Path(text).name
+        return Path(UPLOAD_FOLDER) / Path(text).name
     reader: Callable[[str], Any] = READERS.get(option.kind, str)  # type: ignore[assignment]
     try:
         return reader(text)
@@ -123,7 +124,7 @@ def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
 
     Args:
         request: its `word`, the `options` that were given, and whether tables show every row (`full`).
-        tell: the function that is called with how much is done, and of how much, and perhaps with a few words.
+        tell: called as tell(done, total), or as tell(done, total, words), while the question is being answered.
 
     Raises:
         InputError: what the question refuses.
@@ -138,8 +139,8 @@ def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
     description = description_of(answer)
     if description.answered(answer):
         for form in description.forms:
-            write_form(description, answer, form, Path(f"{ANSWER}.{form}"))
-    write_text(Path(SHOWN), answer_html(description, answer, bool(request["full"])))
+            write_form(description, answer, form, Path(f"{ANSWER_STEM}.{form}"))
+    write_text(Path(ANSWER_PAGE), answer_html(description, answer, bool(request["full"])))
 
 
 def _tell(done: int, total: int, _words: str = "") -> None:

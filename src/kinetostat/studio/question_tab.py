@@ -21,13 +21,13 @@ from kinetostat.studio.elements import MAIN_BUTTON, choice, icon_button, upload_
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.processes import REFUSED, Turns, make_modest
 from kinetostat.studio.question_process import (
-    ANSWER,
+    ANSWER_PAGE,
+    ANSWER_STEM,
     ASKING_PROGRAM,
     MACHINE_FILE,
     MEMORY_TO_ANSWER,
     SECONDS_TO_ANSWER,
-    SENT,
-    SHOWN,
+    UPLOAD_FOLDER,
     in_words_of_the_page,
     label_of,
 )
@@ -221,13 +221,13 @@ class AskTab:
         folder = TemporaryDirectory()
         try:
             place = Path(folder.name)
-            (place / SENT).mkdir()
+            (place / UPLOAD_FOLDER).mkdir()
             (place / MACHINE_FILE).write_bytes(self._session.as_file()[1])
             for name, data in sent.items():
-                (place / SENT / name).write_bytes(data)
+                (place / UPLOAD_FOLDER / name).write_bytes(data)
             async with ASKING.turn(self.button.client.id):
                 problem = await self._run(place, json.dumps(request).encode())
-            shown = "" if problem else await run.io_bound(_read_answer, place / SHOWN)
+            shown = "" if problem else await run.io_bound(_read_answer, place / ANSWER_PAGE)
         except InputError as error:
             problem, shown = str(error), ""
         finally:
@@ -244,7 +244,7 @@ class AskTab:
         self._folder = folder
         self.answer.set_content(str(shown))
         for form, button in self.files.items():
-            button.set_visibility((place / f"{ANSWER}.{form}").exists())
+            button.set_visibility((place / f"{ANSWER_STEM}.{form}").exists())
         self.note_change()
 
     async def _run(self, folder: Path, request: bytes) -> str:
@@ -299,7 +299,7 @@ class AskTab:
 
     def _send(self, form: str) -> None:
         if self._folder is not None:
-            ui.download.file(Path(self._folder.name) / f"{ANSWER}.{form}", f"{self.choice.value}.{form}")
+            ui.download.file(Path(self._folder.name) / f"{ANSWER_STEM}.{form}", f"{self.choice.value}.{form}")
 
 
 def _import_questions(words: tuple[str, ...]) -> dict[str, Question]:

@@ -207,18 +207,16 @@ def elevation_figures(answer: Elevation) -> dict[str, Drawing]:
 def elevation_figure(answer: Elevation, title: str = "{}: over elevation") -> "Figure":
     """Draw displacement, rotation, frequency, loads, error and corrections over the elevation, a panel for each."""
     contents = _panel_contents(answer)
-    rows = -(-len(contents) // 2)
+    rows, _ = figures.grid_shape(len(contents), most_columns=2)
     heights = answer.machine.display.scale("rad")
     notes = setting_of(answer.machine), "dotted lines: loads reverse" if answer.reversals else ""
     with figures.new_figure(
         (7.0, ROOM_FOR_TITLE + PANEL_HEIGHT * rows), title.format(answer.machine.name), *notes
     ) as figure:
-        panels = list(figure.subplots(rows, 2, squeeze=False, sharex=True).flat)
-        for panel, content in zip(panels, contents, strict=False):
+        panels = figures.panel_grid(figure, len(contents), most_columns=2, sharex=True)
+        for panel, content in zip(panels, contents, strict=True):
             _draw_panel(panel, answer, content, heights.factor)
-        for unused in panels[len(contents) :]:
-            unused.set_visible(False)
-        for panel in panels[max(0, len(contents) - 2) : len(contents)]:  # the last of both columns
+        for panel in panels[-2:]:  # the last of both columns
             panel.set_xlabel(heights.label("elevation"))
             panel.tick_params(labelbottom=True)
     return figure

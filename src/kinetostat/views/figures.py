@@ -4,6 +4,7 @@ What a figure shows is drawn by the module of its answer.
 """
 
 import io
+import math
 import struct
 import textwrap
 import zlib
@@ -60,10 +61,14 @@ METRES_PER_INCH = 0.0254
 """Metres of an inch: PNG states its resolution in pixels per metre."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
+NO_RESULT_COLOUR = "#eeeeee"
+"""Pale grey of poses without a result."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 """Dashes of curves, which tell them apart without colours."""
 NOTE_CHARACTERS_PER_INCH, TITLE_CHARACTERS_PER_INCH = 19, 12
 """Characters of the notes below a figure and of its title that fit into an inch, at 6.5 and 10 points."""
+MOST_COLUMNS = 3
+"""Panels side by side, as a rule at most: with more, a figure would be wider than a page."""
 PAGE_MARGIN = 0.04
 """Room around a figure that stands in a page, inches: the page has margins of its own."""
 
@@ -90,6 +95,30 @@ def new_figure(size: tuple[float, float], title: str | None = None, *notes: str)
         if notes:
             note_setting(figure, *notes)
         fix_layout(figure)
+
+
+def grid_shape(count: int, most_columns: int = MOST_COLUMNS) -> tuple[int, int]:
+    """Return the numbers of rows and of columns of so many panels, which are filled row by row."""
+    columns = min(most_columns, count)
+    return math.ceil(count / columns), columns
+
+
+def panel_grid(
+    figure: Figure, count: int, most_columns: int = MOST_COLUMNS, sharex: bool = False, sharey: bool = False
+) -> list[Axes]:
+    """Add panels to a figure row by row, and return them; what is left over of the last row stays empty.
+
+    Args:
+        figure: the figure, which has no panels yet.
+        count: number of panels.
+        most_columns: number of panels side by side at most.
+        sharex, sharey: whether all panels have one scale across, and up.
+    """
+    shape = grid_shape(count, most_columns)
+    panels = list(figure.subplots(*shape, squeeze=False, sharex=sharex, sharey=sharey).flat)
+    for unused in panels[count:]:
+        unused.remove()
+    return panels[:count]
 
 
 def save(
@@ -218,7 +247,7 @@ def fill_regions(panel: Axes, x: Array, y: Array, places: Any, has_result: Any, 
         has_result: whether there is a result; elsewhere the panel is grey [y x x].
         colours: the colours from which they are taken.
     """
-    panel.set_facecolor("#eeeeee")
+    panel.set_facecolor(NO_RESULT_COLOUR)
     panel.grid(visible=False)
     shown, end = np.ma.masked_array(places, ~has_result), len(colours) - 0.5
     palette = ListedColormap(colours)

@@ -1,4 +1,4 @@
-"""Figures of answers over a grid: curves, contour maps, and regions where the same legs carry.
+"""Figures of answers over a grid: curves over one field, contours over two, and regions in which the same legs carry.
 
 Nothing is computed here.
 """
@@ -22,7 +22,18 @@ from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, plain_name
 from kinetostat.studies.datasets import LOADS_LEFT_OUT, failures
 from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
-from kinetostat.views.figures import STYLE, fill_regions, look_of, missing_line, new_figure, region_colours, slim_bar
+from kinetostat.views.figures import (
+    NO_RESULT_COLOUR,
+    STYLE,
+    fill_regions,
+    grid_shape,
+    look_of,
+    missing_line,
+    new_figure,
+    panel_grid,
+    region_colours,
+    slim_bar,
+)
 from kinetostat.views.grid import axis_values, display_of, frequent_sets, quantities_of
 from kinetostat.views.map_scales import levels_of, set_axis_scales, thin_numbers, trim_height
 from kinetostat.views.question import Drawing
@@ -36,6 +47,8 @@ MOST_CURVES_WITH_LEGEND_INSIDE = 6
 """Number of curves up to which the legend stands in the panel; the legend of more would cover them."""
 SAME_ON_MAP = 1e-9
 """Relative spread of values up to which a map is constant: its contours would only follow round-off."""
+CONSTANT_COLOUR = "#b5dbe3"
+"""Pale blue of a map that is constant: no band of a contour map has it."""
 MOST_COLOURED_COUNTS = 12
 """Number of whole values up to which each has a colour; more colours cannot be told apart, and contours are drawn."""
 LEGEND_ROW = 0.17
@@ -91,32 +104,43 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         names: the quantities.
         title: title of the whole figure.
     """
-    across, up = dataset["status"].dims
-    columns = min(3, len(names))
-    rows = -(-len(names) // columns)
+    rows, columns = grid_shape(len(names))
     (width, height), (room_beside, room_above) = MAP_SIZE, ROOM_BESIDE_MAPS
-    with new_figure(
-        (width * columns + room_beside, height * rows + room_above), title, *setting_lines(dataset)
-    ) as figure:
+    size = width * columns + room_beside, height * rows + room_above
+    with new_figure(size, title, *setting_lines(dataset)) as figure:
         mpl.rcParams["axes.grid"] = False
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        x, x_label = axis_values(dataset, str(across))
-        y, y_label = axis_values(dataset, str(up))
-        lines = []
-        for place, (panel, name) in enumerate(zip(panels, names, strict=False)):
-            scale = display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
-            panel_of = _count_panel if _is_count(dataset[name]) else _contour_panel
-            lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
-            _label_outside(panel, x_label if place + columns >= len(names) else "", "" if place % columns else y_label)
-            set_axis_scales(panel, dataset, str(across), str(up))
-            thin_numbers(panel)
-        trim_height(figure, figure.axes[0], SQUARE_HEIGHT * rows)
-        for unused in list(figure.axes)[len(names) : rows * columns]:
-            unused.remove()
-    with mpl.rc_context(STYLE):
+        panels, lines = panel_grid(figure, len(names)), []
+        for place, (panel, name) in enumerate(zip(panels, names, strict=True)):
+            is_lowest, is_first = place + columns >= len(names), place % columns == 0
+            lines += _draw_map(panel, dataset, name, is_lowest, is_first)
+        trim_height(figure, panels[0], SQUARE_HEIGHT * rows)
+    with mpl.rc_context(STYLE):  # the values of contours need the layout, which is fixed as the figure ends
         for contours in lines:
             _write_levels(contours)
     return figure
+
+
+def _draw_map(
+    panel: Axes, dataset: xr.Dataset, name: str, labels_across: bool, labels_up: bool
+) -> list[QuadContourSet]:
+    """Draw a quantity over two dimensions, and return the lines whose values are still to be written.
+
+    Args:
+        panel: the panel to fill.
+        dataset: two-dimensional, from `studies.datasets.evaluate_grid`.
+        name: the quantity.
+        labels_across, labels_up: whether the axes are labelled here; else a panel below or to the left has the label.
+    """
+    across, up = map(str, dataset["status"].dims)
+    (x, x_label), (y, y_label) = axis_values(dataset, across), axis_values(dataset, up)
+    scale = display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
+    fill = _count_panel if _is_count(dataset[name]) else _contour_panel
+    lines = fill(panel, x, y, dataset[name].transpose(up, across), scale)
+    panel.set(xlabel=x_label if labels_across else "", ylabel=y_label if labels_up else "")
+    panel.tick_params(labelbottom=labels_across, labelleft=labels_up)
+    set_axis_scales(panel, dataset, across, up)
+    thin_numbers(panel)
+    return lines
 
 
 def grid_curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
@@ -148,14 +172,14 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: S
     """Fill a panel with bands of colour; return its lines, whose values can be written when the layout is fixed."""
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
-    panel.set_facecolor("#eeeeee")
+    panel.set_facecolor(NO_RESULT_COLOUR)
     panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
     panel.locator_params(nbins=MOST_TICK_INTERVALS)
     if values.count() == 0:
         _write_in_middle(panel, "no result")
         return []
     if np.ptp(values.compressed()) <= SAME_ON_MAP * np.abs(values).max():
-        panel.set_facecolor("#b5dbe3")
+        panel.set_facecolor(CONSTANT_COLOUR)
         _write_in_middle(panel, f"constant: {with_unit(number(float(values.compressed()[0])), scale.unit)}")
         return []
     levels = levels_of(values.compressed())
@@ -168,21 +192,20 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: S
     return [panel.contour(filled, levels=levels.bounds[::2], colors="white", linewidths=0.5)]
 
 
-def _label_outside(panel: Axes, x_label: str, y_label: str) -> None:
-    """Label the axes of a panel of several that share them; a label is empty where another panel has it."""
-    panel.set(xlabel=x_label, ylabel=y_label)
-    panel.tick_params(labelbottom=bool(x_label), labelleft=bool(y_label))
-
-
 def _is_count(data: xr.DataArray) -> bool:
     """Return whether a quantity counts, and takes so few values that each can have a colour."""
     name = str(data.name)
-    return name in QUANTITIES and QUANTITIES[name].whole and np.unique(data.values).size <= MOST_COLOURED_COUNTS
+    return name in QUANTITIES and QUANTITIES[name].whole and _counts(data).size <= MOST_COLOURED_COUNTS
+
+
+def _counts(data: xr.DataArray) -> Array:
+    """Return the values that a quantity has at poses with a result, each once."""
+    return np.unique(data.values[np.isfinite(data.values)])
 
 
 def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
     """Fill a panel with a colour for each whole number; between two poses there is no line to draw."""
-    values = np.unique(data.values[np.isfinite(data.values)])
+    values = _counts(data)
     if values.size < 2:
         return _contour_panel(panel, x, y, data, scale)
     panel.set_title(scale.label(data.attrs["symbol"]))
@@ -251,7 +274,7 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
             height = CARRYING_WIDTH * float(np.ptp(y) / np.ptp(x))
             figure.set_figheight(ROOM_BESIDE_CARRYING + LEGEND_ROW * len(named) + height)
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
-        patches += [Patch(color="#eeeeee", label="no result")] if (codes < 0).any() else []
+        patches += [Patch(color=NO_RESULT_COLOUR, label="no result")] if (codes < 0).any() else []
         setting = "\n".join(line for line in setting_lines(dataset) if line)
         figure.legend(handles=patches, loc="outside lower center", ncols=1, title=setting, title_fontsize=6.5)
     return figure

@@ -1,22 +1,16 @@
-"""Design guidelines: the question, the description of its answer, and its figures.
-
-Only rounding is computed here; numbers and curves come from `studies`.
-"""
+"""Design guidelines: the question, and the description of its answer. Only rounding is computed here."""
 
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from rich.text import Text
 
 from kinetostat.arrays import Array
-from kinetostat.display import DASH, number
+from kinetostat.display import DASH, Scale, number
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import Element
-from kinetostat.late import LateModule
-from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guideline_sentences import (
     DECIDING_SHARE,
@@ -25,13 +19,12 @@ from kinetostat.studies.guideline_sentences import (
     share_with_same_signs,
     statements,
 )
-from kinetostat.studies.guidelines import EXCESS, Guidelines, Roles, guidelines, stiffening
+from kinetostat.studies.guidelines import EXCESS, Guidelines, Roles, guidelines
 from kinetostat.views.data_forms import stiffness_of_spring
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LOADS_LEFT_OUT,
     Description,
-    Drawing,
     Field,
     Lines,
     Question,
@@ -39,17 +32,6 @@ from kinetostat.views.question import (
     ranges_option,
 )
 from kinetostat.views.tables import FittedTable, numeric_table, text_table, words_on_omitted
-
-if TYPE_CHECKING:
-    from matplotlib import lines
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from kinetostat.views import figures, sensitivity
-else:
-    lines = LateModule("matplotlib.lines")
-    figures = LateModule("kinetostat.views.figures")
-    sensitivity = LateModule("kinetostat.views.sensitivity")
 
 TOPICS = {"compliance": "Depends on", "weakest": "Weakest", "rigid": "Rigid", "design": "Design"}
 """Words before the sentences of a topic."""
@@ -63,17 +45,6 @@ MOST_NAMED_PATHS = 8
 """Paths of parameters that a sentence names, on two lines; it counts the others."""
 NO_EFFECT = "·"
 """Sign in tables for an effect that is too small to count; a direction that is rigid or free has a dash."""
-MOST_PANELS = 6
-"""Number of elements whose curves are shown, a panel each: two rows of three fit on a page."""
-CURVE_POINTS = 161
-"""Number of points along each curve: it looks smooth over several powers of ten."""
-DECADES_BELOW, DECADES_ABOVE = 2.0, 1.0
-"""Powers of ten by which curves go beyond the limits of rigidity and the present stiffness: below the least of them one
-sees the stiffness of a direction fall, above the greatest one sees it level out."""
-PANEL_SIZE = (2.9, 2.5)
-"""Width and height of the panel of an element with its labels, inches."""
-ROOM_BESIDE_PANELS = (0.9, 0.7)
-"""Further width, of the legend, and height, of title and notes, inches."""
 
 
 def _lines(answer: Guidelines) -> Lines:
@@ -153,25 +124,36 @@ def _limit_table(answer: Guidelines, roles: Roles) -> FittedTable:
     An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
     """
     title = (
-        f"Stiffness from which an element counts as rigid, within 1 % ({NO_EFFECT} any stiffness suffices; never: "
-        "nothing else is compliant in that direction)"
+        f"Stiffness from which an element counts as rigid, within {100.0 * EXCESS:g} % "
+        f"({NO_EFFECT} any stiffness suffices; never: nothing else is compliant in that direction)"
     )
     table = numeric_table(title, "element", ["now", *answer.components])
     for k, element in enumerate(answer.elements):
         factors, scale = _at_pose(roles.rigid)[k].tolist(), answer.machine.display.scale(element.unit)
+        present = unit_of_limits(element, scale)
         if element.stiffness is None:
-            present, now = 1.0, "1 × now"
-        elif element.stiffness == math.inf:  # the limits of a rigid element are stiffnesses themselves
-            present, now = scale.factor, f"rigid ({scale.unit})"
+            now = "1 × now"
         else:
-            present = element.stiffness * scale.factor
-            now = f"{_limit_text(present)} {scale.unit}"
+            now = f"rigid ({scale.unit})" if math.isinf(element.stiffness) else f"{_limit_text(present)} {scale.unit}"
         table.add_row(element.name, now, *(_limit_text(factor * present) for factor in factors))
     return table
 
 
+def unit_of_limits(element: Element, scale: Scale) -> float:
+    """Return the number by which factors on the stiffness of an element become limits as they are shown.
+
+    It is the present stiffness; for an element with several stiffnesses 1, as its limits stay factors; and for a rigid
+    element 1 in SI, as its factors are stiffnesses themselves.
+
+    Args:
+        element: the element.
+        scale: the scale in which its stiffnesses are shown.
+    """
+    return 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0) * scale.factor
+
+
 def _limit_text(value: float) -> str:
-    """Return a limit in at most five characters."""
+    """Return a limit in few characters: in two digits from 1000 on, else in three."""
     if math.isnan(value):
         return DASH
     if value == 0.0 or math.isinf(value):
@@ -200,90 +182,6 @@ def _effect_text(percent: float) -> Text:
         return Text(DASH if math.isnan(percent) else NO_EFFECT)
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
     return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
-
-
-def guideline_figures(guidelines: Guidelines) -> dict[str, Drawing]:
-    """Return the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
-    if guidelines.here is None:
-        return {}
-    draw = partial(design_figure, guidelines)
-    effect = Drawing("Effect of each parameter on each direction.", draw, minor=True, file="guidelines-design")
-    drawings = {"design": effect} if guidelines.parameters else {}
-    limited = _elements_with_limits(guidelines.elements, guidelines.here.rigid)
-    caption = "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
-    if limited:
-        drawings["rigid"] = Drawing(caption, partial(rigid_figure, guidelines, limited), file="guidelines-rigid")
-    return drawings
-
-
-def _elements_with_limits(elements: Sequence[Element], limits: Array) -> list[tuple[Element, Array]]:
-    """Return the last elements that have a limit of rigidity, with their limits in multiples of their stiffness.
-
-    The last ones, because all links together stand at the end, see `with_links_together`, and are most of interest.
-    """
-    rows = [(element, row[:, 0]) for element, row in zip(elements, limits, strict=True) if not element.actuated]
-    limited = [(element, row) for element, row in rows if (np.isfinite(row) & (row > 0.0)).any()]
-    return limited[-MOST_PANELS:]
-
-
-def design_figure(guidelines: Guidelines, title: str = "{}: effect of each parameter") -> "Figure":
-    """Draw parameters against directions: blue where 1 % more makes a direction stiffer, red where softer."""
-    rows = {with_leg(guidelines.machine, effect.path): effect.percents for effect in guidelines.parameters}
-    titles = title.format(guidelines.machine.name), setting_of(guidelines.machine)
-    label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
-    return sensitivity.coloured_table(titles, rows, guidelines.components, "RdBu", label)
-
-
-def rigid_figure(
-    guidelines: Guidelines,
-    limited: Sequence[tuple[Element, Array]],
-    title: str = "{}: stiffness from which an element counts as rigid",
-) -> "Figure":
-    """Draw the stiffness of each direction against that of each element, with dots where it becomes rigid."""
-    columns = min(3, len(limited))
-    rows = -(-len(limited) // columns)
-    (width, height), (legend_width, title_height) = PANEL_SIZE, ROOM_BESIDE_PANELS
-    with figures.new_figure(
-        (width * columns + legend_width, height * rows + title_height),
-        title.format(guidelines.machine.name),
-        setting_of(guidelines.machine),
-        guidelines.loads_left_out,
-    ) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        for panel, (element, limits) in zip(panels, limited, strict=False):
-            _draw_curves(panel, guidelines, element, limits)
-        for unused in list(figure.axes)[len(limited) :]:
-            unused.remove()
-        styles = zip(guidelines.components, figures.COLOURS, figures.DASHES, strict=False)
-        curves = [lines.Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
-        near = f"within {100.0 * EXCESS:g} %"
-        dot = lines.Line2D([], [], color=figures.GUIDE_COLOUR, marker="o", markersize=4, linestyle="", label=near)
-        figure.legend(handles=[*curves, dot], loc="outside right center", title="direction")
-    return figure
-
-
-def _draw_curves(panel: "Axes", guidelines: Guidelines, element: Element, limits: Array) -> None:
-    """Draw the stiffness of each direction over the stiffness of an element, with a dot at each limit of rigidity."""
-    finite = limits[np.isfinite(limits) & (limits > 0.0)]
-    rigid_now = element.stiffness == math.inf
-    ends = np.log10([*finite, *([] if rigid_now else [1.0])])
-    factors = np.logspace(ends.min() - DECADES_BELOW, ends.max() + DECADES_ABOVE, CURVE_POINTS)
-    scale = guidelines.machine.display.scale(element.unit)
-    present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0) * scale.factor
-    stiff = stiffening(guidelines.state, element, factors)
-    for colour, dash, curve, limit in zip(figures.COLOURS, figures.DASHES, stiff, limits, strict=False):
-        if limit == math.inf:
-            continue
-        panel.plot(present * factors, 100.0 * curve, linestyle=dash, color=colour, linewidth=1.3)
-        if 0.0 < limit < math.inf:
-            panel.plot(present * limit, 100.0 / (1.0 + EXCESS), "o", color=colour, markersize=4, zorder=3)
-    if not rigid_now:
-        panel.axvline(present, color="#888888", linewidth=0.8, linestyle=":")
-        panel.text(present, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
-    unit = scale.label("stiffness") if element.stiffness is not None else "multiple of the present stiffness"
-    panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
-    panel.set_title(element.name, parse_math=False)
-    panel.margins(x=0.0)
 
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
@@ -408,7 +306,7 @@ GUIDELINES = Description(
     ),
     lines=_lines,
     tables=_tables,
-    figures=guideline_figures,
+    figures="views.guideline_figures.guideline_figures",
     state=lambda answer: "design guidelines" if answer.status is Status.OK else answer.status.word,
     answered=lambda answer: answer.status is Status.OK,
     files={"guidelines.json": "json"},

@@ -80,15 +80,11 @@ def _figures(answer: MotorChoice) -> dict[str, Drawing]:
 def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion") -> "Figure":
     """Draw the speed-torque diagram of the best motors, with the motion and its mean squares in it."""
     shown = answer.fits[:MOST_DRAWN]
-    columns = min(2, len(shown))
-    rows = -(-len(shown) // columns)
+    rows, columns = figures.grid_shape(len(shown), most_columns=2)
     note = "shaded: torque that the motor may give; dark: for ever, light: for a short while"
     with figures.new_figure((1.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name)) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        for panel, fit in zip(panels, shown, strict=False):
+        for panel, fit in zip(figures.panel_grid(figure, len(shown), most_columns=2), shown, strict=True):
             _diagram(panel, answer, fit)
-        for panel in figure.axes[len(shown) :]:
-            panel.set_visible(False)
         name_drives(figure, shown[0].loads, f"{PEAK_MARK}\n{RMS_MARK}")
         note_motion(figure, shown[0].loads, note)
     return figure

@@ -14,7 +14,7 @@ from kinetostat.studies.optimisation.assessment import COMMON_SHARE, Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, new_figure
+from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, grid_shape, new_figure, panel_grid
 from kinetostat.views.question import Drawing
 
 BINS = 40
@@ -40,6 +40,8 @@ ROOM_BEYOND_BARS = 0.18
 """Room to both sides of bars for the numbers at their ends, as a share of the range of the bars."""
 ROOM_ABOVE_HISTOGRAM = 1.4
 """Height of a panel over that of its tallest bar: the legend with three values stands above the bars."""
+WIDTH_ALONE, WIDTH_AMONG_OTHERS, FRONT_HEIGHT = 4.2, 3.1, 3.2
+"""Width of the panel of a pair of objectives, alone and among others, and its height, inches."""
 PALE_GREY = "#cccccc"
 """Colour of what stands behind the result: designs beside a front, and the scale of a variable."""
 MIDDLE_GREY = "#777777"
@@ -154,11 +156,10 @@ def front(result: Result, title: str) -> Figure:
     feasible = outcome.objectives[outcome.violation == 0.0]
     best = outcome.objectives[result.front]
     pairs = [(i, j) for i in range(best.shape[1]) for j in range(i + 1, best.shape[1])]
-    columns = min(3, len(pairs))
-    rows = -(-len(pairs) // columns)
-    with new_figure((4.2 * columns if columns == 1 else 3.1 * columns, 3.2 * rows), title) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        for panel, (i, j) in zip(panels, pairs, strict=False):
+    rows, columns = grid_shape(len(pairs))
+    width = WIDTH_ALONE if columns == 1 else WIDTH_AMONG_OTHERS
+    with new_figure((width * columns, FRONT_HEIGHT * rows), title) as figure:
+        for panel, (i, j) in zip(panel_grid(figure, len(pairs)), pairs, strict=True):
             x, y = (problem.machine.display.scale(problem.objectives[k].term.unit) for k in (i, j))
             panel.scatter(
                 feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color=PALE_GREY, linewidths=0,

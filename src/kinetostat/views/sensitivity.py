@@ -152,7 +152,7 @@ def _draw_cells(panel: "Axes", cells: Array, colours: str, label: str) -> None:
     end = max(map_scales.usual_range(sizes)[1] if sizes.size else 0.0, LEAST_SCALE)
     scale = colors.Normalize(-end, end)
     image = panel.imshow(np.ma.masked_invalid(cells), cmap=colours, norm=scale, aspect="auto")
-    panel.set_facecolor("#eeeeee")
+    panel.set_facecolor(figures.NO_RESULT_COLOUR)
     panel.grid(visible=False)
     panel.tick_params(length=0, top=False)
     for (row, column), value in np.ndenumerate(cells):

@@ -16,15 +16,13 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Configuration, Machine, setting_of
 from kinetostat.studies.vibration import DRAWN_MODES, Vibration, frequency_range
 from kinetostat.views.drawing import Points
-from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, STYLE, new_figure
+from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, STYLE, grid_shape, new_figure
 from kinetostat.views.loaded import legend_of_overlay, overlay_of_motion
 from kinetostat.views.question import Drawing
 from kinetostat.views.rendering.camera import VIEWPOINTS, axes_towards
 from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.vibration import AXES, drawn_directions
 
-MOST_COLUMNS = 3
-"""Shapes of modes side by side: with more, a machine would be smaller than its heading."""
 AXES_IN_DIAGONAL = 10.0
 """Axes of the base that would fit into the diagonal of the machine, about: their length is rounded to one digit."""
 ROOM = 0.1
@@ -147,8 +145,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
     planar = response.configuration.plane is not None
     view = _view_of(machine, response.configuration)
     shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN_MODES], 1) if mode.shape is not None]
-    columns = min(MOST_COLUMNS, len(shown))
-    rows = -(-len(shown) // columns)
+    rows, columns = grid_shape(len(shown))
     across = 0.4 + MACHINE_WIDTH * columns
     size = (across, 0.9 + across * rows * view.height / (columns * view.width))  # with title and legend, inches
     axis = float(f"{view.diagonal / AXES_IN_DIAGONAL:.0e}")

@@ -232,18 +232,15 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
         along: the coordinate whose value is the title of each panel; none if empty.
     """
     labels, conditions = answer.verdicts, answer.conditions
-    columns = min(3, len(cuts))
-    rows = -(-len(cuts) // columns)
+    rows, columns = figures.grid_shape(len(cuts))
     width = 4.6 if len(cuts) == 1 else 2.6
     with figures.new_figure((width * columns + 0.3, 0.9 * width * rows + 0.9), title) as figure:
-        panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+        panels = figures.panel_grid(figure, len(cuts), sharex=True, sharey=True)
         borders: set[PoseCondition] = set()
-        for panel, cut in zip(panels, cuts, strict=False):
+        for panel, cut in zip(panels, cuts, strict=True):
             borders |= _fill(panel, cut, labels, conditions)
             if along and len(cuts) > 1:
                 panel.set_title(_coordinate_text(cut, along))
-        for panel in panels[len(cuts) :]:
-            panel.remove()
         map_scales.trim_height(figure, panels[0], 0.85 * width * rows)
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(

@@ -17,7 +17,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+    from matplotlib.figure import Figure as MatplotlibFigure
 
     from kinetostat.views import figures
 else:
@@ -141,13 +141,15 @@ class Report:
 
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
-_EXPONENT = re.compile(r"\*\*([2-4])\b")
-_DEGREES = re.compile(r"(?<=\d) deg\b")
-_WHOLE = re.compile(r"(?<=\d)\.0(?= (?:m|rad|N|kg|Pa)\b)")
-_PLAIN_NUMBER = re.compile(r"[-+.\de]+(?: deg)?")
-_ZEROS = re.compile(r"(?<![\w.,])(\d+?)(0{6,})(?:\.0)?(?= (?:m|rad|N|kg|Pa)\b)")
-_TIMES = re.compile(r"^(\d+) x ")
+_UNIT = r"(?= (?:m|rad|N|kg|Pa)\b)"
+_POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")  # 1.2e-05: 1.2×10⁻⁵
+_EXPONENT = re.compile(r"\*\*([2-4])\b")  # m**2: m²
+_DEGREES = re.compile(r"(?<=\d) deg\b")  # 30 deg: 30°
+_WHOLE = re.compile(r"(?<=\d)\.0" + _UNIT)  # 5.0 m: 5 m
+_PLAIN_NUMBER = re.compile(r"[-+.\de]+(?: deg)?")  # a cell that is nothing but a number
+# 210000000 Pa: 2.1e8 Pa. Fewer than six zeros are counted at a glance.
+_ZEROS = re.compile(r"(?<![\w.,])(\d+?)(0{6,})(?:\.0)?" + _UNIT)
+_TIMES = re.compile(r"^(\d+) x ")  # 3 x M8: 3 × M8
 
 
 def typeset(text: str) -> str:
@@ -165,7 +167,7 @@ def _scientific(digits: str, zeros: int) -> str:
     return f"{digits[0]}{decimals}e{zeros + len(digits) - 1}"
 
 
-def as_figure(drawing: "Drawing", caption: str) -> Figure:
+def as_figure(drawing: "MatplotlibFigure", caption: str) -> Figure:
     """Convert a drawing of Matplotlib for a report, in which all drawings have one scale."""
     return Figure(caption, figures.as_svg(drawing), min(1.0, drawing.get_figwidth() / FULL_WIDTH_INCHES))
 
@@ -174,15 +176,16 @@ def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:
     """Convert a table of the terminal for a report.
 
     Args:
-        table: a table of one of the `*_tables` of `views`.
+        table: a table as the terminal shows it.
         caption: the caption in place of its title.
-        split: see `content.Table`.
+        split: rows above the horizontal rule and columns left of the vertical one, as in `Table`.
     """
     columns = [without_round_off([*map(str, column.cells)]) for column in table.columns]
     numeric = tuple(column.justify == "right" for column in table.columns)
     shown = [
-        [typeset(cell) if i or other or _PLAIN_NUMBER.fullmatch(cell) else cell for cell in column]
-        for i, (column, other) in enumerate(zip(columns, numeric, strict=True))
+        # The first column has names, which keep their signs as in the file.
+        [typeset(cell) if place or is_numeric or _PLAIN_NUMBER.fullmatch(cell) else cell for cell in column]
+        for place, (column, is_numeric) in enumerate(zip(columns, numeric, strict=True))
     ]
     heads = tuple(str(column.header).replace("\n", " ") for column in table.columns)
     return Table(caption, heads, tuple(zip(*shown, strict=True)), numeric, split)
