@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
-WORDS_OF_COMMANDS = "computing"
+USUAL_ACTIVITY = "computing"
 """Words while a command takes long that has none of its own."""
-WORDS_OF_CHECK = "computing; if the pose is out of reach, the nearest one is looked for"
+CHECK_ACTIVITY = "computing; if the pose is out of reach, the nearest one is looked for"
 """Words while a check takes long."""
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -73,7 +73,10 @@ exit codes: 0 done, 1 the question has no answer or a requirement is not met, 2 
 
 
 class Overview(Help):
-    """Help that lists the commands in groups."""
+    """Help that lists the commands in groups.
+
+    `argparse` offers no public way to order them, hence its private names.
+    """
 
     def _format_action(self, action: argparse.Action) -> str:
         if not isinstance(action, argparse._SubParsersAction):
@@ -87,10 +90,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input; 130
-        stopped by Ctrl-C.
+        The exit code, as the end of `EXAMPLES` lists them.
     """
-    _take_surroundings()
+    _prepare_process()
     with spoken_silence("starting") as watch:
         return _run(arguments, watch)
 
@@ -100,7 +102,7 @@ def _run(arguments: Sequence[str] | None, watch: SilenceWatch | None) -> int:
     try:
         options = _options(arguments)
         if watch is not None:
-            watch.say(getattr(options, "doing", WORDS_OF_COMMANDS))
+            watch.say(getattr(options, "doing", USUAL_ACTIVITY))
             watch.ends_with_any_output = getattr(options, "serves", False)
         code = int(options.run(options))
         sys.stdout.flush()
@@ -124,10 +126,11 @@ def _run(arguments: Sequence[str] | None, watch: SilenceWatch | None) -> int:
         return BAD_INPUT
 
 
-def _take_surroundings() -> None:
-    """Work where output is closed or knows few characters, and whatever window system figures are meant for.
+def _prepare_process() -> None:
+    """Make printing and drawing work everywhere.
 
-    Figures are only written to files, so that a window system that is not there must not matter.
+    A closed stream becomes the null device, characters that a terminal lacks become "?", and Matplotlib draws without
+    a window system, because figures are only written to files.
     """
     os.environ["MPLBACKEND"] = "agg"
     for name in ("stdout", "stderr"):
@@ -188,7 +191,7 @@ def _add_file_commands(commands: "Commands") -> None:
         "a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a long grid or "
         "search, whose checksums are then compared",
     )
-    check.set_defaults(doing=WORDS_OF_CHECK)
+    check.set_defaults(doing=CHECK_ACTIVITY)
 
 
 def _add_new_command(commands: "Commands") -> None:

@@ -11,7 +11,8 @@ from test_state_of_load import CABLES
 from kinetostat.display import with_minus_signs
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.under_load import under_load
-from kinetostat.studio.session import Memory, Session, address_of, memory_of
+from kinetostat.studio.addresses import address_of, memory_of
+from kinetostat.studio.session import Memory, Session
 
 DOWN = ("control load.force.2", "write", "-400 N")
 

@@ -13,6 +13,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.addresses import address_of
 from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
@@ -29,7 +30,7 @@ from kinetostat.studio.processes import check_upload
 from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.question_tab import AskTab
 from kinetostat.studio.scene_panel import Handles, ScenePanel
-from kinetostat.studio.session import Memory, Session, address_of
+from kinetostat.studio.session import Memory, Session
 from kinetostat.studio.text_pane import TextPane
 from kinetostat.views.scene.anatomy import proportions_of
 

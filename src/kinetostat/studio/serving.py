@@ -24,11 +24,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.addresses import memory_of
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.elements import refuse
 from kinetostat.studio.menus import serve_pictures
 from kinetostat.studio.page import StudioPage
-from kinetostat.studio.session import Memory, memory_of
+from kinetostat.studio.session import Memory
 
 LARGEST_BODY = LARGEST_FILE + (64 << 10)
 """Bytes of a request: a machine file and what a form adds to it."""

@@ -13,7 +13,7 @@ from kinetostat.arrays import AnyArray, Array, Mask
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, ROTATION
 from kinetostat.units import motion_unit
-from kinetostat.views.figures import COLOURS, new_figure, slim_bar
+from kinetostat.views.figures import COLOURS, colour_of, new_figure, slim_bar
 from kinetostat.views.layout import width_of
 from kinetostat.views.question import Drawing
 
@@ -31,17 +31,16 @@ ROOM_ABOVE_RESIDUALS, OUTLIER_PLACE = 1.3, 0.94
 """Half the height of a panel over its greatest residual, and where an outlier beyond it stands, as a share of that."""
 LEAST_RESIDUAL = 1e-12
 """Residual that a panel shows at least, in its unit: one whose values fit exactly still has a scale."""
-FIT_CAPTIONS = {
-    "residuals": "What is left of every measured value, as drawn and as identified.",
-    "correlations": "Correlations of the numbers: which ones were found together.",
-    "poses": "The tool points at which was measured, from above and from the front.",
-}
 
 
 def identification_figures(answer: Identification) -> dict[str, Drawing]:
     """Return the drawings of an identification, by name."""
-    draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
-    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in FIT_CAPTIONS.items()}
+    drawings = (
+        ("residuals", "What is left of every measured value, as drawn and as identified.", residual_figure),
+        ("correlations", "Correlations of the numbers: which ones were found together.", correlation_figure),
+        ("poses", "The tool points at which was measured, from above and from the front.", pose_figure),
+    )
+    return {name: Drawing(caption, partial(draw, answer)) for name, caption, draw in drawings}
 
 
 def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
@@ -78,9 +77,9 @@ def _draw_residuals(panel: Axes, answer: Identification, rows: Mask, residuals: 
     """Draw the residuals of some rows over their lines, a colour for each component; outliers are black crosses."""
     names, is_kept = _component_names(answer), answer.fit.kept
     lines = np.array(answer.observed.data.lines)[answer.observed.row_poses]
-    for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
+    for place, name in enumerate(dict.fromkeys(names[rows])):
         of_name = rows & is_kept & (names == name)
-        panel.plot(lines[of_name], residuals[of_name], ".", color=colour, ms=3, label=name)
+        panel.plot(lines[of_name], residuals[of_name], ".", color=colour_of(place), ms=3, label=name)
     edge = ROOM_ABOVE_RESIDUALS * np.abs(residuals[rows & is_kept]).max(initial=LEAST_RESIDUAL)
     outliers = rows & ~is_kept
     if outliers.any():
@@ -124,6 +123,6 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
             low, high = panel.get_ylim()
             shortfall = max(0.0, LEAST_HEIGHT * float(np.ptp(panel.get_xlim())) - (high - low))
             panel.set_ylim(low - shortfall / 2.0, high + shortfall / 2.0)
-        handles, labels = panel.get_legend_handles_labels()
+        handles, labels = panel.get_legend_handles_labels()  # those of the other panel are the same
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

@@ -47,12 +47,16 @@ else:
 
 USUAL_QUANTITY = "free_stiffness"
 """Quantity that is computed where nobody names one: what a tool feels."""
-FIGURE_WIDTH, QUANTITY_HEIGHT, COORDINATE_HEIGHT, ROOM_ABOVE_AND_BELOW = 6.6, 1.9, 1.25, 0.7
-"""Width of the figure, height of a panel of quantities and of one of coordinates, and of title and notes, inches."""
+FIGURE_WIDTH, ROOM_FOR_TITLE = 6.6, 0.7
+"""Width of the figure, and height of its title and notes, inches."""
+QUANTITY_HEIGHT, COORDINATE_HEIGHT = 1.9, 1.25
+"""Height of a panel of quantities, and of one of coordinates, which only say where the machine is; inches."""
 NO_RESULT_COLOUR = "#dddddd"
 """Colour behind poses that have no result."""
 MOST_DOTS = 60
 """Number of poses up to which each is marked with a dot: more would run into a line."""
+Curves = dict[str, Array]
+"""Values at each pose, in the unit of the axis, by the name in the legend."""
 
 
 def _lines(answer: PoseAnswers) -> Lines:
@@ -75,7 +79,7 @@ def _tables(answer: PoseAnswers, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Extremes and the numbers of their poses", "quantity", heads)
     display = answer.machine.display
     for name, values in answer.values.items():
-        if np.isnan(values).all():  # of turns, where the machine has none
+        if np.isnan(values).all():  # such as a rotation that a planar machine does not have
             table.add_row(name, display.scale(QUANTITIES[name].unit).head, DASH, DASH, DASH, DASH)
             continue
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
@@ -94,8 +98,8 @@ def _variables(answer: PoseAnswers) -> dict[str, Any]:
     return {name: {"units": QUANTITIES[name].unit, "values": answer.values[name]} for name in answer.names}
 
 
-def at_poses_of(machine: Machine, poses: Path, progress: Progress, quantities: Sequence[str] = ()) -> PoseAnswers:
-    """Evaluate quantities at the poses of a file, see `evaluate`.
+def evaluate_file(machine: Machine, poses: Path, progress: Progress, quantities: Sequence[str] = ()) -> PoseAnswers:
+    """Evaluate quantities at every pose of a CSV file; without names, `USUAL_QUANTITY`.
 
     Raises:
         InputError: the file cannot be read, or names an unknown field or quantity.
@@ -112,69 +116,67 @@ def _csv(answer: PoseAnswers) -> str:
     """
     columns: dict[str, Sequence[Any]] = {"pose": range(1, answer.poses.count + 1)}
     for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
-        columns[_head(data_name(field.path), field.unit)] = values.tolist()
+        columns[_column_head(data_name(field.path), field.unit)] = values.tolist()
     columns["status"] = [Status(code).word for code in answer.status.tolist()]
     for name, values in answer.values.items():
-        columns[_head(name, QUANTITIES[name].unit)] = ["" if math.isnan(value) else value for value in values.tolist()]
+        columns[_column_head(name, QUANTITIES[name].unit)] = [
+            "" if math.isnan(value) else value for value in values.tolist()
+        ]
     return csv_text(columns, zip(*columns.values(), strict=True))
 
 
-def _head(name: str, unit: str) -> str:
+def _column_head(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def path_figures(answers: PoseAnswers) -> dict[str, Drawing]:
+def path_figures(answer: PoseAnswers) -> dict[str, Drawing]:
     """Return the one figure of quantities along a path."""
-    return {"path": Drawing("Quantities along the poses.", partial(path_figure, answers))}
+    return {"path": Drawing("Quantities along the poses.", partial(path_figure, answer))}
 
 
-def path_figure(answers: PoseAnswers, title: str = "{}") -> "Figure":
+def path_figure(answer: PoseAnswers, title: str = "{}") -> "Figure":
     """Draw quantities along a path, a panel for each unit, and the coordinates that vary below; grey without a result.
 
     The poses are taken as neighbours in the order in which they are given.
     """
-    quantities, coordinates = _quantity_panels(answers), _coordinate_panels(answers)
+    quantities, coordinates = _quantity_panels(answer), _coordinate_panels(answer)
     heights = [QUANTITY_HEIGHT] * len(quantities) + [COORDINATE_HEIGHT] * len(coordinates)
-    size = (FIGURE_WIDTH, ROOM_ABOVE_AND_BELOW + sum(heights))
-    with figures.new_figure(size, title.format(answers.machine.name), *_notes(answers)) as figure:
+    size = (FIGURE_WIDTH, ROOM_FOR_TITLE + sum(heights))
+    with figures.new_figure(size, title.format(answer.machine.name), *_notes(answer)) as figure:
         panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for panel, (label, curves) in zip(panels, quantities + coordinates, strict=True):
-            _draw_panel(panel, answers, curves, label)
+            _draw_panel(panel, answer, curves, label)
         panels[-1].set_xlabel("pose")
     return figure
 
 
-Curves = dict[str, Array]
-"""Values at each pose, in the unit of the axis, by the name in the legend."""
-
-
-def _quantity_panels(answers: PoseAnswers) -> list[tuple[str, Curves]]:
+def _quantity_panels(answer: PoseAnswers) -> list[tuple[str, Curves]]:
     """Return label and curves of a panel for each unit of the quantities."""
     members: dict[str, list[str]] = {}
-    for name in answers.values:
+    for name in answer.values:
         members.setdefault(QUANTITIES[name].unit, []).append(name)
     panels = []
     for unit, names in members.items():
-        scale = answers.machine.display.fitting(unit, (v for name in names for v in answers.values[name]))
+        scale = answer.machine.display.fitting(unit, (v for name in names for v in answer.values[name]))
         label = scale.label(plain_name(group_of(names) or names[0]))
-        panels.append((label, {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in names}))
+        panels.append((label, {QUANTITIES[name].symbol: answer.values[name] * scale.factor for name in names}))
     return panels
 
 
-def _coordinate_panels(answers: PoseAnswers) -> list[tuple[str, Curves]]:
+def _coordinate_panels(answer: PoseAnswers) -> list[tuple[str, Curves]]:
     """Return label and curves of a panel for each kind of field that varies along the path."""
     panels: dict[str, Curves] = {}
-    for field, values in zip(answers.poses.fields, answers.poses.values, strict=True):
+    for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
         if np.ptp(values) > 0.0:
-            scale = answers.machine.display.scale(field.unit)
+            scale = answer.machine.display.scale(field.unit)
             curves = panels.setdefault(scale.label(field.quantity.kind), {})
             curves[named_entry(field.shown)] = values * scale.factor
     return list(panels.items())
 
 
-def _draw_panel(panel: "Axes", answers: PoseAnswers, curves: Curves, label: str) -> None:
-    numbers = np.arange(1, answers.poses.count + 1)
-    _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
+def _draw_panel(panel: "Axes", answer: PoseAnswers, curves: Curves, label: str) -> None:
+    numbers = np.arange(1, answer.poses.count + 1)
+    _shade(panel, np.flatnonzero(answer.status != Status.OK) + 1)
     marker = "." if len(numbers) <= MOST_DOTS else ""
     for place, (name, values) in enumerate(curves.items()):
         finite = np.where(np.isfinite(values), values, np.nan)
@@ -191,11 +193,11 @@ def _shade(panel: "Axes", numbers: Integers) -> None:
             panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=NO_RESULT_COLOUR, linewidth=0.0)
 
 
-def _notes(answers: PoseAnswers) -> tuple[str, str, str]:
+def _notes(answer: PoseAnswers) -> tuple[str, str, str]:
     """Return the notes: numbers that differ from the file, loads left out, and poses without a result."""
-    counts = {status: len(numbers) for status, numbers in answers.failures.items()}
-    missing = figures.missing_line(counts, answers.poses.count, " (grey)")
-    return setting_of(answers.machine, list(answers.poses.leaves)), answers.loads_left_out, missing
+    counts = {status: len(numbers) for status, numbers in answer.failures.items()}
+    missing = figures.missing_line(counts, answer.poses.count, " (grey)")
+    return setting_of(answer.machine, list(answer.poses.leaves)), answer.loads_left_out, missing
 
 
 PATH = Description(
@@ -218,7 +220,7 @@ PATH = Description(
 )
 PATH_QUESTION = Question(
     example="kinetostat path hexapod poses.csv -o stiffness.csv -o stiffness.png",
-    answer=at_poses_of,
+    answer=evaluate_file,
     options=(
         Option(
             "poses",
