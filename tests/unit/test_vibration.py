@@ -20,7 +20,12 @@ from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.datasets import evaluate_grid
 from kinetostat.studies.vibration import NOTHING_RINGS, TOO_DIFFERENT, modes
-from kinetostat.vibration.scalar_frequencies import free_frequencies, legs_without_mass, pose_frequencies, reducible
+from kinetostat.vibration.scalar_frequencies import (
+    frequencies_over_scalars,
+    legs_without_mass,
+    numpy_frequencies,
+    reducible,
+)
 from machines import with_bodies
 
 BODY = {"tool.mass": 12.0, "tool.inertia.0": 0.3, "tool.inertia.1": 0.3, "tool.inertia.2": 0.5}
@@ -67,9 +72,9 @@ def test_the_quick_route_and_the_modes_give_the_same_frequencies(name, links):
     if machine.family.name != "legs" or name in BY_MATRICES:  # a machine leg by leg that is new may go either way
         assert reducible(machine) == (legs_without_mass(machine, response.configuration) or name not in BY_MATRICES)
     if reducible(machine):
-        quick = [float(f) for f in free_frequencies(machine, response, joints)]
+        quick = [float(f) for f in frequencies_over_scalars(machine, response, joints)]
     else:
-        quick = pose_frequencies(state_of(machine))[0].tolist()
+        quick = numpy_frequencies(state_of(machine))[0].tolist()
     known = [mode.frequency for mode in modes(machine).modes][:6]
     assert quick[: len(known)] == pytest.approx(known, rel=1e-9)
     assert all(math.isinf(f) for f in quick[len(known) :])

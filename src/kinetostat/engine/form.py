@@ -208,7 +208,7 @@ class TraceOptions:
         stepping: whether to give, after the objectives, the coordinates of the state of rest after another step and
             the square of its size, so that the program can be repeated until this is small.
         plan: the motions that there are, where quantities need them, see `plan_for`.
-        modes: number of modes that are known, as further columns (`scalar_frequencies.vibrating`); 0 to solve for
+        modes: number of modes that are known, as further columns (`scalar_frequencies.mode_columns`); 0 to solve for
             frequencies inside.
         mode_counts: numbers of modes over springs that are known, as further columns, where legs that have masses
             close loops.
@@ -292,11 +292,11 @@ def _response_at_rest(
         status = where(motions.sure, status, int(Status.NOT_CONVERGED))
         if counts.loaded:
             squares = [motions.square(mode) for mode in modes[: counts.loaded]]
-            loaded["frequency"] = scalar_frequencies.lowest_frequencies(squares)
+            loaded["frequency"] = scalar_frequencies.sorted_frequencies(squares)
         if counts.factor:
             loaded["factor"] = motions.factor(modes[-1])
     if "frequency" in wanted and "frequency" not in loaded:
-        loaded["frequency"] = scalar_frequencies.frequencies_at(equations.cut, coordinates, differentiated)
+        loaded["frequency"] = scalar_frequencies.frequencies_of_cut(equations.cut, coordinates, differentiated)
     columns = (*state, *(column for mode in modes for column in mode))
     return replace(response, loaded=loaded, status=status), columns
 
@@ -318,16 +318,17 @@ def _response_vibrating(
     if counts is not None and counts.free:
         motions = springwise.motions_without_loads(traced.machine, response, joints)
         modes = [new_inputs(traced.graph, motions.size) for _ in range(counts.free)]
-        frequencies = scalar_frequencies.lowest_frequencies([motions.square(mode) for mode in modes])
+        frequencies = scalar_frequencies.sorted_frequencies([motions.square(mode) for mode in modes])
         status = where(motions.sure, response.status, int(Status.SINGULAR))
         columns = tuple(column for mode in modes for column in mode)
         return replace(response, frequencies=frequencies, status=status), columns
     if options.modes:
-        vibration = scalar_frequencies.vibrating(traced.machine, response, joints, options.modes)
+        vibration = scalar_frequencies.machine_of_known_modes(traced.machine, response, joints, options.modes)
         columns = new_inputs(traced.graph, vibration.columns)
-        return replace(response, frequencies=scalar_frequencies.lowest_frequencies(vibration.squares(columns))), columns
+        frequencies = scalar_frequencies.sorted_frequencies(vibration.inverse_squares(columns))
+        return replace(response, frequencies=frequencies), columns
     if any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for name in names):
-        frequencies = scalar_frequencies.free_frequencies(traced.machine, response, joints, differentiated)
+        frequencies = scalar_frequencies.frequencies_over_scalars(traced.machine, response, joints, differentiated)
         return replace(response, frequencies=frequencies), ()
     return response, ()
 

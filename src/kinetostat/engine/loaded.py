@@ -39,7 +39,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.motion.response import response_in_motion
 from kinetostat.vibration.cutting import cut_receptances
 from kinetostat.vibration.modes import frequencies
-from kinetostat.vibration.scalar_frequencies import leaves_plane, platform_alone, pose_frequencies, reducible
+from kinetostat.vibration.scalar_frequencies import leaves_plane, numpy_frequencies, platform_alone, reducible
 from kinetostat.vibration.springwise import ModeCounts, mode_counts_of
 
 
@@ -198,7 +198,7 @@ def _response_with_states(
     state = states_at(machine, columns, count)
     response = state.free
     if any(quantity.modal and not quantity.loaded and not quantity.cut for quantity in wanted):
-        response = replace(response, frequencies=list(pose_frequencies(state).T))
+        response = replace(response, frequencies=list(numpy_frequencies(state).T))
     if any(quantity.cut for quantity in wanted):
         pressure = state.machine.tables["cutting"].pressure
         response = replace(response, softest=cut_receptances(state), cutting_pressure=pressure)

@@ -45,14 +45,7 @@ def free_springs_as_joints(leg: LegScrews) -> LegScrews:
     free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if is_infinite(s)]
     if not free:
         return leg
-    independent = _independent_rows(free)
-    basis: list[list[Scalar]] = []
-    singularity_margin = leg.singularity_margin
-    if len(independent) < len(leg.wrenches):
-        basis, margin = _identity(len(leg.wrenches)), 1.0
-        if independent:
-            basis, margin = complement([_unit(row) for row in independent])
-        singularity_margin = smaller(singularity_margin, margin)
+    basis, margin = _mixes_without_load(_independent_rows(free), len(leg.wrenches))
     compliance = [0.0 if is_infinite(s) else s for s in leg.compliance]
     rows = [
         tuple(
@@ -62,12 +55,33 @@ def free_springs_as_joints(leg: LegScrews) -> LegScrews:
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
     return replace(
-        leg, compliance=tuple(compliance), wrenches=wrenches, loads=tuple(rows), singularity_margin=singularity_margin
+        leg,
+        compliance=tuple(compliance),
+        wrenches=wrenches,
+        loads=tuple(rows),
+        singularity_margin=smaller(leg.singularity_margin, margin) if basis else leg.singularity_margin,
     )
 
 
+def _mixes_without_load(rows: Sequence[Sequence[Scalar]], size: int) -> tuple[list[list[Scalar]], Scalar]:
+    """Return mixes of the wrenches of a leg that load none of some springs, and how surely these loads are independent.
+
+    Args:
+        rows: loads of the springs per unit of each wrench, as independent rows.
+        size: number of the wrenches. As many rows leave no mix, and no row leaves every wrench as it is.
+    """
+    if len(rows) >= size:
+        return [], 1.0
+    if not rows:
+        return [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)], 1.0
+    return complement([_unit(row) for row in rows])
+
+
 def _independent_rows(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
-    """Leave out rows that depend on those before them. Only plain numbers can be judged: traced rows are all kept."""
+    """Leave out rows that depend on those before them.
+
+    Only plain numbers can be judged. Traced rows are all kept: if they are dependent, their complement has no margin.
+    """
     kept: list[Sequence[Scalar]] = []
     for row in rows:
         numbers = all(isinstance(c, float) for loads in (row, *kept) for c in loads)
@@ -88,7 +102,8 @@ def _repeats(row: Sequence[Scalar], others: Sequence[Sequence[Scalar]]) -> bool:
 def _rank(rows: Sequence[Sequence[float]]) -> int:
     """The number of independent rows, each scaled to unit size.
 
-    Gram-Schmidt with the largest row first; what is left of a row is dependent if it is below `DEPENDENT_LOADS`.
+    Gram and Schmidt's method with the largest row first; what is left of a row is dependent if it is below
+    `DEPENDENT_LOADS`. It counts on lists, because such rows are few and short.
     """
     sizes = [math.hypot(*row) for row in rows]
     rests = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
@@ -107,10 +122,6 @@ def _rank(rows: Sequence[Sequence[float]]) -> int:
 def _unit(row: Sequence[Scalar]) -> list[Scalar]:
     size = reciprocal(sqrt(total([c * c for c in row])))
     return [weighted(size, c) for c in row]
-
-
-def _identity(size: int) -> list[list[Scalar]]:
-    return [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Legs at one pose as geometry: a chain of joints, springs and flexible links from base to platform, in the base frame.
+"""Legs at one pose as geometry: a chain of joints, springs and flexible links from base to platform.
 
 A leg turns itself into screws (J_p, J_e, W) at a reference point; how a pose places its joints is the family's
 business (`catalogue`), what the screws do to the platform is that of `kinetostatics`.
@@ -92,12 +92,12 @@ class Joint:
 
     @property
     def freedoms(self) -> tuple["Joint", ...]:
-        """Itself."""
+        """The free motions of a joint: the one that it is."""
         return (self,)
 
     @property
     def springs(self) -> tuple["Spring", ...]:
-        """None."""
+        """The springs in a joint: none."""
         return ()
 
     @property
@@ -132,7 +132,10 @@ class Joint:
         return replace(self, axis=motion.rotation.apply(self.axis), point=point, carriage=carriage, foot=foot)
 
     def motion_by(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
-        """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""
+        """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it.
+
+        Only a revolute takes a `Turn`.
+        """
         if self.point is None:
             travel = self.axis * amount
             carriage = None if self.carriage is None else self.carriage + travel
@@ -190,12 +193,12 @@ class Spring:
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
-        """None: it is held."""
+        """The free motions of a spring: none, because it is held."""
         return ()
 
     @property
     def springs(self) -> tuple["Spring", ...]:
-        """Itself."""
+        """The springs in a spring: the one that it is."""
         return (self,)
 
     @property
@@ -205,7 +208,7 @@ class Spring:
 
     @property
     def path(self) -> tuple[Vector, ...]:
-        """Nothing that a drawing shows."""
+        """The points that a drawing shows: none."""
         return ()
 
     def displaced(self, motion: Displacement) -> "Spring":
@@ -341,17 +344,15 @@ class Leg:
         passive = tuple(joint.twist(reference) for joint in (*self.passive, *absent))
         lines, centres = self.lines, None if absent else self._two_centres()
         squares: tuple[Scalar, ...] = ()
+        singularity_margin: Scalar = 1.0  # of a leg that is known to carry forces along lines alone
         if centres:
             squares = (centres.square(reference, length),)
             lines = (Line(centres.point, self._slide_along(centres.along)),)
             singularity_margin = centres.singularity_margin(reference, length)
-        elif lines:
-            singularity_margin = 1.0
-        else:
+        wrenches = tuple(line.wrench(reference) for line in lines)
+        if not lines:
             needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
             wrenches, singularity_margin = reciprocal_wrenches(needed, length)
-        if lines:
-            wrenches = tuple(line.wrench(reference) for line in lines)
         elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
         return LegScrews(
             passive=passive,
@@ -365,7 +366,11 @@ class Leg:
         )
 
     def _load_squares(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
-        """Squares of the loads by unit wrenches; for all turns, those by the arm of the first one."""
+        """Square of the greatest load that a unit wrench can exert on each spring, beside which others are round-off.
+
+        It is 1 for a slide, and length² + arm² for a turn, m². All turns have the arm of the first one: only the
+        magnitude counts, and traced programs then need one product.
+        """
         turning = next((twist for twist in elastic if not twist.slides), None)
         square = 1.0 if turning is None else length * length + turning.translational.dot(turning.translational)
         return tuple(1.0 if twist.slides else square for twist in elastic)

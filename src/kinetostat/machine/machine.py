@@ -1,8 +1,7 @@
 """The machine: a family, its parameters as plain frozen data, and what the family makes of them at a pose.
 
-Parameters may be floats or traced scalars; nothing here validates (that is `spec`) and nothing here solves.
-
-Points and axes are in the base frame.
+Parameters may be floats or traced scalars. Methods that change numbers have them checked by `parameters` and `spec`, as
+a file is; nothing here solves. Points and axes are in the base frame.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -19,7 +18,7 @@ from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_in
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
-from kinetostat.machine.parameters import Given, check_contrast, parameters, read_numbers, values, with_values
+from kinetostat.machine.parameters import POSE, Given, check_contrast, parameters, read_numbers, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
@@ -262,7 +261,7 @@ class Machine(Immutable):
         family: the kind of machine.
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
-        written: the file it was read from; None where it was made of data. Comparisons leave it out.
+        written: the file it was read from; None where it was made of data. Comparisons (`Immutable`) leave it out.
         requirements: the requirements of its file's table [requirements], by name; they change no number
             (`studies.requirements`).
         tolerances: the tolerances of its file's table [tolerances], by what they are about; they change
@@ -407,11 +406,11 @@ def frame_of(machine: Machine, axes: str = "base") -> str:
 def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:
     """List the coordinates of the pose that do not vary, in the units of its display; empty where all vary."""
     numbers = values(machine)
-    fixed = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
+    fixed = [p for p in parameters(machine.family) if p.path.startswith(POSE) and p.path not in varied]
     shown = (
         machine.display.show(float(numbers[p.path]), KINDS[p.quantity.kind].unit, digits=POSE_DIGITS) for p in fixed
     )
-    return ", ".join(f"{p.path.removeprefix('pose.')} {text}" for p, text in zip(fixed, shown, strict=True))
+    return ", ".join(f"{p.path.removeprefix(POSE)} {text}" for p, text in zip(fixed, shown, strict=True))
 
 
 def setting_of(machine: Machine, varied: Collection[str] = ()) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.screw import Twist
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import needs_masses, needs_motion
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from kinetostat.motion.rigid import MotionPlan, RigidLeg, RigidMachine
 else:  # most responses are asked for nothing that moves
     machine_at_pose = LateModule("kinetostat.motion.machine_at_pose")
-
-SIZE = 6
-"""Components of a twist."""
 
 
 def response_in_motion(
@@ -45,9 +43,9 @@ def response_in_motion(
     if plan is None:
         return replace(response, lost_motion_of_joints=[0.0] * SIZE)
     placed = machine_at_pose.at_pose(machine, response.configuration, joints, plan)
-    # Fewer drives than motions hold nothing.
-    are_enough = len(placed.rigid.drives) >= len(placed.rigid.ways or range(SIZE))
-    loads = machine_at_pose.loads_by_acceleration(placed) if needs_masses(names) and are_enough else None
+    # With fewer drives than motions, no forces of drives balance an acceleration.
+    drives_suffice = len(placed.rigid.drives) >= len(placed.rigid.ways or range(SIZE))
+    loads = machine_at_pose.loads_by_acceleration(placed) if needs_masses(names) and drives_suffice else None
     lost_motion = lost_motion_of_joints(placed.rigid, response)
     return replace(response, acceleration_loads=loads, lost_motion_of_joints=lost_motion)
 
@@ -73,13 +71,15 @@ def lost_motion_of_joints(machine: "RigidMachine", response: Response) -> list[S
     first = 0
     for rigid_leg, leg, screws in zip(machine.legs, response.configuration.legs, response.legs, strict=True):
         if any(not is_zero(part.coulomb) for part in rigid_leg.friction):
-            for component, motion in enumerate(tool_motions):
-                for number, spring in enumerate(leg.springs, first):
+            spring_numbers = range(first, first + len(leg.springs))
+            loads = [response.statics.flexibility[number].components() for number in spring_numbers]
+            for component, tool_motion in enumerate(tool_motions):
+                # Springs between the joints and the tool move the tool, not the joints.
+                joint_motion = tool_motion
+                for spring, twist, number, load in zip(leg.springs, screws.elastic, spring_numbers, loads, strict=True):
                     if not (spring.actuated or spring.hinge):
-                        load = response.statics.flexibility[number].components()[component]
-                        deflection = screws.elastic[number - first] * (compliances[number] * load)
-                        motion = motion - deflection
-                lost[component].append(_lost_motion_of_leg(rigid_leg, motion, machine.length))
+                        joint_motion = joint_motion - twist * (compliances[number] * load[component])
+                lost[component].append(_lost_motion_of_leg(rigid_leg, joint_motion, machine.length))
         first += len(leg.springs)
     return [total(row) for row in lost]
 
@@ -98,14 +98,17 @@ def _motions_under_unit_loads(response: Response, compliances: Sequence[Scalar])
         entries = [response.compliance.entry(i, row) for i in range(SIZE)]
         column = Twist(Vector(*entries[:3]), Vector(*entries[3:]))
         for twist, new, old in zip(response.statics.flexibility, compliances, response.statics.compliance, strict=True):
-            if new is not old:
+            if new is not old:  # a loop replaces the spring; the same object needs no correction
                 column = column + twist * ((new - old) * twist.components()[row])
         columns.append(column)
     return columns
 
 
 def _lost_motion_of_leg(leg: "RigidLeg", motion: Twist, length: Scalar) -> Scalar:
-    """Return the motion, m or rad, that friction of the joints of a leg holds back.
+    """Return the motion of the tool that friction of the joints of a leg holds back: along a force m, of a moment rad.
+
+    Frictions are forces, N, of joints that turn over the machine's length, and rates are rad or machine lengths per
+    unit of the load. So the length makes their products work per unit of the load. A friction c goes from c to -c.
 
     Args:
         leg: the leg.

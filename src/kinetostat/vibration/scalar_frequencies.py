@@ -42,8 +42,8 @@ from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, pl
 from kinetostat.vibration.modes import frequencies, hertz, mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
 EQUAL_SQUARES = 1e-9
-"""Relative difference of the squares of two frequencies up to which they count as equal: far above round-off, and far
-below what two parts that are meant to differ do."""
+"""Relative difference of 1 / omega² up to which two modes share one frequency: far above round-off, and far below what
+two parts that are meant to differ do."""
 PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.(.*\.)?rotor_inertia|legs\..*\.mass|sections\..*\.density")
 """Leaf paths of parameters that may give links or rotors a mass."""
 SPARE_MODES = 5
@@ -51,7 +51,7 @@ SPARE_MODES = 5
 
 
 def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
-    """Whether `free_frequencies` can compute a machine at all values of its varying parameters (leaf paths)."""
+    """Whether `frequencies_over_scalars` can compute a machine at all values of its varying parameters (leaf paths)."""
     state = state_of(machine)
     with np.errstate(all="ignore"):
         if platform_alone(state, varying):
@@ -81,7 +81,9 @@ def legs_without_mass(machine: Machine, configuration: Configuration) -> bool:
     )
 
 
-def free_frequencies(machine: Machine, response: Response, joints: Joints | None, sloped: bool = False) -> list[Scalar]:
+def frequencies_over_scalars(
+    machine: Machine, response: Response, joints: Joints | None, sloped: bool = False
+) -> list[Scalar]:
     """Return the lowest natural frequencies of a machine with relaxed springs, Hz [MODES]; infinite beyond the last.
 
     Args:
@@ -91,14 +93,14 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
         sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
     """
     if legs_without_mass(machine, response.configuration):
-        return lowest_frequencies(eigenvalues(platform_matrix(machine, response), sloped))
+        return sorted_frequencies(eigenvalues(platform_matrix(machine, response), sloped))
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None or machine_cut.legs:
         raise ValueError("loops that rods do not cut have no frequencies over scalars")
-    return frequencies_at(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
+    return frequencies_of_cut(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
 
 
-def pose_frequencies(state: MachineState) -> Array:
+def numpy_frequencies(state: MachineState) -> Array:
     """Return natural frequencies of any machine at n poses, by NumPy, Hz [n x MODES]; NaN if springs do not hold it."""
     machine, response, count = state.machine, state.free, state.count
     if not legs_without_mass(machine, response.configuration):
@@ -150,37 +152,37 @@ def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
     return result
 
 
-def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list[Scalar]:
+def frequencies_of_cut(machine_cut: Cut, coordinates: Row, sloped: bool = False) -> list[Scalar]:
     """Return the lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
 
     Args:
-        machine: the machine with its loops cut; where legs close some, the platform alone is massive.
+        machine_cut: the machine with its loops cut; where legs close some, the platform alone is massive.
         coordinates: coordinates of its carrier at rest.
         sloped: whether derivatives will be taken, see `algebra.symmetric.eigenvalues`.
     """
-    if machine.legs:
-        tangent, mechanism = LegwiseTangent(machine, coordinates), machine.mechanism
+    if machine_cut.legs:
+        tangent, mechanism = LegwiseTangent(machine_cut, coordinates), machine_cut.mechanism
         inertia = platform_inertia(mechanism.platform, tangent.platform, mechanism.length)[0]
         stiff, mass = tangent.over_springs(inertia)
     else:
-        stiff, mass = _matrices_over_carrier(machine, coordinates)
-    return lowest_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
+        stiff, mass = _matrices_over_carrier(machine_cut, coordinates)
+    return sorted_frequencies(eigenvalues(relative(elimination(stiff.tolist()), mass), sloped))
 
 
-def _matrices_over_carrier(machine: Cut, coordinates: Row) -> tuple[Array, Array]:
+def _matrices_over_carrier(machine_cut: Cut, coordinates: Row) -> tuple[Array, Array]:
     """Return K and M over the coordinates of the carrier of a machine whose loops are all cut at rods."""
-    place, mechanism = place_of(machine, coordinates), machine.mechanism
+    place, mechanism = place_of(machine_cut, coordinates), machine_cut.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = machine.carrier.chain.place(of_scalars(coordinates), amounts)
+    placed = machine_cut.carrier.chain.place(of_scalars(coordinates), amounts)
     length, twists = mechanism.length, place.terms.rates[0]
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
-    for rod in machine.rods:
+    for rod in machine_cut.rods:
         if not is_zero(rod.rotor):
             inertia = inertia + _stretch_dyad(rod, place.platform.point(rod.ends.far)) * (rod.rotor * length[0])
     mass = twists.T @ inertia @ twists
-    for _, matrix in mass_matrices(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
+    for _, matrix in mass_matrices(machine_cut.carrier.masses, leg_rates(machine_cut.carrier, placed), length):
         mass = mass + matrix[0]
-    return 0.5 * (place.rates + place.rates.T), mass + np.diag(machine.carrier.rotors[0] * length[0])
+    return 0.5 * (place.rates + place.rates.T), mass + np.diag(machine_cut.carrier.rotors[0] * length[0])
 
 
 def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
@@ -193,37 +195,37 @@ def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
     return np.asarray(np.outer(line, line))
 
 
-def lowest_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
+def sorted_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
     """Return the lowest natural frequencies in rising order, Hz [MODES]; equal ones share their mean.
 
     Args:
         modes: 1 / omega² of each mode, s², in any order.
     """
-    squares, size = [*modes], len(modes)
+    inverse_squares, size = [*modes], len(modes)
     for first in range(size):  # odd-even sort without branches: exchange neighbours until the largest come first
         for k in range(first % 2, size - 1, 2):
-            left, right = squares[k], squares[k + 1]
+            left, right = inverse_squares[k], inverse_squares[k + 1]
             swap = left < right
-            squares[k], squares[k + 1] = where(swap, right, left), where(swap, left, right)
-    largest = squares[:MODES]
-    means = [_mean_of_equals(squares, square) for square in largest] + [0.0] * (MODES - len(largest))
-    return [_frequency(mean, squares[0]) for mean in means]
+            inverse_squares[k], inverse_squares[k + 1] = where(swap, right, left), where(swap, left, right)
+    largest = inverse_squares[:MODES]
+    means = [_mean_of_equals(inverse_squares, each) for each in largest] + [0.0] * (MODES - len(largest))
+    return [_frequency(mean, inverse_squares[0]) for mean in means]
 
 
-def _mean_of_equals(squares: Sequence[Scalar], square: Scalar) -> Scalar:
-    equals = [abs(other - square) <= EQUAL_SQUARES * abs(square) for other in squares]
-    sums = total([where(equal, other, 0.0) for equal, other in zip(equals, squares, strict=True)])
+def _mean_of_equals(inverse_squares: Sequence[Scalar], inverse_square: Scalar) -> Scalar:
+    equals = [abs(other - inverse_square) <= EQUAL_SQUARES * abs(inverse_square) for other in inverse_squares]
+    sums = total([where(equal, other, 0.0) for equal, other in zip(equals, inverse_squares, strict=True)])
     return sums / total([where(equal, 1.0, 0.0) for equal in equals])
 
 
-def _frequency(square: Scalar, largest: Scalar) -> Scalar:
+def _frequency(inverse_square: Scalar, largest: Scalar) -> Scalar:
     """Return the frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
-    finite = square > UNRESISTED * largest
-    return where(finite, 0.5 / math.pi / sqrt(where(finite, square, 1.0)), math.inf)
+    finite = inverse_square > UNRESISTED * largest
+    return where(finite, 0.5 / math.pi / sqrt(where(finite, inverse_square, 1.0)), math.inf)
 
 
 def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
-    """Return the lowest modes of a machine with relaxed springs at n poses as columns for `Vibrating.squares` [n].
+    """Return the lowest modes of a machine with relaxed springs at n poses as columns for `MachineOfKnownModes` [n].
 
     Args:
         machine: the machine, with columns of n poses.
@@ -242,18 +244,18 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
     columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
     for part in solved_modes(equations):
         known = min(most, part.inverse_squares.shape[1])
-        squares, shapes = part.inverse_squares[:, :known], part.shapes[:, :, :known]
+        inverse_squares, shapes = part.inverse_squares[:, :known], part.shapes[:, :, :known]
         # Along allowed motions mu K y = M y; across them, the forces of the constraints balance the difference.
-        imbalance = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes
+        imbalance = stiff[part.rows] @ shapes * inverse_squares[:, None] - mass[part.rows] @ shapes
         forces = np.linalg.pinv(np.swapaxes(constraints[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ imbalance
-        rows = np.concatenate([squares[:, None], shapes, forces[:, :closing]], axis=1)
+        rows = np.concatenate([inverse_squares[:, None], shapes, forces[:, :closing]], axis=1)
         columns[part.rows] = 0.0
         columns[part.rows, :known] = np.swapaxes(rows, 1, 2)
     return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
 
 
 @dataclass(frozen=True)
-class Vibrating:
+class MachineOfKnownModes:
     """A machine with relaxed springs whose modes are known, over scalars.
 
     Attributes:
@@ -274,7 +276,7 @@ class Vibrating:
         """Number of columns that `mode_columns` makes of it."""
         return 1 + self.most * (1 + sum(self.sizes) + self.sizes[0] * len(self.mechanism.legs))
 
-    def squares(self, columns: Sequence[Scalar]) -> list[Scalar]:
+    def inverse_squares(self, columns: Sequence[Scalar]) -> list[Scalar]:
         """1 / omega² of each mode, s² [most]: exact, as their derivatives by the machine's parameters are.
 
         Args:
@@ -283,12 +285,16 @@ class Vibrating:
         force_unit, *of_modes = columns
         size = len(of_modes) // self.most
         ratio = self.mechanism.force[0] / force_unit
-        return [self._square(of_modes[k * size : (k + 1) * size], ratio) for k in range(self.most)]
+        return [self._inverse_square(of_modes[k * size : (k + 1) * size], ratio) for k in range(self.most)]
 
-    def _square(self, columns: Sequence[Scalar], ratio: Scalar) -> Scalar:
-        """Return mu + y^T M y - mu y^T K y + 2 forces . what opens the legs, of which all but mu add up to 0."""
+    def _inverse_square(self, columns: Sequence[Scalar], ratio: Scalar) -> Scalar:
+        """Return mu + r (y^T M y - mu y^T K y) + 2 f . g for one mode y, with mu = 1 / omega².
+
+        f are the forces that close the legs, g the gaps that y opens, and r is the ratio of the units of force of this
+        machine and of the one whose mode it is. At the known mode all but mu vanishes; its derivatives do not.
+        """
         mechanism, remaining = self.mechanism, iter(columns)
-        square = next(remaining)
+        inverse_square = next(remaining)
         rates, *leg_motions = [of_scalars([next(remaining) for _ in range(size)])[0] for size in self.sizes]
         forces = [mechanism.ways @ [next(remaining) for _ in range(self.sizes[0])] for _ in mechanism.legs]
         twist = mechanism.ways @ rates
@@ -302,10 +308,12 @@ class Vibrating:
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
             end_twist = placed.screws[0].T @ (leg.chain.follows @ motion)
             opening_work = opening_work + total(list(force * (end_twist - twist)))
-        return square + ratio * (kinetic - square * strain) + 2.0 * opening_work
+        return inverse_square + ratio * (kinetic - inverse_square * strain) + 2.0 * opening_work
 
 
-def vibrating(machine: Machine, response: Response, joints: Joints | None, most: int) -> Vibrating:
+def machine_of_known_modes(
+    machine: Machine, response: Response, joints: Joints | None, most: int
+) -> MachineOfKnownModes:
     """Return a machine with numbers of any kind, whose modes will be known.
 
     Args:
@@ -314,4 +322,4 @@ def vibrating(machine: Machine, response: Response, joints: Joints | None, most:
         joints: coordinates that close its legs, if it is written leg by leg.
         most: number of modes.
     """
-    return Vibrating(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0), most)
+    return MachineOfKnownModes(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0), most)

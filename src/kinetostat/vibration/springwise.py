@@ -320,7 +320,7 @@ def _triangle(matrix: Array) -> list[Scalar]:
 
 
 def motions_without_loads(machine: Machine, response: Response, joints: Joints | None) -> SpringMotions:
-    """Return the motions of a machine with relaxed springs and numbers of any kind; arguments as of `vibrating`."""
+    """Return the motions of a machine with relaxed springs; arguments as of `machine_of_known_modes`."""
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None:
         raise ValueError("loops that cannot be cut have no motions over scalars")

@@ -72,8 +72,10 @@ def _check_axes(data: Any, where: str) -> None:
 
 def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
     axis = getattr(data, "axis", (0.0, 0.0, 1.0))
-    sizes = {"normal": math.hypot(axis[0], axis[1]), "along": abs(axis[2]), "always": 0.0, "": math.inf}
-    if not sizes[JOINT_TYPES[joint.kind].in_plane] < PARALLEL_IN_FILE * math.hypot(*axis):
+    # The part of the axis that must be nothing beside it: 0 of a joint that always moves in the plane, infinite of one
+    # that never does.
+    wrong_parts = {"normal": math.hypot(axis[0], axis[1]), "along": abs(axis[2]), "always": 0.0, "": math.inf}
+    if not wrong_parts[JOINT_TYPES[joint.kind].in_plane] < PARALLEL_IN_FILE * math.hypot(*axis):
         raise InputError(
             f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
             'change its axis or its type, or write space = "spatial".'
@@ -101,9 +103,10 @@ def _check_link(
 def complete_plan(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     """The plan with what its numbers tell of each leg: its closed form, idle freedoms, and joints about one point.
 
-    Freedoms are idle that depend on others by form: as the file writes them, up to round-off. Near such a form a leg is
-    nearly locked, and its margin falls to zero with the angle that is left. The home pose may be special, so that
-    joints are displaced at random to find idle freedoms; legs need not close for that.
+    A freedom is idle if it depends on the others at every pose, up to round-off of the file. One that only nearly does
+    is not: a file that is off by an angle describes a leg that is nearly locked, with a margin of about that angle. The
+    home pose may be special, so that joints are displaced at random to find idle freedoms; legs need not close for
+    that, and a fixed seed gives a file the same plan each time.
     """
     home = chains(plan, **tables)
     amounts = iter(np.random.default_rng(1).uniform(-RANDOM_AMOUNT, RANDOM_AMOUNT, home.size).tolist())
@@ -135,7 +138,7 @@ def _centre(joint: Joint) -> tuple[float, ...] | None:
 
 
 def _dependent_freedoms(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
-    """Numbers of the freedoms that depend on the others; those that a plane does not have count as given.
+    """Numbers of the freedoms that depend on the others; those that a plane does not have count as present.
 
     The method is Gram and Schmidt's with pivoting: the largest rest is kept and taken out of the others.
     """
@@ -145,8 +148,8 @@ def _dependent_freedoms(freedoms: Sequence[Joint], planar: bool, reference: Vect
     twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
     matrix = np.array(twists, dtype=float).T / np.repeat([1.0, length or 1.0], 3)[:, None]
     matrix /= np.linalg.norm(matrix, axis=0)
-    given, rests = matrix[:, : len(absent)], matrix[:, len(absent) :]
-    rests = rests - given @ np.linalg.lstsq(given, rests, rcond=None)[0] if absent else rests
+    missing_in_plane, rests = matrix[:, : len(absent)], matrix[:, len(absent) :]
+    rests = rests - missing_in_plane @ np.linalg.lstsq(missing_in_plane, rests, rcond=None)[0] if absent else rests
     independent: list[int] = []
     for _ in range(rests.shape[1]):
         sizes = np.linalg.norm(rests, axis=0)
@@ -179,16 +182,16 @@ def check_chain(leg: str, joints: tuple[JointPlan, ...], legs: Mapping[str, Any]
     body, passed = BASE, {BASE}
     for i, joint in enumerate(joints):
         near, far = joint.joins
-        place = f'{where}, joint "{joint.name}"'
+        at = f'{where}, joint "{joint.name}"'
         if near != body:
             before = f'joint "{joints[i - 1].name}" ends at "{body}"' if i else 'a leg starts at "base"'
             raise InputError(
-                f'{place} starts at "{near}", but {before}: the chain is disconnected. '
+                f'{at} starts at "{near}", but {before}: the chain is disconnected. '
                 + (_branching(near) if near in passed else _elsewhere(near, leg, legs, body, f'["{body}", "{far}"]'))
             )
         if far in passed or (far == PLATFORM and i < len(joints) - 1):
             raise InputError(
-                f'{place} leads to "{far}" too early; a leg passes each body once and ends at the platform. Of loops '
+                f'{at} leads to "{far}" too early; a leg passes each body once and ends at the platform. Of loops '
                 "within a leg only a parallelogram can be written, which is one joint."
             )
         body, passed = far, {*passed, far}
