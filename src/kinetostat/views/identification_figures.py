@@ -31,16 +31,18 @@ ROOM_ABOVE_RESIDUALS, OUTLIER_PLACE = 1.3, 0.94
 """Half the height of a panel over its greatest residual, and where an outlier beyond it stands, as a share of that."""
 LEAST_RESIDUAL = 1e-12
 """Residual that a panel shows at least, in its unit: one whose values fit exactly still has a scale."""
+FIT_CAPTIONS = {
+    "residuals": "What is left of every measured value, as drawn and as identified.",
+    "correlations": "Correlations of the numbers: which ones were found together.",
+    "poses": "The tool points at which was measured, from above and from the front.",
+}
+"""Caption of each figure by its name; a report writes them below the pictures of a record, too."""
 
 
 def identification_figures(answer: Identification) -> dict[str, Drawing]:
     """Return the drawings of an identification, by name."""
-    drawings = (
-        ("residuals", "What is left of every measured value, as drawn and as identified.", residual_figure),
-        ("correlations", "Correlations of the numbers: which ones were found together.", correlation_figure),
-        ("poses", "The tool points at which was measured, from above and from the front.", pose_figure),
-    )
-    return {name: Drawing(caption, partial(draw, answer)) for name, caption, draw in drawings}
+    draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
+    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in FIT_CAPTIONS.items()}
 
 
 def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
