@@ -7,7 +7,7 @@ coordinates of the pose. Further, what must hold of any such equations: power, s
 import numpy as np
 import pytest
 
-from kinetostat.engine.moving import Path, forces_on_path, rigid_form
+from kinetostat.engine.moving import PosePath, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import actuator_loads_at_rest, state_of
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinetostatics.drive_limits import driven_springs
@@ -139,7 +139,7 @@ def circle(machine, count, share=1.0):
         angle = turns * time + phase
         pose[name], rates[name] = middle + size * np.sin(angle), size * turns * np.cos(angle)
         accelerations[name] = -size * turns**2 * np.sin(angle)
-    return Path(pose, rates, accelerations)
+    return PosePath(pose, rates, accelerations)
 
 
 def losses(machine, form, path, point):
@@ -252,7 +252,7 @@ def test_operators_over_pose_and_drives_give_the_forces(name):
 
 def single(machine, rates, gains):
     names, pose = named(machine)
-    return Path(*({n: np.array([v]) for n, v in zip(names, row, strict=True)} for row in (pose, rates, gains)))
+    return PosePath(*({n: np.array([v]) for n, v in zip(names, row, strict=True)} for row in (pose, rates, gains)))
 
 
 @pytest.mark.parametrize("name", [*(name for name in NAMES if name != "tripteron"), "hexapod-rus"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from kinetostat.engine.moving import Path, forces_on_path, rigid_form
+from kinetostat.engine.moving import PosePath, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import POSE, values, with_values
@@ -43,7 +43,7 @@ def swing(machine, count, size=0.01):
     rates = {name: size * 2.0 * np.pi * np.cos(angle + phases[name]) for name in here}
     gains = {name: -size * (2.0 * np.pi) ** 2 * np.sin(angle + phases[name]) for name in here}
     loads = {path: most * (1.0 + np.sin(angle + most)) for path, most in WRENCH.items()}
-    return Path(pose, rates, gains, loads)
+    return PosePath(pose, rates, gains, loads)
 
 
 def read(folder, machine, text, points=400):
@@ -61,7 +61,7 @@ def test_forces_along_a_motion_are_those_of_the_file_at_each_point(name, compile
         by_hand = with_values(machine, {leaf: float(rows[point]) for leaf, rows in path.loads.items()})
         alone = path.at(np.array([point]))
         there = forces_on_path(
-            rigid_form(state_of(by_hand)), Path(alone.pose, alone.rates, alone.accelerations), True, compiled=False
+            rigid_form(state_of(by_hand)), PosePath(alone.pose, alone.rates, alone.accelerations), True, compiled=False
         )
         for part in ("drives", "joints", "wrench"):
             expected = getattr(there, part)[..., 0]
@@ -148,7 +148,7 @@ def still(motion, point):
     """The machine at rest at one point of a motion, twice, with the forces of its file."""
     pose = {name: np.full(2, rows[point]) for name, rows in motion.path.pose.items()}
     rest = {name: np.zeros(2) for name in pose}
-    return Motion("rest", np.array([0.0, 1.0]), Path(pose, rest, rest))
+    return Motion("rest", np.array([0.0, 1.0]), PosePath(pose, rest, rest))
 
 
 def test_a_motion_that_ends_with_another_force_does_not_go_on_for_ever(tmp_path):
@@ -219,7 +219,7 @@ def test_a_force_alone_asks_something_of_drives_and_motors(tmp_path):
 def test_a_motion_made_in_python_has_forces_too():
     machine = load("hexapod", [*MASSES])
     path = swing(machine, 16)
-    quiet = Path(path.pose, path.rates, path.accelerations)
+    quiet = PosePath(path.pose, path.rates, path.accelerations)
     times = np.linspace(0.0, 1.0, 16)
     forces, others = (drives(machine, Motion("swing", times, way)).curves for way in (path, quiet))
     assert np.abs(forces.parts[:, 2]).max() > 10.0

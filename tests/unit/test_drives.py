@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kinetostat.display import number
-from kinetostat.engine.moving import Path
+from kinetostat.engine.moving import PosePath
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, load
 from kinetostat.motion.forces import PARTS
@@ -225,7 +225,7 @@ def test_no_direction_asks_for_more_than_the_worst_ones():
             {n: part[:, names.index(n)] if n in names else np.zeros(3000) for n in pose}
             for part in (rates * speed, gains * 5.0)
         ]
-        random = drives(machine, Motion("random", np.zeros(3000), Path(pose, *parts), timeless=True))
+        random = drives(machine, Motion("random", np.zeros(3000), PosePath(pose, *parts), timeless=True))
         for first, second in zip(worst.drives, random.drives, strict=True):
             assert share * second.force <= first.force * (1.0 + 1e-9)
             assert first.force < 1.03 * second.force

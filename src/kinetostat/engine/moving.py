@@ -46,7 +46,7 @@ COMPILED_FROM = 2000
 
 
 @dataclass(frozen=True)
-class Path:
+class PosePath:
     """Points of a motion.
 
     Attributes:
@@ -74,10 +74,10 @@ class Path:
         """Number of points."""
         return len(next(iter(self.pose.values())))
 
-    def at(self, rows: Integers) -> "Path":
+    def at(self, rows: Integers) -> "PosePath":
         """Return some of its points, by number."""
         parts = (self.pose, self.rates, self.accelerations, self.loads)
-        return Path(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
+        return PosePath(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def rigid_form(state: MachineState) -> RigidForm:
     return RigidForm(state.machine, plan, masses if any(masses) else ())
 
 
-def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: bool | None = None) -> PathForces:
+def forces_on_path(form: RigidForm, path: PosePath, joints: bool = False, compiled: bool | None = None) -> PathForces:
     """Compute what drives do along a motion, and if wanted what joints pass on.
 
     Args:
@@ -188,7 +188,7 @@ def forces_on_path(form: RigidForm, path: Path, joints: bool = False, compiled: 
     )
 
 
-def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
+def _by_columns(form: RigidForm, path: PosePath, joints: bool) -> tuple[Array, Codes]:
     with np.errstate(all="ignore"):
         state = states_at(form.machine, path.columns, path.size)
         parts = form.at(state)
@@ -208,7 +208,7 @@ def _by_columns(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
     return results, codes
 
 
-def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes]:
+def _by_program(form: RigidForm, path: PosePath, joints: bool) -> tuple[Array, Codes]:
     """By machine code, which closes the legs itself where they have closed forms; the rest is closed before it."""
     closed = closes_inside(form.machine)
     results, status = _run(form, path, joints, closed)
@@ -218,7 +218,7 @@ def _by_program(form: RigidForm, path: Path, joints: bool) -> tuple[Array, Codes
     return results, status
 
 
-def _run(form: RigidForm, path: Path, joints: bool, closed: bool) -> tuple[Array, Codes]:
+def _run(form: RigidForm, path: PosePath, joints: bool, closed: bool) -> tuple[Array, Codes]:
     machine, varying = form.machine, path.columns
     shape, fixed = form_of(machine, list(varying))
     options = {"plan": form.plan, "links": len(form.masses), "joints_too": joints, "closed": closed}

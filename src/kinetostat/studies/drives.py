@@ -34,7 +34,8 @@ from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.dynamics import places_of_drives, rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
-from kinetostat.studies.motions import Motion, every_direction, read_motion, required_motion
+from kinetostat.studies.motions import Motion, read_motion, required_motion
+from kinetostat.studies.worst_directions import every_direction
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import KINDS, UnitError
 

@@ -1,7 +1,7 @@
 """Motions: poses over time from a CSV file, as positions, rates and accelerations of the coordinates of the pose.
 
 The head of the file says which kind it is: poses at times; moves with a feed rate, which begin and end at rest; or
-sines about the pose of the machine. Nothing is computed about the machine here.
+sines about the pose of the machine. A machine file may name such files in its requirements.
 
 Source: theory (96)-(98).
 """
@@ -17,14 +17,12 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from kinetostat.arrays import Array
-from kinetostat.engine.moving import Path as MovedPath
-from kinetostat.engine.moving import RigidForm, forces_on_path
+from kinetostat.engine.moving import PosePath
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import POINT
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLES, part_of
 from kinetostat.machine.parameters import POSE, find, named_entry, values
-from kinetostat.motion.machine_at_pose import NUMBERS_OF_DRIVE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
@@ -50,8 +48,6 @@ SAME_POSE = 1e-12
 """Difference of a coordinate of the first and the last pose, SI, up to which the motion is a closed one."""
 WHOLE_PERIODS = 1e-9
 """Difference from a whole number of periods of the slowest sine up to which a sine has come back to its start."""
-DIRECTIONS_OF_SPEED = 32
-"""Directions of the speed, beside those in which a drive is fastest: in space they are some 35 degrees apart."""
 POINTS_PER_PERIOD = 256
 """Least number of points in a period of the fastest sine: its greatest value is missed by less than 1e-4."""
 MOST_PERIODS = 200
@@ -73,7 +69,7 @@ class Motion:
 
     kind: str
     times: Array
-    path: MovedPath
+    path: PosePath
     periodic: bool = False
     timeless: bool = False
     unit_doubt: str = ""
@@ -88,74 +84,6 @@ class Motion:
         """Forces and moments that it says, by name, with their units, as JSON has columns of poses."""
         units = {path: "N" if ".force." in path else "N·m" for path in self.path.loads}
         return {named_entry(path): {"units": units[path], "values": self.path.loads[path]} for path in units}
-
-
-def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motion:
-    """A speed and an acceleration of the platform point in the directions that are worst for each drive.
-
-    A drive is fastest where the speed is along its row of J, and its inertia is greatest where the acceleration is
-    along its row of J^-T M, either way; each of these accelerations is met by each of those speeds, by others spread
-    evenly over all directions, and by rest.
-
-    Args:
-        form: form of the machine's equations, at its pose.
-        speed, acceleration: speed and acceleration of the platform point, m/s and m/s².
-
-    Raises:
-        InputError: no coordinate of the pose is x, y or z.
-    """
-    coordinates = {
-        path.removeprefix(POSE): float(v) for path, v in values(form.machine).items() if path.startswith(POSE)
-    }
-    moving = [name for name in coordinates if name in POINT]
-    if not moving:
-        raise InputError(f"no coordinate of the pose of {form.machine.name} is x, y or z; give a motion instead.")
-    count = len(moving)
-    units, zeros = np.eye(count), np.zeros((count, count))
-    # Unit speeds at rest of all else, then unit accelerations: their numbers are the columns of J and of J^-T M.
-    answer = forces_on_path(
-        form, _at_pose(coordinates, moving, np.concatenate([units, zeros]), np.concatenate([zeros, units]))
-    ).drives
-    fastest, hardest = answer[:, 0, :count], answer[:, NUMBERS_OF_DRIVE.index("inertia"), count:]
-    speeds = np.concatenate([np.zeros((1, count)), *_both_ways(fastest), _spread(count)]) * speed
-    accelerations = np.concatenate(_both_ways(hardest)) * acceleration
-    pairs = np.repeat(speeds, len(accelerations), axis=0), np.tile(accelerations, (len(speeds), 1))
-    return Motion(
-        f"every direction at {speed:.4g} m/s and {acceleration:.4g} m/s²",
-        np.zeros(len(pairs[0])),
-        _at_pose(coordinates, moving, *pairs),
-        timeless=True,
-    )
-
-
-def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, accelerations: Array) -> MovedPath:
-    """Rates and accelerations of some coordinates [n x moving], all at one pose."""
-    count = len(rates)
-    parts = [
-        {name: part[:, moving.index(name)] if name in moving else np.zeros(count) for name in here}
-        for part in (rates, accelerations)
-    ]
-    return MovedPath({name: np.full(count, value) for name, value in here.items()}, *parts)
-
-
-def _both_ways(rows: Array) -> list[Array]:
-    """Unit vectors along rows that are not zero, and against them."""
-    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
-    units = rows[sizes[:, 0] > 0.0] / sizes[sizes[:, 0] > 0.0]
-    return [units, -units]
-
-
-def _spread(size: int) -> Array:
-    """Directions spread evenly over a sphere, a circle or a line [n x size]."""
-    if size == 1:
-        return np.array([[1.0], [-1.0]])
-    shares = (np.arange(DIRECTIONS_OF_SPEED) + 0.5) / DIRECTIONS_OF_SPEED
-    if size == 2:
-        return np.column_stack([np.cos(2.0 * np.pi * shares), np.sin(2.0 * np.pi * shares)])
-    # Fibonacci's lattice: even steps of height, and turns by the golden angle.
-    height, angle = 1.0 - 2.0 * shares, np.pi * (1.0 + np.sqrt(5.0)) * DIRECTIONS_OF_SPEED * shares
-    across = np.sqrt(1.0 - height**2)
-    return np.column_stack([across * np.cos(angle), across * np.sin(angle), height])
 
 
 def read_motion(machine: Machine, path: Path, points: int = 400, text: str | None = None) -> Motion:
@@ -282,11 +210,14 @@ def _coordinates_and_loads(
 
 def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array], times: Array, points: int) -> Motion:
     """The spline through poses at times, theory (96); periodic where it ends at its first pose and loads."""
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(times) < 2 or late.size:
-        after = f"after {times[late[0]]:g} s comes {times[late[0] + 1]:g} s" if late.size else "there is only one pose"
+    not_later = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(times) < 2 or not_later.size:
+        after = "there is only one pose"
+        if not_later.size:
+            after = f"after {times[not_later[0]]:g} s comes {times[not_later[0] + 1]:g} s"
         raise InputError(f"times must grow from line to line, but {after}; put the poses in their order.")
     table = np.stack(list(coordinates.values()), axis=1)
+    # A periodic spline needs more points than its degree, beside the last one, which is the first again.
     closed = len(times) > SPLINE_DEGREE + 1 and bool((np.abs(table[0] - table[-1]) < SAME_POSE).all())
     if closed:
         table[-1] = table[0]
@@ -296,13 +227,14 @@ def _through_poses(coordinates: Mapping[str, Array], loads: Mapping[str, Array],
     rows = [np.asarray(spline(fine, nu=order)) for order in range(3)]
     kind = f"{len(times)} poses over {times[-1] - times[0]:.4g} s"
     path = _path(list(coordinates), rows, {name: np.interp(fine, times, column) for name, column in loads.items()})
-    return Motion(kind, fine, path, closed and all(column[0] == column[-1] for column in loads.values()))
+    periodic = closed and all(column[0] == column[-1] for column in loads.values())
+    return Motion(kind=kind, times=fine, path=path, periodic=periodic)
 
 
-def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array]) -> MovedPath:
+def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array]) -> PosePath:
     """Coordinates, rates and accelerations [n x coordinates] by name, with loads."""
     pose, rates, accelerations = (dict(zip(names, np.ascontiguousarray(part.T), strict=True)) for part in rows)
-    return MovedPath(pose, rates, accelerations, loads)
+    return PosePath(pose, rates, accelerations, loads)
 
 
 def _shapes(column: GivenColumn | None, count: int) -> list[str]:
@@ -316,8 +248,8 @@ def _shapes(column: GivenColumn | None, count: int) -> list[str]:
         raise InputError(
             "the first pose is where the motion begins, and the last one ends a move: neither is on an arc."
         )
-    for before, word in pairwise(words):
-        if (before == "through") is not (word == "arc"):
+    for previous, word in pairwise(words):
+        if (previous == "through") is not (word == "arc"):
             raise InputError("an arc needs a line with the shape through before it, and that one an arc behind it.")
     return words
 
@@ -352,7 +284,7 @@ def _moves(
     joined_loads = {name: np.concatenate(parts) for name, parts in loads_of_moves.items()}
     phases_in_words = "seven phases" if JERK in amounts else "three phases"
     kind = f"{_number_of(len(moves), 'move')} of {phases_in_words}, {clock:.4g} s"
-    return Motion(kind, np.concatenate(times), _path(names, joined_rows, joined_loads))
+    return Motion(kind=kind, times=np.concatenate(times), path=_path(names, joined_rows, joined_loads))
 
 
 @dataclass(frozen=True)
@@ -402,7 +334,8 @@ def _sines(machine: Machine, columns: Mapping[str, GivenColumn], points: int) ->
     periods = [sine.rate / slowest for sine in sines]
     closes = all(abs(number - round(number)) < WHOLE_PERIODS for number in periods)
     kind = f"{_number_of(len(sines), 'sine')}, {times[-1]:.4g} s"
-    return Motion(kind, times, MovedPath(coordinates, rates, accelerations, loads), closes)
+    path = PosePath(coordinates, rates, accelerations, loads)
+    return Motion(kind=kind, times=times, path=path, periodic=closes)
 
 
 def _sines_of_lines(machine: Machine, columns: Mapping[str, GivenColumn]) -> list[_Sine]:

@@ -31,13 +31,12 @@ from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.search import optimize
 from kinetostat.studies.optimisation.slopes import ridge_sentences
+from kinetostat.studies.printed_equations import EquationCheck, derivation
 from kinetostat.studies.printed_numbers import (
-    EquationCheck,
     PaperNumber,
     PrintVerdict,
     at,
     coefficients,
-    derivation,
     equations_33_38,
     section_4_3,
     table_3,

@@ -21,7 +21,8 @@ from rich.text import Text
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.spec.installation import command, start_command
 from kinetostat.studies import printed_numbers
-from kinetostat.studies.printed_numbers import EquationCheck, PaperNumber, PrintVerdict
+from kinetostat.studies.printed_equations import EquationCheck
+from kinetostat.studies.printed_numbers import PaperNumber, PrintVerdict
 from kinetostat.studies.reproduction import Claim, Finding, Reproduction
 from kinetostat.studies.storage import write_text
 from kinetostat.views.answers import write_files
