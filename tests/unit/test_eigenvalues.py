@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.symmetric import greatest_eigenvalue
-from kinetostat.engine.gradient import Interpreted, gradient
+from kinetostat.engine.gradient import InterpretedBody, gradient
 from kinetostat.engine.trace import Body, Graph
 
 COUNT = 5000
@@ -61,7 +61,7 @@ def test_its_derivatives_are_the_dyad_of_its_vector(diagonal):
     result = greatest_eigenvalue([[inputs[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
     assert gradient(result, list(inputs.values()))
     found, codes = np.empty((7, 2)), np.empty(2, dtype=np.int8)
-    program = Interpreted(Body([], list(inputs.values()), [result], 0.0), list(inputs.values()))
+    program = InterpretedBody(Body([], list(inputs.values()), [result], 0.0), list(inputs.values()))
     program.run(np.empty(0), [np.ascontiguousarray(stack[:, i, j]) for i, j in places], found, codes)
     vectors = np.linalg.eigh(stack)[1][:, :, -1]
     for row, (i, j) in zip(found[1:], places, strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.scalar import cos, sin, smaller, sqrt, where
-from kinetostat.engine.gradient import Interpreted, gradient, share_of, with_gradients
+from kinetostat.engine.gradient import InterpretedBody, gradient, share_of, with_gradients
 from kinetostat.engine.machine_code import Program, machine_code_of
 from kinetostat.engine.trace import Body, Graph, needed_nodes
 
@@ -78,7 +78,7 @@ def test_every_rule_is_that_of_calculus(name):
     body, inputs = bodies(RULES[name])
     x, y = points()
     expected = differences(RULES[name], x, y)
-    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), InterpretedBody(body, inputs)):
         value, *slopes = run(runnable, [], [x, y])
         assert value == pytest.approx(RULES[name](x, y) + 0 * x, rel=EXACT)
         assert np.array(slopes) == pytest.approx(expected.astype(float), rel=EXACT, abs=EXACT)
@@ -89,8 +89,18 @@ def test_an_input_may_be_the_same_at_all_points(name):
     body, inputs = bodies(RULES[name], fixed=True)
     y = points()[1]
     expected = differences(RULES[name], 0.3 + 0 * y, y)
-    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), InterpretedBody(body, inputs)):
         assert run(runnable, [0.3], [y])[1:] == pytest.approx(expected.astype(float), rel=EXACT, abs=EXACT)
+
+
+def test_an_input_that_is_given_twice_has_its_derivative_twice():
+    graph = Graph()
+    x = graph.input()
+    body, inputs = Body([], [x], [x * x], 0.0), [x, x]
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), InterpretedBody(body, inputs)):
+        results, codes = np.empty((3, 2)), np.empty(2, dtype=np.int8)
+        runnable.run(np.empty(0), [np.array([1.0, 3.0])], results, codes)
+        assert results.tolist() == [[1.0, 9.0], [2.0, 6.0], [2.0, 6.0]]
 
 
 def test_what_depends_on_fixed_inputs_alone_is_computed_once():
@@ -105,7 +115,7 @@ def test_a_cosine_is_differentiated_as_such_and_not_as_its_series():
     """By its series, the derivative at many turns would be that of the remainder: wrong at every quarter turn."""
     body, inputs = bodies(lambda x, y: cos(x) + y)
     x = np.concatenate([np.arange(-8, 9) * np.pi / 4, [1e5, -3e5]])
-    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), InterpretedBody(body, inputs)):
         assert run(runnable, [], [x, x])[1] == pytest.approx(-np.sin(x), rel=1e-15, abs=1e-15)
 
 
@@ -140,7 +150,7 @@ def test_inputs_may_be_nodes_on_the_way():
 def test_a_branch_not_taken_leaves_nothing_behind():
     body, inputs = bodies(lambda x, y: where(x > 0.0, 1.0 / where(x > 0.0, x, 1.0), 0.0) + y)
     x = np.array([-1.0, 0.0, 2.0, -3.0, 4.0, 0.0, 1.0, 1.0])
-    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), Interpreted(body, inputs)):
+    for runnable in (Program(machine_code_of(with_gradients(body, inputs))), InterpretedBody(body, inputs)):
         by_x = run(runnable, [], [x, x])[1]
         assert by_x == pytest.approx(np.where(x > 0, -1.0 / np.where(x > 0, x, 1.0) ** 2, 0.0), rel=1e-15)
 

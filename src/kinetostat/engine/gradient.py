@@ -2,7 +2,7 @@
 
 Every operation passes on to its operands how a result depends on them, from the result back to the inputs. The rules
 hold over any scalar: over nodes, derivatives are further nodes of the same graph, shared where equal (`gradient`); over
-arrays they are numbers, beside those of the results themselves (`Interpreted`).
+arrays they are numbers, beside those of the results themselves (`InterpretedBody`).
 
 At a kink a derivative is that of the branch that is taken, of |0| that of the positive side. What a branch not taken
 makes infinite must be kept out of it, as by where(d > 0, 1 / where(d > 0, d, 1), 0).
@@ -10,6 +10,7 @@ makes infinite must be kept out of it, as by where(d > 0, 1 / where(d > 0, d, 1)
 Source: Griewank and Walther 2008, Evaluating Derivatives, section 3.2.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -84,7 +85,7 @@ def parents(node: Node) -> list[tuple[int, Traced]]:
     turn = node.graph.turns.get(node)
     if turn is not None:
         return [(0, turn[0])]
-    if isinstance(node, Condition) or node.operation == "steady":
+    if isinstance(node, Condition) or node.operation == "steady":  # "steady" passes a value on without its derivative
         return []
     return [(place, operand) for place, operand in enumerate(node.operands) if isinstance(operand, Traced)]
 
@@ -104,7 +105,7 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
         case "mul":
             return slope * operands[1 - place]
         case "div":
-            share = slope * (1.0 / operands[1])
+            share = slope * (1.0 / operands[1])  # the graph makes this reciprocal once, for both operands
             return share if place == 0 else -(share * value)
         case "sqrt":
             return slope * (0.5 * (1.0 / value))
@@ -115,7 +116,7 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
             return where(operands[0] < 0.0, -slope, slope)
         case "where":
             return where(operands[0], slope, 0.0) if place == 1 else where(operands[0], 0.0, slope)
-        case "turn":
+        case _ if operation == TURN_OPERATION:
             return slope * operands[1]
     raise ValueError(f"no derivative of {operation}")
 
@@ -143,10 +144,13 @@ Values = dict[int, Any]
 """Values by numbers of nodes."""
 
 
-class Interpreted:
+class InterpretedBody:
     """A body evaluated node by node with NumPy, for a few points, where machine code would not pay.
 
     Its results are those of the body, and then of each in turn its derivative by each input.
+
+    Attributes:
+        rows: number of rows of results.
     """
 
     def __init__(self, body: Body, inputs: Sequence[Traced]) -> None:
@@ -154,7 +158,8 @@ class Interpreted:
         self.rows = len(body.results) * (1 + len(inputs))
         self._active = active_nodes((result for result in body.results if isinstance(result, Node)), inputs)
         rates = [operand for node in self._active for operand in rule(node)[1]]
-        self._lines = [node for node in needed_nodes([*body.results, body.code, *rates]) if node.operation != "input"]
+        needed = needed_nodes([*body.results, body.code, *rates])
+        self._evaluated_nodes = [node for node in needed if node.operation != "input"]
 
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
         """Evaluate points, see `trace.Runnable`."""
@@ -162,7 +167,7 @@ class Interpreted:
         values: Values = {node.number: value for node, value in zip(body.fixed, fixed, strict=True)}
         values |= {node.number: column for node, column in zip(body.columns, rows_of(columns), strict=True)}
         with np.errstate(all="ignore"):
-            for node in self._lines:
+            for node in self._evaluated_nodes:
                 values[node.number] = NUMPY_FUNCTIONS[node.operation](*(_value(values, o) for o in node.operands))
             for row, result in zip(results[:count], body.results, strict=True):
                 row[:] = _value(values, result)
@@ -173,20 +178,22 @@ class Interpreted:
         """Pass slopes of all results back to the inputs at once, into `gradients` [results x inputs x points]."""
         gradients[:] = 0.0
         slopes = self._seeds(len(gradients[0, 0]) if gradients.size else 0)
-        rows = {node.number: k for k, node in enumerate(self._inputs)}
+        rows: defaultdict[int, list[int]] = defaultdict(list)
+        for row, node in enumerate(self._inputs):
+            rows[node.number].append(row)
         members = {node.number for node in self._active}
         for node in reversed(self._active):
             slope = slopes.pop(node.number, None)
             if slope is None:
                 continue
             if node.number in rows:
-                gradients[:, rows[node.number]] = slope
+                gradients[:, rows[node.number]] = slope[:, None]
             operation, operands = rule(node)
             operand_values = [_value(values, operand) for operand in operands]
             for place, operand in parents(node):
                 if operand.number in members:
                     share = share_of(operation, operand_values, values[node.number], place, slope)
-                    if operation in UNBOUNDED:
+                    if operation in UNBOUNDED:  # 0 times an infinite derivative is 0 here, not NaN
                         share = np.where(slope == 0.0, 0.0, share)
                     slopes[operand.number] = slopes[operand.number] + share if operand.number in slopes else share
 

@@ -24,7 +24,7 @@ from kinetostat.engine.form import (
     plan_for,
     reduced_angles,
 )
-from kinetostat.engine.gradient import Interpreted, with_gradients
+from kinetostat.engine.gradient import InterpretedBody, with_gradients
 from kinetostat.engine.machine_code import MachineCode, Program, machine_code_of, unpack
 from kinetostat.engine.program_files import read_program, write_program
 from kinetostat.engine.trace import Runnable
@@ -129,7 +129,7 @@ def program_of(recipe: Recipe, native: bool = True) -> Runnable:
         with suppress(ModuleNotFoundError):  # without LLVM all runs in NumPy, fifty times as long
             return Program(_machine_code(recipe))
     formula = recipe.formula()
-    return Interpreted(formula.body, formula.inputs)
+    return InterpretedBody(formula.body, formula.inputs)
 
 
 def machine_program_of(recipe: Recipe) -> Program:

@@ -33,7 +33,7 @@ from kinetostat.views.answers import write_form
 from kinetostat.views.data_forms import csv_text, no_formula
 from kinetostat.views.vibration import VIBRATION
 
-UNITS = {
+MATRIX_UNITS = {
     "stiffness": ("N·m/rad", "N/rad", "N/m"),
     "compliance": ("rad/(N·m)", "rad/N", "m/N"),
 }
@@ -61,7 +61,7 @@ def write_csv(analysis: Analysis, path: Path) -> list[Path]:
     """Write the results as CSV, one number a line: its names, all its digits and its unit; NaN is left empty."""
     dataset = as_dataset(analysis)
     rows = [("about", key, no_formula(str(dataset.attrs[key])), "", "") for key in HEAD_ATTRIBUTES]
-    for quantity, row, column, value in _numbers(dataset):
+    for quantity, row, column, value in _entries_of(dataset):
         shown = "" if math.isnan(value) else repr(value)
         rows.append((quantity, no_formula(row), no_formula(column), shown, _unit_of(dataset, quantity, row, column)))
     write_text(path, csv_text(CSV_HEADER, rows))
@@ -119,7 +119,8 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
     variables: dict[str, Variable] = {}
     for name, matrix in (("stiffness", analysis.stiffness), ("compliance", analysis.compliance)):
         if matrix is not None:
-            variables[name] = (("row", "column"), matrix, _attributes(f"Cartesian {name} at T", ", ".join(UNITS[name])))
+            attributes = _attributes(f"Cartesian {name} at T", ", ".join(MATRIX_UNITS[name]))
+            variables[name] = (("row", "column"), matrix, attributes)
     variables |= _spring_variables(analysis)
     variables |= _index_variables(analysis)
     variables["platform_position"] = (("base_axis",), list(position), _attributes("P in the base frame", "m"))
@@ -127,19 +128,20 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
     variables["platform_rotation"] = (("base_axis", "axis"), rotation, axes)
     variables["tool_point"] = (("base_axis",), point, _attributes("T in the base frame", "m"))
     variables |= _pose_variables(analysis)
+    pairs = zip(analysis.attribution, springs_of(analysis.state.configuration), strict=True)
     coordinates = {
         "row": names,
         "column": names,
         "component": names,
         "spring": [contribution.spring for contribution in analysis.attribution],
         "part": ("spring", [contribution.part for contribution in analysis.attribution]),
-        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(analysis.state.configuration)]),
+        "spring_unit": ("spring", [_spring_unit(spring) for _, spring in pairs]),
         "axis": list(AXES),
         "base_axis": list(AXES),
     }
     answer = {"status": analysis.status.word, "message": analysis.message, "axes": analysis.axes}
-    attributes = {**_origin_of(analysis.machine, analysis.axes), **answer, "order": " ".join(names)}
-    return xr.Dataset(variables, coordinates, attributes)
+    about = {**_origin_of(analysis.machine, analysis.axes), **answer, "order": " ".join(names)}
+    return xr.Dataset(variables, coordinates, about)
 
 
 def _origin_of(machine: Machine, axes: str = "base") -> dict[str, Any]:
@@ -177,7 +179,7 @@ def _spring_variables(analysis: Analysis) -> dict[str, Variable]:
         for name, (rows, meaning) in by_matrix.items()
     }
     stiffness = [spring.stiffness for spring in springs]
-    attributes = _attributes("of the spring; infinite if rigid", "N/m, N·m/rad")
+    attributes = _attributes("stiffness of the spring; infinite if rigid", "N/m, N·m/rad")
     variables["spring_stiffness"] = (("spring",), stiffness, attributes)
     return variables
 
@@ -191,11 +193,11 @@ def _index_variables(analysis: Analysis) -> dict[str, Variable]:
     indices, length = analysis.indices, analysis.characteristic_length
     condition = indices.stiffness_condition if indices else None
     scalars = {
-        "wrench_condition": (analysis.wrench_condition, "condition of W, of the leg wrenches", "1"),
+        "wrench_condition": (analysis.wrench_condition, "condition of W, the leg wrenches", "1"),
         "jacobian_condition": (analysis.jacobian_condition, "condition of the actuators' Jacobian", "1"),
         "stiffness_condition": (condition, "condition of K, by its extreme eigenvalues", "1"),
-        "characteristic_length": (length, "by which rotations are compared with translations", "m"),
-        "moving_mass": (analysis.moving_mass, "of what moves, as far as it is known", "kg"),
+        "characteristic_length": (length, "length that makes rotations comparable with translations", "m"),
+        "moving_mass": (analysis.moving_mass, "mass of the moving parts, as far as known", "kg"),
     }
     variables: dict[str, Variable] = {
         name: ((), value, _attributes(meaning, unit))
@@ -203,7 +205,7 @@ def _index_variables(analysis: Analysis) -> dict[str, Variable]:
         if value is not None and math.isfinite(value)
     }
     for block, principal in ((indices and indices.principal_compliances) or {}).items():
-        unit = UNITS["compliance"][0 if block == "rotation" else 2]
+        unit = MATRIX_UNITS["compliance"][0 if block == "rotation" else 2]
         attributes = _attributes(f"principal compliances, {block}", unit)
         variables[f"principal_compliance_{block}"] = ((f"principal_{block}",), list(principal.compliances), attributes)
     return variables
@@ -213,7 +215,7 @@ def _attributes(meaning: str, unit: str) -> dict[str, str]:
     return {"long_name": meaning, "units": unit}
 
 
-def _numbers(dataset: xr.Dataset) -> Iterator[tuple[str, str, str, float]]:
+def _entries_of(dataset: xr.Dataset) -> Iterator[tuple[str, str, str, float]]:
     """Give every number of a dataset: quantity, label of its row, label of its column, value."""
     for name, variable in dataset.data_vars.items():
         sizes = variable.sizes
@@ -229,9 +231,9 @@ def _label(dataset: xr.Dataset, dim: str, i: int) -> str:
 
 
 def _unit_of(dataset: xr.Dataset, name: str, row: str, column: str) -> str:
-    if name in UNITS:
+    if name in MATRIX_UNITS:
         translations = sum(label not in ROTATIONS for label in (row, column))
-        return UNITS[name][translations]
+        return MATRIX_UNITS[name][translations]
     if name == "spring_stiffness":
         return str(dataset["spring_unit"].sel(spring=row).values)
     return str(dataset[name].attrs["units"])
@@ -260,10 +262,11 @@ def _matlab_results(analysis: Analysis) -> dict[str, Any]:
         "platform_rotation": np.array(rotation),
         "pose": {name: float(value) for name, (_, value, _) in pose.items()},
         "units": {
-            "K": ", ".join(UNITS["stiffness"]),
-            "C": ", ".join(UNITS["compliance"]),
+            "K": ", ".join(MATRIX_UNITS["stiffness"]),
+            "C": ", ".join(MATRIX_UNITS["compliance"]),
             "reference_point": "m, base frame",
             "platform_position": "m, base frame",
+            "platform_rotation": "1, platform axes in the base frame",
             "pose": {name: attributes["units"] for name, (_, _, attributes) in pose.items()},
         },
     }

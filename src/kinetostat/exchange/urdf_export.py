@@ -49,8 +49,8 @@ STROKE = 10.0
 """Limit of a slide from the pose, in machine lengths: URDF requires one, which should stop no motion of the machine."""
 EFFORT = 1e6
 """Limit of the effort of a slide, N: URDF requires one, and no machine of these sizes carries as much."""
-VELOCITY = 1.0
-"""Limit of the velocity of a slide, m/s: URDF requires one, and nothing that we write depends on it."""
+VELOCITY = 1e3
+"""Limit of the velocity of a slide, m/s: URDF requires one, which should stop no motion either."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,10 @@ class _Carrier:
 
 
 class _Tree:
-    """The file while it is written; every name in it is unique."""
+    """The file while it is written; every name in it is unique.
+
+    It is made with all its links and joints; masses may follow.
+    """
 
     def __init__(self, analysis: Analysis, configuration: Configuration) -> None:
         planar = configuration.plane is not None
@@ -111,7 +114,7 @@ class _Tree:
         for tip in other_tips:
             self._close(tip)
 
-    def weigh(self, machine: Machine, response: Response, joints: Joints | None) -> None:
+    def add_masses(self, machine: Machine, response: Response, joints: Joints | None) -> None:
         """Add what weighs something to the links, as far as a link carries it whole.
 
         Args:
@@ -123,6 +126,7 @@ class _Tree:
         }
         missing_mass = 0.0
         names = [leg.name for leg in response.configuration.legs]
+        # Members without a leg are those of the leg without an actuator, or of the first one where all are driven.
         passive = next((i for i, leg in enumerate(response.configuration.legs) if leg.number is None), 0)
         for member in located_members(machine, response.configuration, None if joints is None else joints.coordinates):
             if member.mass:
@@ -141,10 +145,10 @@ class _Tree:
 
     def _add_inertial(self, link: ElementTree.Element, origin: Array, part: Heavy) -> None:
         element = SubElement(link, "inertial")
-        SubElement(element, "origin", xyz=_numbers(*(part.centre - origin)), rpy="0 0 0")
-        SubElement(element, "mass", value=_numbers(part.mass))
+        SubElement(element, "origin", xyz=_digits_of(*(part.centre - origin)), rpy="0 0 0")
+        SubElement(element, "mass", value=_digits_of(part.mass))
         pairs = combinations_with_replacement(range(3), 2)
-        entries = {f"i{'xyz'[i]}{'xyz'[j]}": _numbers(part.inertia[i, j]) for i, j in pairs}
+        entries = {f"i{'xyz'[i]}{'xyz'[j]}": _digits_of(part.inertia[i, j]) for i, j in pairs}
         SubElement(element, "inertia", entries)
 
     def _add_link(self, name: str, origin: Array, reach: Array | None = None) -> None:
@@ -156,9 +160,9 @@ class _Tree:
             visual = SubElement(element, "visual")
             x, y, z = reach
             pitch, yaw = float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))
-            SubElement(visual, "origin", xyz=_numbers(*(reach / 2.0)), rpy=_numbers(0.0, pitch, yaw))
+            SubElement(visual, "origin", xyz=_digits_of(*(reach / 2.0)), rpy=_digits_of(0.0, pitch, yaw))
             geometry = SubElement(visual, "geometry")
-            SubElement(geometry, "cylinder", radius=_numbers(ROD_RADIUS * self._size), length=_numbers(length))
+            SubElement(geometry, "cylinder", radius=_digits_of(ROD_RADIUS * self._size), length=_digits_of(length))
 
     def _unique(self, name: str) -> str:
         word = _plain_name(name)
@@ -167,11 +171,11 @@ class _Tree:
 
     def _add_leg(self, leg: Leg) -> str:
         """Add a whole leg, and return the name of its last link."""
-        row = list(joints_of(leg)) or [(0, UrdfJoint(f"{leg.name} foot", "fixed", self._platform))]
-        ends = [*(joint.origin for _, joint in row[1:]), self._platform]
+        leg_joints = list(joints_of(leg)) or [(0, UrdfJoint(f"{leg.name} foot", "fixed", self._platform))]
+        ends = [*(joint.origin for _, joint in leg_joints[1:]), self._platform]
         link, joint_before, carriers = BASE, "", []
-        for i, ((elements, joint), end) in enumerate(zip(row, ends, strict=True), 1):
-            child = self._unique(f"{leg.name}{TIP}" if i == len(row) else f"{leg.name} body {i}")
+        for i, ((elements, joint), end) in enumerate(zip(leg_joints, ends, strict=True), 1):
+            child = self._unique(f"{leg.name}{TIP}" if i == len(leg_joints) else f"{leg.name} body {i}")
             joint_before = self._add_joint(joint, link, child, end - joint.origin, joint_before)
             link = child
             if elements:  # a foot carries nothing that moves
@@ -188,15 +192,15 @@ class _Tree:
         element = SubElement(self.robot, "joint", name=name, type=joint.kind)
         SubElement(element, "parent", link=parent)
         SubElement(element, "child", link=child)
-        SubElement(element, "origin", xyz=_numbers(*(joint.origin - self._links[parent][1])), rpy="0 0 0")
+        SubElement(element, "origin", xyz=_digits_of(*(joint.origin - self._links[parent][1])), rpy="0 0 0")
         if joint.axis is not None:
-            SubElement(element, "axis", xyz=_numbers(*joint.axis))
+            SubElement(element, "axis", xyz=_digits_of(*joint.axis))
         if joint.kind == "prismatic":
             limits = {"lower": -STROKE * self._size, "upper": STROKE * self._size}
             limits |= {"effort": EFFORT, "velocity": VELOCITY}
-            SubElement(element, "limit", {limit: _numbers(value) for limit, value in limits.items()})
+            SubElement(element, "limit", {limit: _digits_of(value) for limit, value in limits.items()})
         if joint.mimics:
-            SubElement(element, "mimic", joint=joint_before, multiplier=_numbers(MIMIC_RATIO), offset="0")
+            SubElement(element, "mimic", joint=joint_before, multiplier=_digits_of(MIMIC_RATIO), offset="0")
         if joint.extension:
             SubElement(element, "kinetostat", joint.extension)
         if joint.extension.get("actuated"):
@@ -218,7 +222,7 @@ def texts_of(analysis: Analysis) -> tuple[str, str]:
     machine = analysis.machine
     response = analysis.state.free
     tree = _Tree(analysis, response.configuration)
-    tree.weigh(machine, response, analysis.state.joints)
+    tree.add_masses(machine, response, analysis.state.joints)
     ElementTree.indent(tree.robot, "  ")
     text = '<?xml version="1.0"?>\n' + ElementTree.tostring(tree.robot, encoding="unicode") + "\n"
     lists = {
@@ -234,7 +238,7 @@ def _plain_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "unnamed"
 
 
-def _numbers(*numbers: float) -> str:
+def _digits_of(*numbers: float) -> str:
     """Return the numbers with all their digits."""
     return " ".join(repr(float(number)) for number in numbers)
 
@@ -348,13 +352,13 @@ def _bearings(springs: Sequence[Spring], before: Array) -> Iterator[UrdfJoint]:
         origin = array(points[0]) if points else before
         matrix = compliance_at(part_springs, Vector(*origin.tolist()))
         if np.any(matrix):
-            yield UrdfJoint(part, "fixed", origin, extension={"compliance": _numbers(*matrix.ravel())})
+            yield UrdfJoint(part, "fixed", origin, extension={"compliance": _digits_of(*matrix.ravel())})
 
 
 def _parallelogram(piece: Parallelogram) -> Iterator[UrdfJoint]:
     normal = array(piece.normal)
     bar = "rigid" if math.isinf(piece.bar) else repr(float(piece.bar))
-    side = _numbers(*array(piece.side))
+    side = _digits_of(*array(piece.side))
     extension = {"parallelogram": side, "width": repr(float(piece.width)), "bar_stiffness": bar}
     yield UrdfJoint(f"{piece.name} near", "continuous", array(piece.near), normal)
     yield UrdfJoint(f"{piece.name} far", "continuous", array(piece.far), normal, extension, mimics=True)

@@ -23,7 +23,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, Turn
 from kinetostat.machine.link import Beam, Parallelogram, matrix_springs
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine, Member, Plane
@@ -254,8 +254,8 @@ def _joint(leg: str, joint: Entry, document: Entry) -> list[LegPart]:
         axial_rigidity = _axial_rigidity(joint, document)
         if axial_rigidity is not None:
             freedom_of_rod = replace(freedom, carriage=vector(joint["point"]))
-            rod = Spring(PartName(leg, f"{joint['name']} rod"), freedom_of_rod, axial_rigidity)
-            in_series.append(LegPart(rod, rod=True))
+            rod = Spring(PartName(leg, f"{joint['name']} rod"), freedom_of_rod, RIGID)
+            in_series.append(LegPart(rod, axial_rigidity=float(axial_rigidity)))
         moving[driven : driven + 1] = in_series
     bearings = [LegPart(spring) for spring in _bearings(name, joint)]
     travel = BEARINGS_TRAVEL[kind] if kind in BEARINGS_TRAVEL else JOINT_TYPES[kind].bearings_travel

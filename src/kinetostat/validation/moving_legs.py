@@ -23,7 +23,8 @@ from kinetostat.tolerances import CLOSED
 from kinetostat.validation.pieces import array, tensor_of
 
 MOST_CLOSING_STEPS = 20
-"""Steps of Newton's method from coordinates that should be those of the pose already: a handful are enough."""
+"""Steps of Newton's method from coordinates that should be those of the pose already: a handful are enough, and legs
+that have not closed after some more do not reach."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,14 @@ class LegPart:
     """A part of a leg at the home pose.
 
     Attributes:
-        element: the element with its points and axes; the stiffness of a rod is its E A.
+        element: the element with its points and axes.
         moves: whether a joint coordinate moves what follows.
-        rod: whether it is the rod of a strut, whose stiffness depends on its length.
+        axial_rigidity: E A of the rod of a strut, N, whose stiffness follows from its length at a pose; None of others.
     """
 
     element: Element
     moves: bool = False
-    rod: bool = False
+    axial_rigidity: float | None = None
 
     def motion(self, amount: float) -> Array:
         """Return the placement of what follows once the part has moved by an amount (rad, m) from the home pose."""
@@ -202,9 +203,9 @@ class MovingLeg:
         chain = [part.at_pose(before, after) for part, before, after in pairs]
         for number, part in enumerate(self.parts):
             rod = chain[number]
-            if part.rod and isinstance(rod, Spring):
+            if part.axial_rigidity is not None and isinstance(rod, Spring):
                 start, end = self._rod_ends(number, chain)
-                chain[number] = replace(rod, stiffness=float(rod.stiffness) / float(np.linalg.norm(end - start)))
+                chain[number] = replace(rod, stiffness=part.axial_rigidity / float(np.linalg.norm(end - start)))
         return Leg(self.name, tuple(chain))
 
     def _rod_ends(self, number: int, chain: Sequence[Element]) -> tuple[Array, Array]:
