@@ -213,7 +213,7 @@ def test_a_force_alone_asks_something_of_drives_and_motors(tmp_path):
     assert max(drive.force for drive in answer.drives) > 100.0
     assert all(drive.speed == 0.0 for drive in answer.drives)
     light, heavy = (motors(machine, read(tmp_path, machine, MOVES.replace("-10", z))) for z in ("-10", "-1000"))
-    assert heavy.fits[0].peak > 3.0 * light.fits[0].peak
+    assert heavy.candidates[0].peak > 3.0 * light.candidates[0].peak
 
 
 def test_a_motion_made_in_python_has_forces_too():

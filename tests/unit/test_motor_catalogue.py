@@ -60,7 +60,7 @@ def test_shafts_of_screws_turn_as_solid_steel_of_their_diameter_unless_the_file_
         diameter, lead = (1e-3 * float(size) for size in name.removeprefix("ball-").split("x"))
         mass = 7850.0 * np.pi * (0.5 * diameter) ** 2 * 0.3
         assert (screw.lead, screw.length) == pytest.approx((lead, 0.3))
-        assert screw.turning == pytest.approx(0.5 * mass * (0.5 * diameter) ** 2)
+        assert screw.total_inertia == pytest.approx(0.5 * mass * (0.5 * diameter) ** 2)
         assert "steel" in catalogue.sources["screws", name]
     path = tmp_path / "mine.toml"
     path.write_text(
@@ -80,22 +80,22 @@ def test_limits_are_constant_then_of_constant_power_then_nothing():
 
 def test_a_fit_is_what_drives_says_with_the_rotor_of_the_motor(motion):
     answer = motors(load("hexapod", SETTINGS), motion)
-    fit = next(fit for fit in answer.fits if fit.name == "yaskawa-sgmsh-10a")
+    fit = next(fit for fit in answer.candidates if fit.name == "yaskawa-sgmsh-10a")
     alone = drives(load("hexapod", [*SETTINGS, "drives.rotor_inertia=1.74e-4"]), motion)
     torque, speed = np.abs(alone.curves.motor_torque), np.abs(alone.curves.motor_speed)
     limit = np.where(speed <= 100.0 * math.pi, 9.54, 9.54 * 100.0 * math.pi / np.maximum(speed, 1.0))
     assert fit.peak == pytest.approx((torque / limit).max(), rel=1e-9)
     assert fit.continuous == pytest.approx(max(drive.rms_torque for drive in alone.drives) / 3.18, rel=1e-9)
     assert fit.speed == pytest.approx(speed.max() / (5000.0 * math.pi / 30.0), rel=1e-9)
-    assert answer.fits[0].fits
-    assert not answer.fits[-1].fits
+    assert answer.candidates[0].suffices
+    assert not answer.candidates[-1].suffices
 
 
 def test_of_motors_that_do_not_fit_the_nearest_comes_first(motion):
     """Those that are too fast have no torque left, and so no finite share of it."""
     machine = load("hexapod", [*SETTINGS, "drives.lead=0.5 mm"])
     answer = motors(machine, motion)
-    missed = [fit for fit in answer.fits if not fit.fits]
+    missed = [fit for fit in answer.candidates if not fit.suffices]
     assert len(missed) > 2
     assert sum(math.isinf(fit.greatest_share) for fit in missed) > 1
     assert [fit.hardest[1] for fit in missed] == sorted(fit.hardest[1] for fit in missed)
@@ -109,7 +109,7 @@ def test_a_gear_or_a_screw_of_the_catalogue_takes_the_place_of_the_file(motion, 
         'inertia = "2e-5 kg*m**2"\n'
     )
     machine = load("hexapod", SETTINGS)
-    (fit,) = motors(machine, motion, path, screw="steep").fits
+    (fit,) = motors(machine, motion, path, screw="steep").candidates
     more = ["drives.lead=20 mm", "drives.efficiency=0.9", "drives.rotor_inertia=1.2e-4"]
     alone = drives(load("hexapod", [*SETTINGS, *more]), motion)
     np.testing.assert_allclose(fit.loads.curves.motor_torque, alone.curves.motor_torque, rtol=1e-12)
@@ -191,12 +191,12 @@ def required(folder, parts, name="mine.toml"):
 def test_a_file_requires_that_a_motor_fits_its_motion(motion, tmp_path, capsys):
     paths = [required(tmp_path, f'fits = "{name}", motion = "motion.csv"') for name in ("yaskawa-sgm7d-02k",)]
     (slow,) = requirements(load(paths[0]))
-    fits = {fit.name: fit for fit in motors(load("hexapod", SETTINGS), motion).fits}
+    fits = {fit.name: fit for fit in motors(load("hexapod", SETTINGS), motion).candidates}
     assert (slow.met, slow.worst, slow.poses) == (False, fits["yaskawa-sgm7d-02k"].greatest_share, 401)
     machine = load(required(tmp_path, 'fits = "yaskawa-sgmp-03b", motion = "motion.csv"', "good.toml"))
     (good,) = requirements(machine)
     fit = fits["yaskawa-sgmp-03b"]
-    assert (good.met, good.worst) == (fit.fits, fit.greatest_share) == (True, pytest.approx(1.0 - good.margin))
+    assert (good.met, good.worst) == (fit.suffices, fit.greatest_share) == (True, pytest.approx(1.0 - good.margin))
     assert f"the motion uses {100.0 * fit.hardest[1]:.0f} % of its {fit.hardest[0]}" in good.sentence(machine.display)
     there = machine.with_values(good.worst_pose)
     assert there.tables["pose"] != machine.tables["pose"]

@@ -27,6 +27,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity, quantities, table
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.drives import DriveLoads, drive_loads, root_mean_square
 from kinetostat.studies.dynamics import rigid_form_of
 from kinetostat.studies.motions import Motion, read_motion, required_motion
@@ -86,7 +87,7 @@ class ScrewRating:
     length: Annotated[float, Quantity("length", "of the screw shaft")] = 0.0
 
     @property
-    def turning(self) -> float:
+    def total_inertia(self) -> float:
         """Moment of inertia of all that turns with the screw, kg·m².
 
         Per length, a solid shaft has pi / 32 times its density times the fourth power of its diameter.
@@ -162,8 +163,9 @@ def _entry(kind: Any, where: str, given: Any) -> Any:
     return kind(**values)
 
 
+@former_names(fits="suffices")
 @dataclass(frozen=True)
-class MotorFit:
+class MotorCandidate:
     """A motor along a motion.
 
     Attributes:
@@ -200,11 +202,12 @@ class MotorFit:
         return max(shares.items(), key=lambda item: item[1] if math.isfinite(item[1]) else 0.0)
 
     @property
-    def fits(self) -> bool:
+    def suffices(self) -> bool:
         """Whether the motor does what the motion asks."""
         return self.greatest_share <= 1.0
 
 
+@former_names(fits="candidates")
 @dataclass(frozen=True, eq=False)
 class MotorChoice(ImmutableAnswer):
     """The motors of a catalogue along a motion.
@@ -213,15 +216,15 @@ class MotorChoice(ImmutableAnswer):
         machine: the machine with lead or ratio of its drives.
         status: status of the first pose without an answer, else OK.
         message: the answer in a sentence.
-        fits: each motor along the motion: those that fit, the smallest first, then the others, the nearest to fitting
-            first; none without an answer.
+        candidates: each motor along the motion: those that fit, the smallest first, then the others, the nearest to
+            fitting first; none without an answer.
         requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
 
     machine: Machine
     status: Status
     message: str
-    fits: tuple[MotorFit, ...] = ()
+    candidates: tuple[MotorCandidate, ...] = ()
     requirements: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
@@ -253,24 +256,29 @@ def motors(
     products = read_catalogue(catalogue)
     if not products.motors:
         raise InputError("the catalogue has no motors; write [motors.NAME] with torques, speeds and inertia.")
-    fitted, inertia = with_transmission(machine, products, gear, screw)
+    geared, inertia = with_transmission(machine, products, gear, screw)
     if isinstance(motion, Path):
-        motion = read_motion(fitted, motion, points)
+        motion = read_motion(geared, motion, points)
     elif motion is None:
-        motion = required_motion(fitted, points)
+        motion = required_motion(geared, points)
     if motion is None:
         raise InputError(
             "no motion is given, and the file requires no motor for one; name its CSV file, or write the requirement "
             f'drives = {{ fits = "{next(iter(products.motors))}", motion = "motion.csv" }}.'
         )
-    fits = []
+    candidates = []
     for name in products.motors:
-        loads = loads_with(fitted, products.motors[name], inertia, motion)
+        loads = loads_with(geared, products.motors[name], inertia, motion)
         if loads.curves is None or not loads.drives:
-            return MotorChoice(fitted, loads.status, loads.message)
-        fits.append(fit_of(products, name, loads))
-    ordered = tuple(sorted(fits, key=lambda fit: (not fit.fits, fit.motor.torque if fit.fits else fit.hardest[1])))
-    return MotorChoice(fitted, Status.OK, _message(ordered), ordered)
+            return MotorChoice(geared, loads.status, loads.message)
+        candidates.append(candidate_of(products, name, loads))
+    ordered = tuple(sorted(candidates, key=_order))
+    return MotorChoice(machine=geared, status=Status.OK, message=_message(ordered), candidates=ordered)
+
+
+def _order(candidate: MotorCandidate) -> tuple[bool, float]:
+    """Those that fit come first, by torque; then the others, by the limit that they miss most."""
+    return not candidate.suffices, candidate.motor.torque if candidate.suffices else candidate.hardest[1]
 
 
 def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: str) -> tuple[Machine, float]:
@@ -294,7 +302,7 @@ def with_transmission(machine: Machine, catalogue: Catalogue, gear: str, screw: 
     if screw:
         chosen_screw = catalogue.screws[choice(screw, catalogue.screws, "the screw of the catalogue")]
         settings |= {"drives.lead": chosen_screw.lead, "drives.efficiency": chosen_screw.efficiency}
-        inertia += chosen_screw.turning
+        inertia += chosen_screw.total_inertia
     return with_every_drive(machine, settings), inertia
 
 
@@ -331,13 +339,16 @@ def loads_with(machine: Machine, motor: MotorRating, inertia: float, motion: Mot
     return loads
 
 
-def fit_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
+def candidate_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorCandidate:
     """Compare what a motion asks with what a motor of a catalogue may give.
 
     Args:
         catalogue: the catalogue.
         name: name of the motor.
         loads: the demands of the motion on drives with this motor's rotors.
+
+    Raises:
+        ValueError: the loads have no curves, because the motion has no answer.
     """
     motor = catalogue.motors[name]
     if loads.curves is None or loads.motion is None:
@@ -352,7 +363,7 @@ def fit_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorFit:
     hardest = max(range(len(shares)), key=lambda k: max(shares[k]))
     ratios = [drive.inertia_ratio for drive in loads.drives if drive.inertia_ratio is not None]
     peak, continuous, speed_share = (max(column) for column in zip(*shares, strict=True))
-    return MotorFit(
+    return MotorCandidate(
         name=name,
         motor=motor,
         loads=loads,
@@ -372,17 +383,16 @@ def _share(torque: Array, limit: Array) -> float:
     return float(shares.max())
 
 
-def _message(fits: tuple[MotorFit, ...]) -> str:
-    good = [fit for fit in fits if fit.fits]
-    if good:
-        best = good[0]
-        used, count = f"{100.0 * best.greatest_share:.0f} %", f"{len(good)} of {len(fits)}"
-        return f"{best.name} fits: the motion uses {used} of what it may give; {count} motors fit."
-    nearest = fits[0]
-    return f"No motor fits: of {nearest.name}, the nearest, the motion asks {share_in_words(nearest)}."
+def _message(candidates: tuple[MotorCandidate, ...]) -> str:
+    count = sum(candidate.suffices for candidate in candidates)
+    best = candidates[0]
+    if not count:
+        return f"No motor fits: of {best.name}, the nearest, the motion asks {share_in_words(best)}."
+    share = f"{100.0 * best.greatest_share:.0f} %"
+    return f"{best.name} fits: the motion uses {share} of what it may give; {count} of {len(candidates)} motors fit."
 
 
-def share_in_words(fit: MotorFit) -> str:
+def share_in_words(candidate: MotorCandidate) -> str:
     """The share of the limit that a motion comes nearest to, such as "87 % of its peak torque"."""
-    limit, share = fit.hardest
+    limit, share = candidate.hardest
     return f"{100.0 * share:.0f} % of its {limit}"

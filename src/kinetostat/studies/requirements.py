@@ -141,17 +141,19 @@ def required_motors(machine: Machine) -> "motors.MotorChoice":
     The motors are in the order of the file, without its verdicts; none of a motion that the machine cannot make.
     """
     pairs = [_motor_along(machine, each)[1:] for each in machine.requirements.values() if each.fits]
-    stuck = next((loads for loads, fit in pairs if fit is None), None)
+    stuck = next((loads for loads, candidate in pairs if candidate is None), None)
     if stuck is not None:
         return motors.MotorChoice(machine, stuck.status, stuck.message)
-    fits = tuple(fit for _, fit in pairs if fit is not None)
-    sentences = (f"Of {fit.name}, which is required, the motion uses {motors.share_in_words(fit)}." for fit in fits)
-    return motors.MotorChoice(machine, Status.OK, " ".join(sentences), fits)
+    candidates = tuple(candidate for _, candidate in pairs if candidate is not None)
+    sentences = (
+        f"Of {each.name}, which is required, the motion uses {motors.share_in_words(each)}." for each in candidates
+    )
+    return motors.MotorChoice(machine, Status.OK, " ".join(sentences), candidates)
 
 
 def _motor_along(
     machine: Machine, requirement: Requirement
-) -> "tuple[motions.Motion, DriveLoads, motors.MotorFit | None]":
+) -> "tuple[motions.Motion, DriveLoads, motors.MotorCandidate | None]":
     """Return the motion of a requirement, what it asks of the drives, and how the motor fits; None without curves."""
     catalogue = motors.read_catalogue()
     if requirement.catalogue:
@@ -161,21 +163,21 @@ def _motor_along(
     motion = motions.motion_of(requirement, machine)
     geared, inertia = motors.with_transmission(machine, catalogue, requirement.gear, requirement.screw)
     loads = motors.loads_with(geared, catalogue.motors[motor], inertia, motion)
-    return motion, loads, None if loads.curves is None else motors.fit_of(catalogue, motor, loads)
+    return motion, loads, None if loads.curves is None else motors.candidate_of(catalogue, motor, loads)
 
 
 def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
     """Judge whether a motor can do a motion: it uses at most its limits, a share of 1."""
-    motion, loads, fit = _motor_along(machine, requirement)
+    motion, loads, candidate = _motor_along(machine, requirement)
     worst, place, words, pose = None, "", loads.message, dict[str, float]()
-    if loads.curves is not None and fit is not None:
-        worst, place = fit.greatest_share, fit.drive
-        row = [drive.name for drive in loads.drives].index(fit.drive)
-        speeds = fit.hardest[0] == "speed"
+    if loads.curves is not None and candidate is not None:
+        worst, place = candidate.greatest_share, candidate.drive
+        row = [drive.name for drive in loads.drives].index(candidate.drive)
+        speeds = candidate.hardest[0] == "speed"
         curve = loads.curves.motor_speed if speeds else loads.curves.motor_torque
         point = int(np.abs(curve[row]).argmax())
         pose = {path: float(rows[point]) for path, rows in motion.path.columns.items()}
-        words = f"the motion uses {motors.share_in_words(fit)}, most at {fit.drive}."
+        words = f"the motion uses {motors.share_in_words(candidate)}, most at {candidate.drive}."
     return Verdict(
         name=name,
         condition=f"fits {requirement.fits}",

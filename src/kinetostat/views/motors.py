@@ -17,7 +17,7 @@ from kinetostat.display import DASH, number
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine, setting_of
 from kinetostat.studies.drives import DriveCurves, DriveLoads, root_mean_square
-from kinetostat.studies.motors import MotorChoice, MotorFit, motors
+from kinetostat.studies.motors import MotorCandidate, MotorChoice, motors
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.units import load_unit
 from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
@@ -53,25 +53,26 @@ def _percent_text(share: float) -> str:
 
 def _lines(answer: MotorChoice) -> Lines:
     yield "Motors", answer.message
-    for best in answer.fits[:1]:  # all sources are in files; a reader wants to check the motor that the answer names
+    # All sources are in files; a reader wants to check the motor that the answer names.
+    for best in answer.candidates[:1]:
         if best.source:
             yield "Source", f"{best.name}: {best.source}."
 
 
 def _tables(answer: MotorChoice, _full: bool) -> Iterator[FittedTable]:
-    if not answer.fits:
+    if not answer.candidates:
         return
     columns = ["fits", "peak torque", "RMS", "speed", "inertia ratio", "hardest drive"]
     table = numeric_table("Share of its limits that the motion uses", "motor", columns)
-    for fit in answer.fits:
-        ratio = DASH if fit.inertia_ratio is None else number(fit.inertia_ratio, digits=3)
-        shares = [_percent_text(share) for share in (fit.peak, fit.continuous, fit.speed)]
-        table.add_row(fit.name, "yes" if fit.fits else "no", *shares, ratio, fit.drive)
+    for candidate in answer.candidates:
+        ratio = DASH if candidate.inertia_ratio is None else number(candidate.inertia_ratio, digits=3)
+        shares = [_percent_text(share) for share in (candidate.peak, candidate.continuous, candidate.speed)]
+        table.add_row(candidate.name, "yes" if candidate.suffices else "no", *shares, ratio, candidate.drive)
     yield table
 
 
 def _figures(answer: MotorChoice) -> dict[str, Drawing]:
-    if not answer.fits:
+    if not answer.candidates:
         return {}
     caption = "Torque and speed of all drives in the diagrams of the motors; circles: RMS."
     return {"motors": Drawing(caption, partial(motors_figure, answer))}
@@ -79,26 +80,27 @@ def _figures(answer: MotorChoice) -> dict[str, Drawing]:
 
 def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion") -> "Figure":
     """Draw the speed-torque diagram of the best motors, with the motion and its mean squares in it."""
-    shown = answer.fits[:MOST_DRAWN]
+    shown = answer.candidates[:MOST_DRAWN]
     rows, columns = figures.grid_shape(len(shown), most_columns=2)
     note = "shaded: torque that the motor may give; dark: for ever, light: for a short while"
     with figures.new_figure((1.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name)) as figure:
-        for panel, fit in zip(figures.panel_grid(figure, len(shown), most_columns=2), shown, strict=True):
-            _diagram(panel, answer, fit)
+        for panel, candidate in zip(figures.panel_grid(figure, len(shown), most_columns=2), shown, strict=True):
+            _diagram(panel, answer, candidate)
         name_drives(figure, shown[0].loads, f"{PEAK_MARK}\n{RMS_MARK}")
         note_motion(figure, shown[0].loads, note)
     return figure
 
 
-def _diagram(panel: "Axes", answer: MotorChoice, fit: MotorFit) -> None:
+def _diagram(panel: "Axes", answer: MotorChoice, candidate: MotorCandidate) -> None:
     scale = answer.machine.display.scale("N·m")
-    speeds = np.linspace(0.0, fit.motor.greatest_speed, LIMIT_POINTS)
+    speeds = np.linspace(0.0, candidate.motor.greatest_speed, LIMIT_POINTS)
     for peak, opacity in ((True, PEAK_OPACITY), (False, CONTINUOUS_OPACITY)):
-        limit = fit.motor.limit(peak, speeds) * scale.factor
+        limit = candidate.motor.limit(peak, speeds) * scale.factor
         panel.fill_between(speeds * PER_MINUTE, limit, color=LIMIT_COLOUR, alpha=opacity, linewidth=0.0)
-    if fit.loads.curves is not None:
-        draw_torque_over_speed(panel, fit.loads, rotary=True)
-    panel.set_title(f"{fit.name}: {'fits' if fit.fits else 'does not fit'}", loc="left", parse_math=False)
+    if candidate.loads.curves is not None:
+        draw_torque_over_speed(panel, candidate.loads, rotary=True)
+    verdict = "fits" if candidate.suffices else "does not fit"
+    panel.set_title(f"{candidate.name}: {verdict}", loc="left", parse_math=False)
 
 
 def curves_of(answer: DriveLoads) -> DriveCurves:
@@ -206,7 +208,7 @@ MOTORS = Description(
             "motor",
             (
                 Field("name", column="motor_name"),
-                Field("fits"),
+                Field("fits", "suffices"),
                 Field("peak", long_name="share of the peak torque limit that is used"),
                 Field("continuous", long_name="share of the continuous torque limit that is used"),
                 Field("speed", long_name="share of the greatest speed that is used"),
@@ -214,13 +216,13 @@ MOTORS = Description(
                 Field("drive", long_name="drive with the least reserve", column="worst_drive"),
                 Field("source"),
             ),
-            "fits",
+            "candidates",
         ),
     ),
     lines=_lines,
     tables=_tables,
     figures=_figures,
-    answered=lambda answer: bool(answer.fits),
+    answered=lambda answer: bool(answer.candidates),
     kept=lambda answer: all(verdict.met for verdict in answer.requirements),
     files={"motors.json": "json", "motors.csv": "csv"},
 )
