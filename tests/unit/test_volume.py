@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.points import Axis, Cells
+from kinetostat.numerics.isosurface import surface
 from kinetostat.studies.workspace import FEWEST_CELLS, connected_to, estimate_volume
-from kinetostat.studies.workspace_verdicts import surface
 
 
 def cells(*counts, seed=0, ends=(-1.0, 1.0)):

@@ -28,9 +28,9 @@ from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.evaluation import point_of_file
+from kinetostat.studies.pose_conditions import PoseCondition, parse_condition
 from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
-from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
 
 if TYPE_CHECKING:
     from kinetostat.studies import motions, motors

@@ -1,14 +1,11 @@
-"""Verdicts on poses: whether each belongs to the workspace, why not, what the poses inside demand; and its borders.
+"""Verdicts on poses: whether each belongs to the workspace and why not, how far its borders are, what poses demand.
 
-Verdicts follow from status, aspect and conditions on quantities, which people write as "free_stiffness_z > 20 N/um";
-demands follow from the measures of the limits. A border between two nodes of a grid may come from reach, a limit, a
-singularity or a condition. In every case the judge can say on which side a pose lies, so that halving the step between
-the nodes again and again finds the border without a formula for it; pictures then show the true outline and surface.
+Verdicts follow from status, aspect and conditions on quantities; demands follow from the measures of the limits. A
+border between two nodes may come from reach, a limit, a singularity or a condition. In every case the judge can say on
+which side a pose lies, so that halving the step between the nodes again and again finds the border without a formula
+for it; pictures then show the true outline and surface.
 """
 
-import math
-import operator
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -24,14 +21,11 @@ from kinetostat.equilibrium.state import MachineState
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.extremes import aspect
-from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.renamed import current_name
 from kinetostat.studies.datasets import GridQuestion
-from kinetostat.studies.quantities import resolve_quantities
-from kinetostat.units import KINDS, UnitError, as_read, parse
+from kinetostat.studies.pose_conditions import PoseCondition
+from kinetostat.units import as_read
 
 Poses = dict[str, Array]
 """Coordinates of poses by leaf path, SI."""
@@ -51,95 +45,9 @@ LIMIT_VERDICT, CONDITION_VERDICT = "limits.", "fails "
 """The words with which verdicts of limits and of conditions begin."""
 
 
-COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
-"""Comparisons of a condition, and their functions."""
-CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
-"""The end of messages about a text that is not a condition."""
-LONGEST_CONDITION = 200
-"""Characters of a condition; a longer text is refused unread."""
-_CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
-"""A condition: quantity, comparison and value."""
-COMPARED_KINDS = (
-    *("length", "angle", "force", "moment", "mass", "frequency"),
-    *("speed", "rate", "acceleration", "angular acceleration"),
-)
-"""Kinds of quantities beside stiffnesses and compliances, of which several have one unit."""
-KIND_OF_UNIT = {
-    kind.unit: kind.name
-    for kind in KINDS.values()
-    if kind.name.endswith(("stiffness", "compliance")) or kind.name in COMPARED_KINDS
-}
-"""Kind of the value with which a quantity of a unit is compared; values of other units are plain numbers."""
-
-
 def phrase(label: str) -> str:
     """Write a verdict in a few words."""
     return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT_VERDICT}{limit.name}"), label)
-
-
-@dataclass(frozen=True)
-class PoseCondition:
-    """A quantity compared with a value.
-
-    Attributes:
-        text: the condition as written, with single spaces.
-        quantity: name of the quantity.
-        comparison: "<", "<=", ">" or ">=".
-        value: the value with which it is compared, SI.
-    """
-
-    text: str
-    quantity: str
-    comparison: str
-    value: float
-
-    def holds(self, values: Array) -> Mask:
-        """Tell at which points the quantity, given in SI, meets the condition; where it is NaN, it does not."""
-        return np.asarray(COMPARISONS[self.comparison](values, self.value))
-
-
-def parse_condition(text: str, components: Sequence[str]) -> PoseCondition:
-    """Read a condition from text.
-
-    Args:
-        text: "QUANTITY < VALUE".
-        components: components that the machine has.
-
-    Raises:
-        InputError: not of that form, an unknown quantity, or a value of another kind.
-    """
-    match = _CONDITION.fullmatch(text) if len(text) <= LONGEST_CONDITION else None
-    if match is None:
-        raise InputError(f"{shorten(text)} is not a condition; {CONDITION_FORM}.")
-    quantity, comparison, written = match.groups()
-    name = current_name(quantity, "quantity")
-    if name in GROUPS:
-        raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
-    resolve_quantities([name], components)
-    value = value_of(QUANTITIES[name].unit, written, f"the condition on {name}")
-    return PoseCondition(f"{name} {comparison} {written}", name, comparison, value)
-
-
-def value_of(unit: str, written: float | str | None, where: str) -> float:
-    """Read the value, SI, with which a quantity of some unit is compared; `where` it is written goes into messages.
-
-    Raises:
-        InputError: it is of another kind, or not finite.
-    """
-    try:
-        if unit in KIND_OF_UNIT:
-            return _finite(parse(written, KIND_OF_UNIT[unit]))
-        return _finite(float(written if written is not None else math.nan))
-    except UnitError as error:
-        raise InputError(f"in {where}, {shorten(written)}: {error}.") from None
-    except ValueError:
-        raise InputError(f"in {where}, {shorten(written)} must be a plain number, e.g. 0.05.") from None
-
-
-def _finite(value: float) -> float:
-    if not np.isfinite(value):
-        raise UnitError('no condition can ask for "rigid"; give a large value')
-    return value
 
 
 @dataclass(frozen=True)
@@ -362,67 +270,3 @@ def _neighbours(nodes: AnyArray, k: int) -> tuple[AnyArray, AnyArray]:
 def _along_axis(k: int, chosen: slice) -> tuple[slice, ...]:
     """The index that chooses nodes along axis k, and all nodes along the others."""
     return (*[slice(None)] * k, chosen)
-
-
-CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-"""Corners of a cell, in steps from its lowest one."""
-TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]])
-"""Corners of the six tetrahedra about the diagonal of a cell."""
-LAYERS_OUTSIDE = 2
-"""Layers of nodes outside the region that are added at the ends of the axes, so that its surface closes there."""
-
-
-def surface(depth: Array, axes: Sequence[Array]) -> Array:
-    """Triangulate the surface of a region by marching tetrahedra; corners run counter-clockwise seen from outside.
-
-    Args:
-        depth: positive at nodes inside, negative outside, 0 on the surface between [nx x ny x nz].
-        axes: evenly spaced coordinates of the nodes; the triangles are in the same units and stay between their ends.
-    """
-    field = np.pad(depth, LAYERS_OUTSIDE, constant_values=-1.0)
-    cells = _mixed_cells(field)
-    parts = []
-    for corners in TETRAHEDRA:
-        nodes = cells[:, None, :] + CORNERS[corners]
-        parts += _cut(nodes.astype(float), field[nodes[..., 0], nodes[..., 1], nodes[..., 2]])
-    triangles = np.concatenate(parts) if parts else np.zeros((0, 3, 3))
-    start = np.array([axis[0] for axis in axes])
-    step = np.array([axis[1] - axis[0] for axis in axes])
-    return np.clip(start + (triangles - LAYERS_OUTSIDE) * step, start, [axis[-1] for axis in axes])
-
-
-def _mixed_cells(field: Array) -> Integers:
-    """Return the lowest corner of each cell through which the surface passes [n x 3]."""
-    high = field > 0.0
-    size = [n - 1 for n in field.shape]
-    counts = np.zeros(size, dtype=int)
-    for i, j, k in CORNERS:
-        counts += high[i : i + size[0], j : j + size[1], k : k + size[2]]
-    return np.argwhere((counts > 0) & (counts < len(CORNERS)))
-
-
-def _cut(nodes: Array, values: Array) -> list[Array]:
-    """Return the triangles in tetrahedra with given corners [n x 4 x 3] and values there [n x 4]."""
-    order = np.argsort(values <= 0.0, axis=1, kind="stable")  # corners inside first
-    nodes, values = np.take_along_axis(nodes, order[..., None], 1), np.take_along_axis(values, order, 1)
-    count = (values > 0.0).sum(axis=1)
-    # By the number of corners inside: the edges on which the corners of each triangle lie.
-    cut_edges = {1: [((0, 1), (0, 2), (0, 3))], 3: [((0, 3), (1, 3), (2, 3))]}
-    cut_edges[2] = [((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))]
-    triangles_of = []
-    for inner, triangles in cut_edges.items():
-        chosen = count == inner
-        corners, at = nodes[chosen], values[chosen]
-        outward = corners[:, inner:].mean(axis=1) - corners[:, :inner].mean(axis=1)
-        for edges in triangles:
-            points = np.stack([_crossing(corners, at, *edge) for edge in edges], axis=1)
-            normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-            inverted = (normal * outward).sum(axis=1) < 0.0
-            points[inverted] = points[inverted][:, ::-1]
-            triangles_of.append(points)
-    return triangles_of
-
-
-def _crossing(corners: Array, values: Array, first: int, other: int) -> Array:
-    share = -values[:, first] / (values[:, other] - values[:, first])
-    return corners[:, first] + share[:, None] * (corners[:, other] - corners[:, first])

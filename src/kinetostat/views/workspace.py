@@ -19,7 +19,9 @@ from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.late import LateModule
 from kinetostat.machine.limits import Limits, no_limits_sentence
 from kinetostat.machine.parameters import dimension, shown
+from kinetostat.numerics.isosurface import surface
 from kinetostat.studies.datasets import field_of
+from kinetostat.studies.pose_conditions import PoseCondition
 from kinetostat.studies.workspace import (
     BORDER_VARIABLES,
     COLOURING_QUANTITY,
@@ -34,10 +36,8 @@ from kinetostat.studies.workspace_verdicts import (
     INSIDE,
     LIMIT_VERDICT,
     STATUS_VERDICTS,
-    PoseCondition,
     depth,
     phrase,
-    surface,
 )
 from kinetostat.views.question import (
     LOADS_LEFT_OUT,

@@ -5,12 +5,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kinetostat.display import Display
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import plain_name
-from kinetostat.late import LateModule
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
@@ -23,12 +22,8 @@ from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, re
 from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.studies.optimisation.space import PoseSet, Space, read_poses, read_space
 from kinetostat.studies.optimisation.terms import Aggregate, Term, known_terms, parse_aggregate, read_term, usual_goal
+from kinetostat.studies.pose_conditions import value_of
 from kinetostat.studies.quantities import refuse_without_derivatives, without_derivatives
-
-if TYPE_CHECKING:
-    from kinetostat.studies import workspace_verdicts
-else:
-    workspace_verdicts = LateModule("kinetostat.studies.workspace_verdicts")
 
 NOT_A_STUDY = (
     "is a machine, but this command takes a study, which names the machine and says what may change and what is "
@@ -248,7 +243,7 @@ def _constraint(machine: Machine, table: ConstraintTable, poses: PoseSet, where:
     term = read_term(machine, table, poses, upper, where)
     written = table.at_most if table.at_most is not None else table.at_least
     key = "at_most" if upper else "at_least"
-    return Constraint(term, 1.0 if upper else -1.0, workspace_verdicts.value_of(term.unit, written, f"{where}.{key}"))
+    return Constraint(term, 1.0 if upper else -1.0, value_of(term.unit, written, f"{where}.{key}"))
 
 
 def _robust(study: StudyFile, space: Space) -> Aggregate | None:
