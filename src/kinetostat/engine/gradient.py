@@ -179,8 +179,8 @@ class InterpretedBody:
         gradients[:] = 0.0
         slopes = self._seeds(len(gradients[0, 0]) if gradients.size else 0)
         rows: defaultdict[int, list[int]] = defaultdict(list)
-        for row, node in enumerate(self._inputs):
-            rows[node.number].append(row)
+        for row, traced_input in enumerate(self._inputs):
+            rows[traced_input.number].append(row)
         members = {node.number for node in self._active}
         for node in reversed(self._active):
             slope = slopes.pop(node.number, None)

@@ -108,8 +108,8 @@ class CondensedLeg:
         # What wrenches do by turning has a symmetric part, and one that only depends on where the leg ends.
         self._bracket = turning_of(acting, self._ways)
         self._close(self._ways.T @ self.terms.rates[0].astype(object))
-        springs, remaining = self._without_passive_motions(geometric, present.residual[0].astype(object))
-        self._condense_springs(springs, remaining, of_scalars(wrench)[0])
+        stiff = self._without_passive_motions(geometric, present.residual[0].astype(object))
+        self._condense_springs(stiff, of_scalars(wrench)[0])
 
     def _close(self, rates: Array) -> None:
         """Solve the closing conditions for the passive motions.
@@ -128,7 +128,7 @@ class CondensedLeg:
         self.passive_by_springs = product(self.passive_by_twist, rates[:, self.elastic])
         self.spring_loads = product(self.wrenches, rates[:, self.elastic])
 
-    def _without_passive_motions(self, geometric: Array, residual: Array) -> tuple[Array, Array]:
+    def _without_passive_motions(self, geometric: Array, residual: Array) -> Array:
         """Take passive motions, which follow the platform and the springs, out of the equations of the springs.
 
         Args:
@@ -136,8 +136,7 @@ class CondensedLeg:
             residual: the forces that are not in balance yet, of all coordinates [coordinates].
 
         Returns:
-            The stiffness of the springs, their own and that of turning wrenches [springs x springs], and the forces of
-            springs that are not in balance [springs].
+            The stiffness of the springs, their own and that of turning wrenches [springs x springs].
         """
         self._inner = geometric[np.ix_(self.passive, self.passive)]
         self._mixed = geometric[np.ix_(self.passive, self.elastic)]
@@ -149,16 +148,16 @@ class CondensedLeg:
         self._coupling = self._mixed - inner_loads
         self._spring_residual = residual[self.elastic] - product(self.passive_by_springs.T, residual[self.passive])
         self._passive_residual = residual[self.passive]
-        return stiff, self._spring_residual
+        return stiff
 
-    def _condense_springs(self, stiff: Array, residual: Array, wrench: Array) -> None:
+    def _condense_springs(self, stiff: Array, wrench: Array) -> None:
         """Eliminate the springs: what remains are the wrenches of the leg with their compliance.
 
         With E = L D L^T for the stiffness of the springs, products with its inverse are those of rows that L has been
         taken from.
 
         Args:
-            stiff, residual: E [springs x springs], and the forces that are not in balance [springs].
+            stiff: E [springs x springs].
             wrench: the wrench that the platform exerts on the leg [ways].
         """
         count = len(self.elastic)
@@ -166,13 +165,13 @@ class CondensedLeg:
         self.sure = self.sure & definite(self._factors, stiff.tolist())
         loads, coupled, remaining = (
             array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), count)
-            for rows in (self.spring_loads, self._coupling, residual[None])
+            for rows in (self.spring_loads, self._coupling, self._spring_residual[None])
         )
         shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
         solved, driven = loads * shrink, coupled * shrink
         self.lines = self.wrenches + product(product(solved, coupled.T), self.passive_by_twist)
         self.gap = self.lines @ self._opening + product(solved, remaining[0])
-        if len(loads) < count:
+        if len(loads) < count:  # a square root has fewer columns than there are springs
             soft = symmetric_product(loads, solved.T).tolist()
             self.roots = array_of(semidefinite_root(soft), len(loads), len(loads))
         else:
@@ -184,7 +183,7 @@ class CondensedLeg:
         self.load_taken = wrench + pressed + self.turning @ self._opening
 
     def step(self, twist: Array, change: Array) -> tuple[Row, Row]:
-        """The steps of its coordinates and of its wrench.
+        """Return the steps of its coordinates and of its wrench.
 
         Args:
             twist: step of the platform [ways].
@@ -311,10 +310,13 @@ def _shared_by_least_energy(lines: Array, roots: Array, gaps: Array) -> tuple[Ar
 class LegwiseTangent:
     """Resistance of a machine with legs that close loops at some coordinates, and Newton's step from there.
 
+    Its `step`, `motion`, `rank`, `platform` and `slack` are as of `reduced.Tangent`.
+
     Attributes:
         legs, pulls: what each leg and each rod adds.
         lines: the wrenches of rods and of legs, as rows [wrenches x ways].
         turning: stiffness by loads and pulls of rods that turn [ways x ways].
+        twist: step of the platform, at the origin [6].
     """
 
     def __init__(self, machine: Cut, coordinates: Row, chord: bool = False) -> None:
@@ -337,7 +339,7 @@ class LegwiseTangent:
         self.platform = placed.end
         is_free = all(is_zero(coordinate) for coordinate in coordinates)
         self.pulls = [pull_of(rod, None if is_free else self.platform) for rod in machine.rods]
-        self.slack: Scalar = 0.0
+        self.slack: Scalar = 0.0  # `cut` takes no machine with such legs whose rods carry one sign only
         self.rank = len(machine.rods) + sum(len(leg.springs) - leg.springs.count(None) for leg in machine.legs)
         force, self.turning = self._platform_and_rods()
         turning = 0.0 * self.turning if chord else self.turning

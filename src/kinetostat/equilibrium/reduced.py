@@ -87,7 +87,7 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":
-    """The equations of a machine that `cut_machine` can cut, with numbers of any kind.
+    """The equations of a machine that `cut` can cut, with numbers of any kind.
 
     Args:
         machine: the machine with its loads.
@@ -207,7 +207,15 @@ def _after(coordinates: Row, tangent: "Tangent | LegwiseTangent") -> tuple[Row, 
 
 
 class Tangent:
-    """Resistance of a machine at a place, and Newton's step from there."""
+    """Resistance of a machine at a place, and Newton's step from there; `LegwiseTangent` has the same attributes.
+
+    Attributes:
+        step: changes of all unknowns.
+        motion: those of them that are motions, by which the size of the step is judged.
+        rank: the greatest rank that the compliance can have.
+        platform: displacement of the platform at the place.
+        slack: number of rods that carry nothing.
+    """
 
     def __init__(self, machine: Cut, place: Place) -> None:
         self.place, self.mechanism, self.carrier, self.rods = place, machine.mechanism, machine.carrier, machine.rods
@@ -251,11 +259,14 @@ class Tangent:
             right = [[a * b for a, b in zip(row, self._factors.shrink, strict=True)] for row in left]
         else:
             left, right = rows, [self._factors.solve(row) for row in rows]
-        whole = [[total([a * b for a, b in zip(row, column, strict=True)]) for column in right] for row in left]
-        return [[_without_round_off(0.5 * (whole[i][j] + whole[j][i])) for j in range(6)] for i in range(6)]
+        compliance = [[total([a * b for a, b in zip(row, column, strict=True)]) for column in right] for row in left]
+        return [[_without_round_off(0.5 * (compliance[i][j] + compliance[j][i])) for j in range(6)] for i in range(6)]
 
     def factor(self) -> tuple[Scalar, Scalar]:
-        """By which the load may grow until the state gives way, and whether springs alone hold the machine."""
+        """The factor by which the load may grow until the state gives way, and whether springs alone hold the machine.
+
+        The load takes from the stiffness of the springs, in whose units the greatest share is an eigenvalue.
+        """
         elastic, rates = self.place.elastic, self.place.rates
         half = elimination((0.5 * (elastic + elastic.T)).tolist())
         greatest = greatest_eigenvalue(relative(half, elastic - 0.5 * (rates + rates.T)))

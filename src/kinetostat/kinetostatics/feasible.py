@@ -265,13 +265,18 @@ def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar
     radius: Scalar = math.inf
     for face in faces:
         size, felt = _size_of_part(face.normal.components(), block, length)
-        radius = smaller(where(felt, face.room * reciprocal(where(felt, size, 1.0)), _reach_if_unfelt(face)), radius)
+        radius = smaller(_reach(face.room, size, felt, _reach_if_unfelt(face)), radius)
     return radius
 
 
 def greatest_along(faces: Sequence[Face], row: int, length: Scalar) -> Scalar:
     """The greatest wrench along both ways of one component, with no other, N or N·m; compare `greatest_ball`."""
     return greatest_ball(faces, slice(row, row + 1), length)
+
+
+def _reach(room: Scalar, size: Scalar, felt: Scalar, if_unfelt: Scalar) -> Scalar:
+    """The multiple of a unit that a bound allows if a unit takes up `size` of its room; else `if_unfelt`."""
+    return where(felt, room * reciprocal(where(felt, size, 1.0)), if_unfelt)
 
 
 def _reach_if_unfelt(face: Face) -> Scalar:
@@ -305,16 +310,16 @@ def greatest_speed(drives: Transmission, speeds: Sequence[Scalar], block: slice)
     """
     if drives.wrenches is None:
         return math.nan
-    shrink, turning, structure = reciprocal(drives.length), block.start == 0, _structure(drives, block)
+    shrink, turning, structure = reciprocal(drives.length), block.start == 0, _forbidden_motions(drives, block)
     radius: Scalar = math.inf
     for wrench, speed in zip(drives.wrenches, speeds, strict=True):
         size, felt = _allowed_size(_components_in_newtons(wrench, shrink), block, structure)
         needed = size * drives.length if turning else size
-        radius = smaller(where(felt, speed * reciprocal(where(felt, needed, 1.0)), math.inf), radius)
+        radius = smaller(_reach(speed, needed, felt, math.inf), radius)
     return where(radius < math.inf, radius, math.nan)
 
 
-def _structure(drives: Transmission, block: slice) -> Conjugated | None:
+def _forbidden_motions(drives: Transmission, block: slice) -> Conjugated | None:
     """An orthonormal basis of the motions in a block that the structure does not allow; None where it allows all."""
     shrink = reciprocal(drives.length)
     stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in drives.constraints]
@@ -323,7 +328,13 @@ def _structure(drives: Transmission, block: slice) -> Conjugated | None:
 
 
 def _allowed_size(whole: Sequence[Scalar], block: slice, structure: Conjugated | None) -> tuple[Scalar, Scalar]:
-    """The size of what allowed motions in a block feel of a row of six, and whether that is more than round-off."""
+    """The size of the part of six components that allowed motions in a block have, and whether it is no round-off.
+
+    Args:
+        whole: the components.
+        block: one of `BLOCKS`.
+        structure: see `_forbidden_motions`.
+    """
     part = list(whole[block])
     for column, inverse in zip(structure.columns, structure.inverses, strict=True) if structure else ():
         share = inverse * total([a * b for a, b in zip(part, column, strict=True)])
@@ -354,23 +365,24 @@ def acceleration_faces(
 def greatest_acceleration(faces: Sequence[Face], drives: Transmission, block: slice) -> Scalar:
     """The greatest acceleration from rest that the drives allow in whichever direction the machine can move.
 
-    Without turning (m/s²), or for the other block about the tool point without moving it (rad/s²). Negative where the
-    drives do not hold what they carry at rest; infinite where nothing that moves has a mass; NaN where nothing moves.
+    It is one without turning (m/s²), or for the other block one about the tool point without moving it (rad/s²). It is
+    negative where the drives do not hold what they carry at rest, infinite where nothing that moves has a mass, and NaN
+    where nothing moves.
 
     Args:
         faces: faces of the set of accelerations.
         drives: the way in which drives and platform act on each other.
         block: one of `BLOCKS`.
     """
-    grow, turning, structure = drives.length, block.start == 0, _structure(drives, block)
+    length, turning, structure = drives.length, block.start == 0, _forbidden_motions(drives, block)
     radius: Scalar = math.inf
     for face in faces:
-        rotational, translational = face.normal.rotational, face.normal.translational * grow
+        rotational, translational = face.normal.rotational, face.normal.translational * length
         size, felt = _allowed_size((*rotational.components(), *translational.components()), block, structure)
-        needed = size if turning else size * reciprocal(grow)
-        radius = smaller(where(felt, face.room * reciprocal(where(felt, needed, 1.0)), _reach_if_unfelt(face)), radius)
+        needed = size if turning else size * reciprocal(length)
+        radius = smaller(_reach(face.room, needed, felt, _reach_if_unfelt(face)), radius)
     stopped = total([where(inverse > 0.0, 1.0, 0.0) for inverse in structure.inverses]) if structure else 0.0
-    return where(stopped < SIZE // 2 - 0.5, radius, math.nan)  # at least one of a block's three motions is left
+    return where(stopped < SIZE // 2 - 0.5, radius, math.nan)  # one at least of a block's three motions remains
 
 
 def greatest_acceleration_along(faces: Sequence[Face], drives: Transmission, row: int) -> Scalar:
@@ -398,7 +410,7 @@ def greatest_speed_along(drives: Transmission, speeds: Sequence[Scalar], row: in
         part = abs(wrench.components()[row])
         components = _components_in_newtons(wrench, shrink)
         felt = components[row] * components[row] > UNREACHED_COMPONENT * total([c * c for c in components])
-        rate = smaller(where(felt, speed * reciprocal(where(felt, part, 1.0)), math.inf), rate)
+        rate = smaller(_reach(speed, part, felt, math.inf), rate)
     return _where_structure_allows(drives, row, rate)
 
 
