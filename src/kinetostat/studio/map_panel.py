@@ -28,6 +28,8 @@ UNITS_OF_LENGTH = ("m", "mm")
 """A map whose two axes have the same one of these units is drawn to scale."""
 LOADED_PREFIX = "loaded_"
 """Beginning of the names of quantities of the machine under its loads."""
+FIRST_QUANTITY = "compliance_x"
+"""Quantity of a first map: every machine has it."""
 MARGIN_POINTS = 2
 """Points of the map that are kept about the part of a range that can be reached, so that its edge is seen."""
 MOSTLY_REACHED = 0.8
@@ -59,7 +61,7 @@ class MapPanel:
         self.view.on("pick", self._pick, throttle=THROTTLE)
         self.view.on("settle", self._settle)
         self.time = ui.label("").classes("server-time").mark("map-time")
-        self._choices_count = False  # whether a change of a choice is the user's, and asks for a new map
+        self._is_users_choice = False  # a choice that `fill` makes asks for no new map
         self._chosen_ranges: dict[str, tuple[float, float]] = {}
         self._reached: dict[str, tuple[float, float]] = {}
         self._is_first_map = True  # of these axes: its ranges may still be narrowed
@@ -67,7 +69,7 @@ class MapPanel:
 
     def fill(self) -> None:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
-        self._choices_count = False
+        self._is_users_choice = False
         self._chosen_ranges.clear()
         self._fit_anew()
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
@@ -75,19 +77,19 @@ class MapPanel:
         self._offer_quantities()
         self.across.set_options(fields, value=first)
         self.up.set_options(fields, value=second)
-        self._choices_count = True
+        self._is_users_choice = True
 
     def _offer_quantities(self) -> None:
         """Offer the quantities that the machine has now: it may have got a mass, or be shown under its loads."""
-        quantities, counted = map_quantities(self._session.machine), self._choices_count
+        quantities, is_users_choice = map_quantities(self._session.machine), self._is_users_choice
         if self.quantity.options == quantities:
             return
         present = str(self.quantity.value)
         other = present.removeprefix(LOADED_PREFIX) if present.startswith(LOADED_PREFIX) else LOADED_PREFIX + present
-        kept = next((name for name in (present, other) if name in quantities), "compliance_x")
-        self._choices_count = False
+        kept = next((name for name in (present, other) if name in quantities), FIRST_QUANTITY)
+        self._is_users_choice = False
         self.quantity.set_options(quantities, value=kept)
-        self._choices_count = counted
+        self._is_users_choice = is_users_choice
 
     def _mappable(self) -> list[Control]:
         """List the controls over whose range a map can be drawn, the pose first."""
@@ -107,6 +109,7 @@ class MapPanel:
         self._lane.ask(MapRequest(self._session.machine, str(self.quantity.value), across, up, start))
 
     def close(self) -> None:
+        """Stop computing maps, because the page is gone."""
         self._lane.close()
 
     def _ends(self) -> tuple[Ends, Ends]:
@@ -224,6 +227,7 @@ class MapPanel:
         if not to:
             raise InputError(f'{subject} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
         high = read_typed(control.parameter, last, scale.unit)
+        # The first end has the unit of the last one: "-5 to 8 cm".
         unit = last.strip().lstrip("+-.0123456789eE \u2212").strip() or scale.unit
         low = read_typed(control.parameter, first, unit)
         if not low < high:
@@ -231,11 +235,11 @@ class MapPanel:
         return low, high
 
     def _choose(self) -> None:
-        if self._choices_count:
+        if self._is_users_choice:
             self.refresh()
 
     def _choose_axis(self) -> None:
-        if self._choices_count:
+        if self._is_users_choice:
             self._fit_anew()
             self.refresh()
 

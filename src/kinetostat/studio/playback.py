@@ -30,7 +30,7 @@ from kinetostat.units import motion_unit
 from kinetostat.views.drives import DRIVES
 
 STEPS_BETWEEN_KEPT_POSES = 24
-"""At `PATH_PERIOD` two seconds of motion."""
+"""Steps from one kept pose to the next: at `PATH_PERIOD` two seconds of motion."""
 PATH_PERIOD = 0.08
 """Seconds between two poses of a path, if the computer keeps up: each is a whole analysis."""
 NO_PATH = "No path yet: open a CSV file of poses (as `kinetostat path` reads it), or keep two poses or more."

@@ -16,6 +16,7 @@ from typing import Any
 from nicegui import background_tasks, events, run, ui
 
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.elements import MAIN_BUTTON, choice, icon_button, upload_field
 from kinetostat.studio.lanes import Lane
@@ -208,21 +209,22 @@ class AskTab:
         if form is None or self._busy:
             return
         self._refuse("")
-        self._asked, self._stopped = self._session.machine, False
+        machine = self._session.machine
+        self._asked, self._stopped = machine, False
         request = {"word": str(self.choice.value), "options": form.entries(), EVERY_ROW: form.full}
         sent = {name: data for files in form.files.values() for name, data in files.items()}
         self._show_busy(True)
         if self._folder is None:  # nothing has been answered yet
             self.answer.set_content("")
-        background_tasks.create(self._answer(request, sent), name="studio question")
+        background_tasks.create(self._answer(machine, request, sent), name="studio question")
 
-    async def _answer(self, request: dict[str, Any], sent: dict[str, bytes]) -> None:
-        """Ask in a process, and show its answer or why there is none."""
+    async def _answer(self, machine: Machine, request: dict[str, Any], sent: dict[str, bytes]) -> None:
+        """Ask about a machine in a process, and show its answer or why there is none."""
         folder = TemporaryDirectory()
         try:
             place = Path(folder.name)
             (place / UPLOAD_FOLDER).mkdir()
-            (place / MACHINE_FILE).write_bytes(self._session.as_file()[1])
+            (place / MACHINE_FILE).write_text(as_file(machine), "utf-8")
             for name, data in sent.items():
                 (place / UPLOAD_FOLDER / name).write_bytes(data)
             async with ASKING.turn(self.button.client.id):

@@ -62,7 +62,8 @@ class ScenePanel:
         """
         self._set_loaded, self._exaggerate, self._name = set_loaded, exaggerate, name
         self._shown: dict[str, Any] | None = None
-        self._ghost = self._pictured = False
+        self._ghost = False
+        self._pictured = False  # the picture shows the present pose, which may have no answer
         self._hidden: set[str] = set()
         with ui.element("div").classes("stage"):
             self._stage()
@@ -207,8 +208,8 @@ def headline(report: Report) -> str:
     """
     tiles, display = [], report.analysis.machine.display
     if report.loaded is not None:
-        for name, moved in zip(report.loaded.components, report.loaded.displacement, strict=True):
-            value, _, unit = display.show_deflection(moved, motion_unit(name.startswith("r"))).partition(" ")
+        for name, motion in zip(report.loaded.components, report.loaded.displacement, strict=True):
+            value, _, unit = display.show_deflection(motion, motion_unit(name.startswith("r"))).partition(" ")
             tiles.append(_tile(f"u {name}", value, unit))
         return f"<dl>{''.join(tiles)}</dl>"
     for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal.tolist(), strict=True):
@@ -242,16 +243,17 @@ class Handles:
         view.on("settle", self._settle)
 
     def close(self) -> None:
+        """Stop following pulls, because the page is gone."""
         self._lane.close()
 
     def _ask(self, event: GenericEventArguments) -> None:
-        of, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
+        part, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
         machine = self._session.machine
         if self._home is None or number != self._pull_number:
             self._pull_number, self._home = number, state_of(machine).configuration.platform
         self._has_ended = False
-        target = goal_of(self._home, axis, float(goal)) if of == PLATFORM else point_goal([float(c) for c in goal])
-        self._lane.ask(Pull(machine, of, leg, axis, target))
+        target = goal_of(self._home, axis, float(goal)) if part == PLATFORM else point_goal([float(c) for c in goal])
+        self._lane.ask(Pull(machine, part, leg, axis, target))
 
     def _follow(self, _pull: Pull, numbers: dict[str, float]) -> None:
         if numbers:

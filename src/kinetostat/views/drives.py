@@ -35,6 +35,8 @@ else:
 
 MOST_MODES = 6
 """Excited modes that are named: the lowest ones move the tool most."""
+FIGURE_WIDTH, PANEL_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.7, 0.9
+"""Width of a figure over time, height of each of its panels, and of title and notes, inches."""
 
 
 def _lines(answer: DriveLoads) -> Lines:
@@ -171,7 +173,9 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
             rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
             rows.append((curves.force * force.factor, force.label(kind), chosen))
     rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
-    with figures.new_figure((6.6, 0.9 + 1.7 * len(rows)), title.format(answer.machine.name)) as figure:
+    with figures.new_figure(
+        (FIGURE_WIDTH, ROOM_FOR_TITLE + PANEL_HEIGHT * len(rows)), title.format(answer.machine.name)
+    ) as figure:
         panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
         for panel, (values, label, chosen) in zip(panels, rows, strict=True):
             _lines_over_time(panel, answer, values, chosen)
@@ -197,7 +201,7 @@ def parts_figure(answer: DriveLoads, name: str, title: str = "{}: parts of the f
     curves, display = curves_of(answer), answer.machine.display
     k = [drive.name for drive in answer.drives].index(name)
     scale = display.scale(answer.drives[k].unit)
-    with figures.new_figure((6.6, 3.2), title.format(answer.machine.name, name)) as figure:
+    with figures.new_figure((FIGURE_WIDTH, 3.2), title.format(answer.machine.name, name)) as figure:
         panel = figure.add_subplot()
         times = answer.motion.times
         for i, part in enumerate(PARTS):
@@ -244,7 +248,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
             ("power", "W", curves.power),
             ("net energy", "J", curves.net_energy),
         )
-        columns |= {f"{drive.name} {what} [{unit}]": part[k] for what, unit, part in rows_of}
+        columns |= {f"{drive.name} {name} [{unit}]": part[k] for name, unit, part in rows_of}
     return columns_csv(columns)
 
 

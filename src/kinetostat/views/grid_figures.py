@@ -59,6 +59,8 @@ SQUARE_HEIGHT = 1.4
 """Height of a map among others without its numbers, if it is square, inches."""
 CURVES_SIZE = (3.4, 3.0)
 """Width and height of a panel of curves, inches."""
+CARRYING_SIZE = (4.6, 4.4)
+"""Width and height of the figure of legs that carry without its legend, inches; a map to scale changes the height."""
 CARRYING_WIDTH, ROOM_BESIDE_CARRYING = 3.6, 1.5
 """Width of the map of legs that carry without its numbers, and height of its title, labels and numbers, inches."""
 
@@ -263,7 +265,8 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
     across, up = (str(dim) for dim in dataset["status"].dims)
     named = [f"{name}: {100.0 * n / dataset['status'].size:.0f} %" for name, n in frequent_sets(carrying)]
     colours = region_colours(max(len(named), 1))
-    with new_figure((4.6, 4.4 + LEGEND_ROW * len(named)), title) as figure:
+    width, height = CARRYING_SIZE
+    with new_figure((width, height + LEGEND_ROW * len(named)), title) as figure:
         panel = figure.subplots()
         (x, x_label), (y, y_label) = axis_values(dataset, across), axis_values(dataset, up)
         codes = dataset["carrying"].transpose(up, across).values
@@ -271,8 +274,8 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
         panel.set(xlabel=x_label, ylabel=y_label)
         set_axis_scales(panel, dataset, across, up)
         if panel.get_aspect() == 1.0:
-            height = CARRYING_WIDTH * float(np.ptp(y) / np.ptp(x))
-            figure.set_figheight(ROOM_BESIDE_CARRYING + LEGEND_ROW * len(named) + height)
+            map_height = CARRYING_WIDTH * float(np.ptp(y) / np.ptp(x))
+            figure.set_figheight(ROOM_BESIDE_CARRYING + LEGEND_ROW * len(named) + map_height)
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
         patches += [Patch(color=NO_RESULT_COLOUR, label="no result")] if (codes < 0).any() else []
         setting = "\n".join(line for line in setting_lines(dataset) if line)

@@ -184,8 +184,9 @@ def _firmware_table(numbers: FirmwareNumbers) -> FittedTable:
     for tower, letter, nominal, angle, half in zip(*columns, strict=True):
         add(f"angle {tower} - {nominal:g}", f"M665 {letter}", f"M665 {letter}", angle, half)
     for place, (tower, letter) in enumerate(zip("abc", "XYZ", strict=True)):
-        changes = (f"M666 {letter} {endstops[place]:+.4f}" for endstops in (marlin, reprap))
-        add(f"position_endstop {tower}, change", *changes, numbers.raised[place], halves["raised"][place])
+        marlin_change, reprap_change = (f"M666 {letter} {endstops[place]:+.4f}" for endstops in (marlin, reprap))
+        raised, half = numbers.raised[place], halves["raised"][place]
+        add(f"position_endstop {tower}, change", marlin_change, reprap_change, raised, half)
     table.add_row("", f"M665 H {marlin_height:+.4f}", f"M665 H {reprap_height:+.4f}", "", "")
     if any(halves["scale"]):
         add("rotation_distance, factor", "1 / M92", "1 / M92", numbers.scale, halves["scale"][0])

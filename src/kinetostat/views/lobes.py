@@ -26,12 +26,14 @@ else:
 
 LISTED_SPEEDS = 12
 """Speeds with a row of the table, about, at equal distances: enough to see the pockets; all are in the files."""
+SECONDS_PER_MINUTE = 60.0
+"""Seconds of a minute: speeds of spindles are read in turns per minute."""
 HEADROOM = 8.0
 """Height of the picture in multiples of the least width: pockets between lobes have no end."""
 
 
 def _speed_text(turns: float) -> str:
-    return f"{number(60.0 * turns)} 1/min"
+    return f"{number(SECONDS_PER_MINUTE * turns)} 1/min"
 
 
 def _lines(answer: Lobes) -> Lines:
@@ -92,7 +94,7 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> "Figure":
     poses = f"least of {answer.poses} poses" if answer.poses > 1 else f"chatter at {answer.frequency:.4g} Hz"
     with figures.new_figure((5.6, 3.6), title.format(answer.machine.name), setting_of(answer.machine), poses) as figure:
         panel = figure.add_subplot()
-        speeds = 60.0 * answer.speeds
+        speeds = SECONDS_PER_MINUTE * answer.speeds
         panel.fill_between(speeds, widths, out_of_view, color=lobe_colour, alpha=0.18, linewidth=0.0)
         panel.plot(speeds, widths, color=lobe_colour)
         panel.axhline(least, color=least_colour, linewidth=0.8, linestyle="--")

@@ -33,9 +33,12 @@ else:
 
 MOST_DRAWN = 4
 """Number of motors that are drawn, the best of them: as many diagrams as fit on a page."""
-LIMIT_COLOUR, PEAK_OPACITY, CONTINUOUS_OPACITY = "#0072b2", 0.15, 0.3
-"""Colour of the torque that a motor may give, and its opacity for a short while and for ever: where both lie, it is
-dark."""
+PEAK_OPACITY, CONTINUOUS_OPACITY = 0.15, 0.3
+"""Opacity of the torque that a motor may give for a short while and for ever: where both lie, it is dark."""
+DIAGRAM_SIZE, ROOM_BESIDE_DIAGRAMS = (3.3, 2.7), (1.4, 0.9)
+"""Width and height of the diagram of a motor; further width, of the legend, and height, of title and notes; inches."""
+WIDTH_ALONE, HEIGHT_ALONE = 6.6, 3.4
+"""Width of the figure of one diagram with its legend, and height of the diagram, inches."""
 LIMIT_POINTS = 200
 """Points of the line of a limit over the speed: its corners stand where they are to a pixel or two."""
 PER_MINUTE = 30.0 / np.pi
@@ -83,20 +86,22 @@ def motors_figure(answer: MotorChoice, title: str = "{}: motors along the motion
     shown = answer.candidates[:MOST_DRAWN]
     rows, columns = figures.grid_shape(len(shown), most_columns=2)
     note = "shaded: torque that the motor may give; dark: for ever, light: for a short while"
-    with figures.new_figure((1.4 + 3.3 * columns, 0.9 + 2.7 * rows), title.format(answer.machine.name)) as figure:
+    (width, height), (legend_width, title_height) = DIAGRAM_SIZE, ROOM_BESIDE_DIAGRAMS
+    size = legend_width + width * columns, title_height + height * rows
+    with figures.new_figure(size, title.format(answer.machine.name)) as figure:
         for panel, candidate in zip(figures.panel_grid(figure, len(shown), most_columns=2), shown, strict=True):
-            _diagram(panel, answer, candidate)
+            _draw_diagram(panel, answer, candidate)
         name_drives(figure, shown[0].loads, f"{PEAK_MARK}\n{RMS_MARK}")
         note_motion(figure, shown[0].loads, note)
     return figure
 
 
-def _diagram(panel: "Axes", answer: MotorChoice, candidate: MotorCandidate) -> None:
+def _draw_diagram(panel: "Axes", answer: MotorChoice, candidate: MotorCandidate) -> None:
     scale = answer.machine.display.scale("N·m")
     speeds = np.linspace(0.0, candidate.motor.greatest_speed, LIMIT_POINTS)
     for peak, opacity in ((True, PEAK_OPACITY), (False, CONTINUOUS_OPACITY)):
         limit = candidate.motor.limit(peak, speeds) * scale.factor
-        panel.fill_between(speeds * PER_MINUTE, limit, color=LIMIT_COLOUR, alpha=opacity, linewidth=0.0)
+        panel.fill_between(speeds * PER_MINUTE, limit, color=figures.COLOURS[0], alpha=opacity, linewidth=0.0)
     if candidate.loads.curves is not None:
         draw_torque_over_speed(panel, candidate.loads, rotary=True)
     verdict = "fits" if candidate.suffices else "does not fit"
@@ -179,7 +184,8 @@ def name_drives(figure: "Figure", answer: DriveLoads, meaning: str = "") -> None
 def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> "Figure":
     """Draw the torque of each motor over its speed, with its peak and its root mean square."""
     shown = [rotary for rotary in (True, False) if any(drive.rotary is rotary for drive in answer.drives)]
-    with figures.new_figure((6.6, 0.9 + 3.4 * len(shown)), title.format(answer.machine.name)) as figure:
+    size = WIDTH_ALONE, ROOM_BESIDE_DIAGRAMS[1] + HEIGHT_ALONE * len(shown)
+    with figures.new_figure(size, title.format(answer.machine.name)) as figure:
         for panel, rotary in zip(figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True):
             draw_torque_over_speed(panel, answer, rotary)
         name_drives(figure, answer, PEAK_MARK if answer.motion.timeless else f"{PEAK_MARK}\n{RMS_MARK}")

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.display import Display, Scale
 from kinetostat.kinetostatics.quantities import plain_name
@@ -17,6 +18,8 @@ from kinetostat.studies.optimisation.result import Result
 from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, grid_shape, new_figure, panel_grid
 from kinetostat.views.question import Drawing
 
+HISTOGRAM_WIDTH = 3.6
+"""Width of a histogram with its numbers, inches."""
 BINS = 40
 """Bars of a histogram of scatter: about 25 machines each for the usual 1000."""
 CAPTIONS = {
@@ -40,6 +43,9 @@ ROOM_BEYOND_BARS = 0.18
 """Room to both sides of bars for the numbers at their ends, as a share of the range of the bars."""
 ROOM_ABOVE_HISTOGRAM = 1.4
 """Height of a panel over that of its tallest bar: the legend with three values stands above the bars."""
+COMPARISON_WIDTH, LINE_HEIGHT, ROOM_FOR_TITLE = 7.2, 0.3, 0.9
+"""Width of the comparison of two designs; height of a direction or a variable in it; and room for title and labels;
+inches."""
 WIDTH_ALONE, WIDTH_AMONG_OTHERS, FRONT_HEIGHT = 4.2, 3.1, 3.2
 """Width of the panel of a pair of objectives, alone and among others, and its height, inches."""
 PALE_GREY = "#cccccc"
@@ -88,7 +94,9 @@ def convergence(log: Log, title: str) -> Figure:
 
 def comparison(result: Result, title: str) -> Figure:
     """Draw how many times stiffer each direction is, and each variable between its bounds before and after."""
-    with new_figure((7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), title) as figure:
+    with new_figure(
+        (COMPARISON_WIDTH, ROOM_FOR_TITLE + LINE_HEIGHT * max(len(COMPONENTS), result.problem.space.size)), title
+    ) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _draw_gains(left, result)
         _draw_variables(right, result)
@@ -181,7 +189,7 @@ def front(result: Result, title: str) -> Figure:
 def tolerances(result: Result, title: str) -> Figure:
     """Draw how each objective scatters over random machines within the tolerances of the best design."""
     scatters = result.robustness.scatters if result.robustness else ()
-    with new_figure((3.6 * len(scatters) + 0.6, 2.9), title) as figure:
+    with new_figure((HISTOGRAM_WIDTH * len(scatters) + 0.6, 2.9), title) as figure:
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
             _histogram(panel, scatter, result.problem.machine.display)
     return figure

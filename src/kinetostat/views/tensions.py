@@ -21,6 +21,8 @@ else:
 
 BAR_HEIGHT = 0.28
 """Height of the figure for each cable, inches: its name fits beside its bar."""
+FIGURE_WIDTH, ROOM_FOR_TITLE = 6.0, 1.3
+"""Width of the figure, and height of its title, scale and notes, inches."""
 FARTHEST_BOUND = 3.0
 """Bound, in multiples of the greatest tension, from which it is not drawn, so that bars are not too short."""
 
@@ -65,7 +67,9 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> "Fig
     sizes = [(cable.tension or 0.0) * scale.factor for cable in answer.cables]
     lowest, greatest = (bound * scale.factor for bound in answer.bounds)
     with figures.new_figure(
-        (6.0, 1.3 + BAR_HEIGHT * len(sizes)), title.format(answer.machine.name), setting_of(answer.machine)
+        (FIGURE_WIDTH, ROOM_FOR_TITLE + BAR_HEIGHT * len(sizes)),
+        title.format(answer.machine.name),
+        setting_of(answer.machine),
     ) as figure:
         panel = figure.add_subplot()
         names = [cable.name for cable in answer.cables]

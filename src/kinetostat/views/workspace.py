@@ -7,6 +7,7 @@ here.
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import cycle
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -86,6 +87,8 @@ MOST_NODES = 64
 """Nodes along an axis that the picture of a solid shows at most: its triangles are then as small as dots."""
 LIGHT = np.array([-0.45, -0.7, 0.55])
 """Direction towards the light: over the left shoulder of the reader, so that edges are seen."""
+WIDTH_ALONE, WIDTH_AMONG_OTHERS = 4.6, 2.6
+"""Width of the panel of a cut with its numbers, alone and among others, inches."""
 SHADE = 0.24
 """Share of the brightness that depends on how a surface faces the light: colours still tell the quantity."""
 
@@ -216,7 +219,7 @@ def _coordinate_text(dataset: xr.Dataset, dim: str) -> str:
 
 
 def _colours(labels: Sequence[str]) -> list[str]:
-    limits, unmet = iter(LIMIT_COLOURS), iter(CONDITION_COLOURS * 6)
+    limits, unmet = cycle(LIMIT_COLOURS), cycle(CONDITION_COLOURS)
     return [
         VERDICT_COLOURS.get(label) or next(limits if label.startswith(LIMIT_VERDICT) else unmet) for label in labels
     ]
@@ -233,7 +236,7 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
     """
     labels, conditions = answer.verdicts, answer.conditions
     rows, columns = figures.grid_shape(len(cuts))
-    width = 4.6 if len(cuts) == 1 else 2.6
+    width = WIDTH_ALONE if len(cuts) == 1 else WIDTH_AMONG_OTHERS
     with figures.new_figure((width * columns + 0.3, 0.9 * width * rows + 0.9), title) as figure:
         panels = figures.panel_grid(figure, len(cuts), sharex=True, sharey=True)
         borders: set[PoseCondition] = set()

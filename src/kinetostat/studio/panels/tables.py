@@ -17,7 +17,7 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.studio.answers import Report
-from kinetostat.studio.elements import toggle
+from kinetostat.studio.elements import refuse, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
@@ -298,7 +298,10 @@ class RequirementsPanel(Panel):
 
     def _go(self, verdict: Verdict) -> None:
         if self._session is not None:
-            self._session.move(verdict.worst_pose)
+            try:
+                self._session.move(verdict.worst_pose)
+            except InputError as error:
+                refuse(str(error))
             self.show_change()
 
 
