@@ -40,7 +40,7 @@ MOST_HALVINGS = 4
 SAME_PLACE = 1e-7
 """Residual, in units of the machine's length, at which the part is where it was pulled: far less than a pixel."""
 DECIMALS = 9
-"""Decimals of metres and radians: finer than anybody can pull, and without the digits of round-off."""
+"""Decimals of metres and radians to which pulled numbers are rounded: finer than anybody can pull."""
 NO_MOTION = 1e-6
 """Singular values below this share of the largest count as zero: motions that no number can make."""
 
@@ -50,7 +50,7 @@ class Handle:
     """A handle of the picture that can be pulled.
 
     Attributes:
-        of: `PLATFORM`, `BASE` or `HEAD`.
+        of: part that is pulled, `PLATFORM`, `BASE` or `HEAD`.
         leg: name of the leg whose joint it is; of the platform empty.
         point: base frame, m.
         axes: those of `MOVES` and `TURNS` along or about which the platform can be pulled; a joint moves in its plate.
@@ -73,9 +73,9 @@ class Pull:
 
     Attributes:
         machine: the machine as it is now.
-        of, leg: the handle.
+        of, leg: part and leg of the handle that is pulled.
         axis: the axis of a platform's handle, one of `MOVES` or `TURNS`.
-        goal: the place where the platform should be, or at its translation the joint.
+        goal: the place where the platform should be; the joint of a leg should be at its translation.
     """
 
     machine: Machine

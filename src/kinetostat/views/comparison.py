@@ -48,6 +48,10 @@ WIDEST_LINEAR_RATIO = 30.0
 otherwise."""
 LONGEST_DESIGN_NAME = 100
 """Greatest number of characters of a design's name in the legend, which is as wide as the figure."""
+LEAST_PANEL_WIDTH, BAR_GROUP_WIDTH, ROOM_FOR_NUMBERS = 0.9, 0.55, 0.6
+"""Width of a panel without bars, what each group of bars adds to it, and the room of the numbers beside it, inches."""
+PANEL_HEIGHT, ROOM_FOR_TITLE, LEGEND_ROW = 2.3, 0.6, 0.17
+"""Height of a line of panels, of the title, and of a design in the legend, inches."""
 PANELS_IN_A_ROW = 4
 """Panels beside each other at most: more would not fit across a page."""
 GROUP_WIDTH = 0.8
@@ -228,9 +232,9 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
     """
     panels = [panel for panel in _panels(comparison) if panel[1]]
     lines = [panels[i : i + PANELS_IN_A_ROW] for i in range(0, len(panels), PANELS_IN_A_ROW)]
-    sizes = [[0.9 + 0.55 * len(bars) for _, bars in line] for line in lines]
-    width = max(sum(line) + 0.6 * len(line) + 0.6 for line in sizes)
-    height = 2.3 * len(lines) + 0.6 + 0.17 * len(comparison.designs)
+    sizes = [[LEAST_PANEL_WIDTH + BAR_GROUP_WIDTH * len(bars) for _, bars in line] for line in lines]
+    width = max(sum(line) + ROOM_FOR_NUMBERS * (len(line) + 1) for line in sizes)
+    height = PANEL_HEIGHT * len(lines) + ROOM_FOR_TITLE + LEGEND_ROW * len(comparison.designs)
     over = f"mean (bars) and worst (dots) {comparison.where}" if comparison.where else "at the pose of each design"
     with figures.new_figure((width, height), title.format(over)) as figure:
         rows = figure.add_gridspec(len(lines), 1)

@@ -37,6 +37,8 @@ else:
 
 MOST_ROWS = 25
 """Designs of a front that are printed, on one screen; result.json has all."""
+OBJECTIVE_DIGITS = 9
+"""Digits with which objectives are shown: the last ones still change while a search converges."""
 LEAST_PERCENT = 1e-4
 """Percent per percent below which a 0 is printed: differences leave round-off of this size."""
 LEAST_STIFFNESS_LEFT = 0.01
@@ -145,8 +147,8 @@ def scatter_table(robustness: Robustness, display: Display = ENGINEERING) -> Tab
     """Return the scatter of the objectives under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
-    usual = f"reached by {100.0 * COMMON_SHARE:g} %"
-    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", usual, "worst", "unit"])
+    head_of_usual = f"reached by {100.0 * COMMON_SHARE:g} %"
+    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", head_of_usual, "worst", "unit"])
     for scatter in robustness.scatters:
         scale = display.scale(scatter.unit)
         nominal, mean, usual, worst = (
@@ -204,7 +206,7 @@ def remarks(result: Result) -> Iterator[str]:
 
 
 def _exact(value: float) -> str:
-    return number(value) if not math.isfinite(value) else f"{value:.9g}"
+    return number(value) if not math.isfinite(value) else f"{value:.{OBJECTIVE_DIGITS}g}"
 
 
 def _times(gain: float) -> str:

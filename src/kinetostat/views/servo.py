@@ -16,7 +16,7 @@ from kinetostat.studies.control import Servo, servo
 from kinetostat.vibration.receptance import ASSUMED_RATIO, along, receptance
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
-from kinetostat.views.vibration import RESPONSE, drawn_directions
+from kinetostat.views.vibration import RESPONSE, drawn_directions, stiffness_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,15 +64,11 @@ def _tables(answer: Servo, _full: bool) -> Iterator[FittedTable]:
     table = numeric_table("Free stiffness of the tool", "", columns)
     rows = zip(answer.components, answer.motors_still, answer.static, answer.least, strict=True)
     for name, motors_still, static, (least, frequency) in rows:
-        unit = _stiffness_unit(name in COMPONENTS[:3])
+        unit = stiffness_unit(name in COMPONENTS[:3])
         stiffnesses = (_stiffness(answer, value, unit) for value in (motors_still, static, least))
         table.add_row(name, *stiffnesses, DASH if math.isinf(least) else number(frequency, digits=3))
     yield table
     yield _table_of_drives(answer)
-
-
-def _stiffness_unit(turning: bool) -> str:
-    return "N·m/rad" if turning else "N/m"
 
 
 def _stiffness(answer: Servo, value: float, unit: str) -> str:
@@ -97,7 +93,7 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
     return [
         {
             "name": str(drive.name),
-            "unit": _stiffness_unit(drive.turning),
+            "unit": stiffness_unit(drive.turning),
             **vars(loop),
             "static": loop.static_stiffness,
         }

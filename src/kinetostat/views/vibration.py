@@ -128,7 +128,7 @@ def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str
             number(100.0 * mode.ratio, digits=3),
             mode.direction,
             display.show(mode.modal_mass, "kg·m**2" if turning else "kg"),
-            display.show(mode.modal_stiffness, "N·m/rad" if turning else "N/m"),
+            display.show(mode.modal_stiffness, stiffness_unit(turning)),
             *(percent(share) for _, share in zip(axes, mode.effective_mass, strict=False)),
         )
     return table
@@ -175,6 +175,11 @@ def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:
         yield mode_table(answer.modes, answer.machine.display, answer.components)
         yield share_table("Strain energy (%)", _strain_shares(answer.modes))
         yield share_table("Kinetic energy (%)", [mode.kinetic for mode in answer.modes])
+
+
+def stiffness_unit(turning: bool) -> str:
+    """Return the unit of the stiffness of a rotation, or of a displacement."""
+    return "N·m/rad" if turning else "N/m"
 
 
 def _named_modes(answer: Vibration) -> list[dict[str, Any]]:

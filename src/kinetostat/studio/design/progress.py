@@ -19,9 +19,7 @@ from kinetostat.studies.optimisation.result import machine_of_design
 from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_problem
 from kinetostat.studies.study_folder import Record, read_history
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
-
-OBJECTIVE_DIGITS = 9
-"""Digits with which objectives are shown: the last ones still change while a search converges."""
+from kinetostat.views.optimisation import OBJECTIVE_DIGITS
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class ContributionsPanel(Panel):
 
 
 def contributions_text(report: Report, component: str) -> str:
-    """Bars of the parts that make one component of the compliance, all springs of a part added up; first by kind.
+    """Return bars of the parts that make one component of the compliance, by kind where that is shorter, then each.
 
     Args:
         report: the report of one pose.
@@ -121,6 +121,7 @@ class SensitivityPanel(Panel):
         self._ask()
 
     def close(self) -> None:
+        """Stop computing, because the page is gone."""
         self._lane.close()
 
     def _ask(self) -> None:
@@ -173,6 +174,7 @@ class LinkPanel(Panel):
         self._ask()
 
     def close(self) -> None:
+        """Stop computing, because the page is gone."""
         self._lane.close()
 
     def _ask(self) -> None:
