@@ -224,7 +224,8 @@ class _Routes:
         native: bool,
         modes: int = 0,
     ) -> None:
-        end_slopes = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
+        known_slopes = _slopes_at_end_stiffnesses(machine)
+        end_slopes = {path: known_slopes[path] for path in paths if path in known_slopes and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
         self._known_slopes, self._differentiated = end_slopes, tuple(path for path in paths if path not in end_slopes)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
@@ -241,9 +242,10 @@ class _Routes:
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
             program_inputs = program_columns(self._machine, self._form, columns, len(status), closed)
-            program_inputs += self._state(program_inputs, len(status), closed) + self._known_modes(columns, len(status))
+            program_inputs += self._rest_columns(program_inputs, len(status), closed)
+            program_inputs += self._mode_columns(columns, len(status))
             if self._known_slopes:
-                self._spread(*self._slopes(self._weights, program_inputs, status, closed), results)
+                self._fill_rows(*self._slopes(self._weights, program_inputs, status, closed), results)
             else:
                 program.run(self._fixed, program_inputs, results, status)
 
@@ -253,10 +255,10 @@ class _Routes:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
         program_inputs = program_columns(self._machine, self._form, columns, len(status))
         rates = self._equations(program_inputs, len(status))
-        program_inputs += self._state(program_inputs, len(status), closed=False)
-        program_inputs += self._known_modes(columns, len(status))
+        program_inputs += self._rest_columns(program_inputs, len(status), closed=False)
+        program_inputs += self._mode_columns(columns, len(status))
         objectives, partial = self._slopes(self._weights, program_inputs, status)
-        self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
+        self._fill_rows(objectives, _slopes_as_joints_follow(partial, rates, len(self._differentiated)), results)
 
     def _equations(self, program_inputs: Sequence[Array], count: int) -> Array:
         """Derivatives of the closing equations, and of those by which idle freedoms stand nearest to home, theory (34).
@@ -284,13 +286,13 @@ class _Routes:
         for motion in np.moveaxis(idle.motions, 1, 0):
             shift = JOINT_STEP * motion.T * units
             change = (rates_at(joints + shift)[1] - rates_at(joints - shift)[1])[:-1] / (2.0 * JOINT_STEP)
-            row = -np.einsum("np,pin->in", idle.pulls, change)
+            row = -np.einsum("np,pin->in", idle.multipliers, change)
             row[first:] += motion.T / units
             row[:first] -= 2.0 * (motion.T * slides).sum(axis=0) * length_rates[:first] / length
             rows.append(row * length)
         return np.concatenate([rates, np.array(rows).reshape(len(rows), *rates.shape[1:])])
 
-    def _state(self, program_inputs: Sequence[Array], count: int, closed: bool) -> list[Array]:
+    def _rest_columns(self, program_inputs: Sequence[Array], count: int, closed: bool) -> list[Array]:
         """Return the coordinates of the states of rest and their modes, if any objective is about them."""
         if not self._loaded:
             return []
@@ -301,11 +303,11 @@ class _Routes:
         inputs = [*program_inputs, *states]
         return states + modes_at_rest(self._machine, self._form, self._fixed, inputs, self._mode_counts, closed)
 
-    def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
+    def _mode_columns(self, columns: Mapping[str, Array], count: int) -> list[Array]:
         """Return the modes that programs cannot find themselves, if any objective is about them."""
         return mode_columns(with_values(self._machine, columns), count, self._modes) if self._modes else []
 
-    def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:
+    def _fill_rows(self, objectives: Array, slopes: Array, results: Array) -> None:
         """Put objectives and slopes in their rows, with the known slopes by rigid and free springs among them."""
         count = len(self._weights)
         results[:count] = objectives
@@ -336,7 +338,7 @@ class _Routes:
         return program_of(recipe, self._native)
 
 
-def _at_ends(machine: Machine) -> dict[str, float]:
+def _slopes_at_end_stiffnesses(machine: Machine) -> dict[str, float]:
     """Return the derivatives, by leaf path, by stiffnesses that are infinite or zero by form: 0 and NaN.
 
     A spring without stiffness is a free joint, so that the machine differs from that with a weak spring there.
@@ -353,17 +355,17 @@ class _IdleMotions:
     Attributes:
         motions: independent ones, of length 1, rad or in units of the machine's length [n x motions x joints]; 0 where
             a point has fewer.
-        pulls: Lagrange's multipliers: how strongly each equation keeps the joints from home [n x equations].
+        multipliers: Lagrange's multipliers: how strongly each equation keeps the joints from home [n x equations].
     """
 
     motions: Array
-    pulls: Array
+    multipliers: Array
 
     @classmethod
     def of(cls, rates: Array, joints: Array) -> "_IdleMotions":
         """Find them from the rates of equations [n x equations x joints] and joint coordinates [n x joints]."""
         sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(joints).all(axis=1)
-        motions, pulls = np.zeros((len(rates), 0, joints.shape[1])), np.zeros(rates.shape[:2])
+        motions, multipliers = np.zeros((len(rates), 0, joints.shape[1])), np.zeros(rates.shape[:2])
         left, sizes, right = np.linalg.svd(rates[sound])
         ranks = (sizes > IDLE_FREEDOM * sizes[:, :1]).sum(axis=1)
         if sound.any() and ranks.min() < joints.shape[1]:
@@ -372,11 +374,11 @@ class _IdleMotions:
             motions[sound] = np.where(kept[:, :, None], 0.0, right)[:, ranks.min() :]
             inverse = np.divide(1.0, sizes, where=kept[:, : sizes.shape[1]], out=np.zeros_like(sizes))
             along = np.einsum("nkj,nj->nk", right[:, : sizes.shape[1]], joints[sound])
-            pulls[sound] = np.einsum("nek,nk->ne", left[:, :, : sizes.shape[1]], inverse * along)
-        return cls(motions, pulls)
+            multipliers[sound] = np.einsum("nek,nk->ne", left[:, :, : sizes.shape[1]], inverse * along)
+        return cls(motions, multipliers)
 
 
-def _following(slopes: Array, rates: Array, count: int) -> Array:
+def _slopes_as_joints_follow(slopes: Array, rates: Array, count: int) -> Array:
     """Return the derivatives of objectives by the first `count` inputs, the parameters, while the joints follow.
 
     Both arrays have the parameters and then the joint coordinates as inputs [results x inputs x points].

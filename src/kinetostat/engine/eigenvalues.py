@@ -66,6 +66,7 @@ class WorkspaceLayout:
     def __init__(self, sizes: SpringSizes) -> None:
         self.size, self.stride = 0, -(-sizes.springs // BLOCK) * BLOCK
         over_ways, longest = sizes.ways * sizes.springs, self.stride + BLOCK
+        # The program has T and H in adjacent columns, which are copied at once: H must follow T here too.
         self.twists, self.mixed_mass, self.mixed_stiffness = (self._take(over_ways) for _ in range(3))
         self._take(BLOCK)  # read beyond the last row where a block is not full, and zero
         self.conditions = self._take(sizes.conditions * sizes.springs)
@@ -104,12 +105,8 @@ class _PencilCode:
     """Writes the program of a pencil."""
 
     def __init__(self, pencil: Pencil, code: LoopCode) -> None:
-        self._pencil, self._sizes, self._at, self._stride = (
-            pencil,
-            pencil.sizes,
-            pencil.layout,
-            pencil.layout.stride,
-        )
+        self._pencil, self._sizes = pencil, pencil.sizes
+        self._at, self._stride = pencil.layout, pencil.layout.stride
         self._code, self._zero = code, code.number(0.0)
 
     def write(self) -> None:
@@ -126,7 +123,7 @@ class _PencilCode:
         enclose(self._code, self._at.tridiagonal, self._pencil.count)
 
     def _assemble(self) -> list[int]:
-        """Put the matrices together from the columns; gives where they begin."""
+        """Put the matrices together from the columns, and return where they begin."""
         at, sizes = self._at, self._sizes
         over_ways, triangles = sizes.ways * sizes.springs, sum(leg * (leg + 1) // 2 for leg in sizes.legs)
         first_triangle = 2 * over_ways + sizes.conditions * sizes.springs
@@ -309,7 +306,7 @@ class _PencilCode:
             at_rows = [self._mirrors_at(place) for place in places]
             with code.loop(0, rows.index, [self._zero] * BLOCK) as columns:
                 column, at_column, sums = columns.index, self._mirrors_at(columns.index), []
-                column_image = code.load(image, column)
+                column_image = code.load(image, column)  # an earlier block of rows has written it
                 for k in block:
                     entry = entry_at(starts[k], column, at_rows[k], at_column)
                     # By symmetry, the entry stands in the column of its row as well.
@@ -384,10 +381,8 @@ class _PencilCode:
             with code.loop(0, stride, step=BLOCK) as columns:
                 places = self._places_of_block(columns.index)
                 with code.loop(0, rows.index, [code.load(mass, row, place) for place in places]) as loop:
-                    factor, row_above = (
-                        code.load(self._at.stiffness, row, loop.index),
-                        code.index("mul", loop.index, stride),
-                    )
+                    factor = code.load(self._at.stiffness, row, loop.index)
+                    row_above = code.index("mul", loop.index, stride)
                     solved = [code.load(mass, row_above, place) for place in places]
                     loop.after = [code.sub(a, code.mul(factor, b)) for a, b in zip(loop.values, solved, strict=True)]
                 for place, value in zip(places, loop.values, strict=True):

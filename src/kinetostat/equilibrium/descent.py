@@ -20,10 +20,10 @@ from kinetostat.equilibrium.tangent import (
     Admissible,
     admissible,
     gaps_of,
+    over_motions,
     places_of,
     starts_of,
     tangent_matrices,
-    within,
 )
 from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, newton
@@ -208,7 +208,7 @@ def _model(equations: Balance, part: Admissible) -> _Model:
     columns = [np.stack(column, axis=1) for column in (lines, loads, springs) if column]
     nothing = np.zeros((len(part.rows), 0))
     no_springs = (np.zeros((len(part.rows), 0, part.motions.shape[2])), nothing, nothing)
-    return _Model(within(elastic + geometric, part.motions), force, *(columns or no_springs))
+    return _Model(over_motions(elastic + geometric, part.motions), force, *(columns or no_springs))
 
 
 def least_within(stiffness: Array, force: Array, radius: Array) -> Array:

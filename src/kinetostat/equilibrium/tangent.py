@@ -128,7 +128,7 @@ def _motions_of_platform(equations: Balance, conditions: Array, rows: Integers) 
     return Admissible(rows[sure], motions[sure], inverse[sure])
 
 
-def within(matrix: Array, allowed: Array) -> Array:
+def over_motions(matrix: Array, allowed: Array) -> Array:
     """The symmetric part of Z^T M Z, which is the matrix M over the motions in the columns of Z [n x k x k]."""
     return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
 
@@ -238,20 +238,20 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     legs = _eliminated_legs(equations, right, loaded)
     if legs is None:
         return solve_over_admissible(equations, right, loaded)
-    whole, load = equations.platform_rates(loaded), right[:, :size]
+    platform_stiffness, load = equations.platform_rates(loaded), right[:, :size]
     stiffest = np.zeros(len(right))
     for leg in legs:
         stiffness = leg[:, -size:, -size:]
         stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
-        whole, load = whole + stiffness, load - leg[:, -size:, :-size]
-    twist = finite_solution(whole, load)
+        platform_stiffness, load = platform_stiffness + stiffness, load - leg[:, -size:, :-size]
+    twist = finite_solution(platform_stiffness, load)
     result = np.concatenate([twist, *(leg[:, :, :-size] + leg[:, :, -size:] @ twist for leg in legs)], axis=1)
-    sound = np.flatnonzero(np.isfinite(whole).all(axis=(1, 2)))
-    softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
+    sound = np.flatnonzero(np.isfinite(platform_stiffness).all(axis=(1, 2)))
+    softest = np.linalg.svd(platform_stiffness[sound], compute_uv=False)[:, -1]
     rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
     if len(rows):
-        of_rows = balance(equations.mechanism.at(rows), equations.state.at(rows))
-        result[rows] = solve_over_admissible(of_rows, right[rows], loaded)
+        equations_of_rows = balance(equations.mechanism.at(rows), equations.state.at(rows))
+        result[rows] = solve_over_admissible(equations_of_rows, right[rows], loaded)
     return result
 
 
@@ -317,10 +317,10 @@ def inverse(compliances: Array) -> Array:
     scaled = compliances / products + fixed[:, :, None] * np.eye(fixed.shape[1])
     finite = (~fixed.all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED))[:, None, None]
     usable = np.where(finite, scaled, np.eye(fixed.shape[1]))
-    return _with_held(np.where(finite, np.linalg.inv(usable) / products, np.inf), fixed)
+    return _with_fixed_components(np.where(finite, np.linalg.inv(usable) / products, np.inf), fixed)
 
 
-def _with_held(stiffness: Array, fixed: Mask) -> Array:
+def _with_fixed_components(stiffness: Array, fixed: Mask) -> Array:
     """A stiffness with infinite entries between components that are fixed, and 0 between these and the others."""
     either, both = fixed[:, :, None] | fixed[:, None], fixed[:, :, None] & fixed[:, None]
     return np.where(both, np.inf, np.where(either & np.isfinite(stiffness), 0.0, stiffness))
@@ -341,10 +341,10 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     total = np.zeros((len(equations.residual), size, size))
     rigid = np.zeros(len(total), dtype=bool)
     for number, leg in enumerate(equations.mechanism.legs):
-        block = equations.leg_rates(number, loaded=False)
-        rigid |= np.linalg.cond(block) >= 1.0 / UNRESISTED
-        # Wrenches that no joint feels make the block singular: the pseudo-inverse leaves out what rigid parts hold.
-        total += np.linalg.pinv(block)[:, leg.size :, leg.size :]
+        leg_equations = equations.leg_rates(number, loaded=False)
+        rigid |= np.linalg.cond(leg_equations) >= 1.0 / UNRESISTED
+        # Wrenches that no joint feels make these singular: the pseudo-inverse leaves out what rigid parts hold.
+        total += np.linalg.pinv(leg_equations)[:, leg.size :, leg.size :]
     from_tool = _shift(skew_of(equations.state.platform.translation))
     stiffness = np.swapaxes(from_tool, 1, 2) @ ways @ total @ ways.T @ from_tool
     stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
@@ -352,7 +352,7 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     fixed = (np.diagonal(compliances, axis1=1, axis2=2) == 0.0) & exists
     separable = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
     result = np.where((rigid & ~separable)[:, None, None], np.inf, stiffness)
-    return _with_held(result, fixed & rigid[:, None])
+    return _with_fixed_components(result, fixed & rigid[:, None])
 
 
 @dataclass(frozen=True)
@@ -375,7 +375,7 @@ class Stability:
 
 @dataclass(frozen=True)
 class Stabilities:
-    """Stability of n states of rest: arrays with the poses first."""
+    """Stability of n states of rest: the fields of `Stability` as arrays with the poses first."""
 
     stable: Mask
     factor: Array
@@ -401,7 +401,7 @@ def stabilities(equations: Balance) -> Stabilities:
         rows, allowed = part.rows, part.motions
         if not allowed.size:  # nothing can move at all
             continue
-        stiff, turning = (within(matrix[rows], allowed) for matrix in (elastic, geometric))
+        stiff, turning = (over_motions(matrix[rows], allowed) for matrix in (elastic, geometric))
         springs = spring_factor(equations, part)
         holds = holds_all(springs)
         whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
@@ -415,5 +415,8 @@ def stabilities(equations: Balance) -> Stabilities:
         modes[rows] = np.where(grows[:, None], motions / np.abs(motions).max(axis=1, keepdims=True), 0.0)
     legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
     return Stabilities(
-        stable, factors, modes[:, :size] @ ways.T, np.stack(legs, axis=1) if legs else np.zeros((count, 0))
+        stable=stable,
+        factor=factors,
+        mode=modes[:, :size] @ ways.T,
+        legs=np.stack(legs, axis=1) if legs else np.zeros((count, 0)),
     )

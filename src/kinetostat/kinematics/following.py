@@ -92,10 +92,10 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
         kept = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
         unknowns[tried[kept]], status[tried[solved]] = reached[kept], int(Status.OK)
         unsolved = unsolved[status[unsolved] != Status.OK]
-    unknowns[unsolved], shown = _least_gap(
+    unknowns[unsolved], is_least = _least_gap(
         problems.subset(unsolved), unknowns[unsolved], coordinates_at(goal, unsolved)
     )
-    status[unsolved[shown]] = int(Status.OUT_OF_REACH)
+    status[unsolved[is_least]] = int(Status.OUT_OF_REACH)
     return unknowns, status
 
 
@@ -105,10 +105,10 @@ def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, M
     A solution at the goal in another mode has crossed to it by too long a step, and is followed again in shorter ones.
     """
     unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, LONGEST_STRIDE)
-    again = np.flatnonzero(crossed)
-    if again.size:
-        part, target = problems.subset(again), coordinates_at(goal, again)
-        unknowns[again], solved[again], _ = _strides(part, plan(part, target), target, CAREFUL_STRIDE)
+    crossing = np.flatnonzero(crossed)
+    if crossing.size:
+        part, target = problems.subset(crossing), coordinates_at(goal, crossing)
+        unknowns[crossing], solved[crossing], _ = _strides(part, plan(part, target), target, CAREFUL_STRIDE)
     return unknowns, solved
 
 
@@ -124,7 +124,8 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, longest: float) ->
         end = newton(
             equations, unknowns[ended], len(ended), most_steps=steps, residual_goal=NEWTON_SETTLED, contraction=1.0
         )
-        unknowns[ended], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, target)
+        unknowns[ended] = end.value
+        closed, same = end.residual <= CLOSED, same_mode(part, end.value, target)
         solved[ended], crossed[ended] = closed & same, closed & ~same
     return unknowns, solved, crossed
 
@@ -190,7 +191,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         The unknowns there, and whether that is shown to be a least distance which is not zero.
     """
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
-    best, shown = unknowns + START_SHIFT * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
+    best, is_least = unknowns + START_SHIFT * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
     gaps, rates, distance = problems.gaps_and_distance(best, goal)
     slope = np.einsum("nrc,nr->nc", rates, gaps)
@@ -198,9 +199,10 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     for _ in range(MOST_DESCENTS):
         settled = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
         is_open = (distance > CLOSED * CLOSED) & np.isfinite(distance)
-        shown[items[settled & is_open]] = True
-        rest = ~settled & is_open
-        items, share, slope, distance, inverse = items[rest], share[rest], slope[rest], distance[rest], inverse[rest]
+        is_least[items[settled & is_open]] = True
+        remaining = ~settled & is_open
+        items, share, inverse = items[remaining], share[remaining], inverse[remaining]
+        slope, distance = slope[remaining], distance[remaining]
         if not items.size:
             break
         step = np.einsum("ncd,nd->nc", inverse, slope)
@@ -213,7 +215,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         best[items[better]] = end[better]
         slope[better], distance[better] = end_slope[better], end_distance[better]
         share = np.where(better, 1.0, SHORTER_DESCENT * share)
-    return best, shown
+    return best, is_least
 
 
 def _updated_inverse(inverse: Array, step: Array, change: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.elastic_legs import idle_motions
-from kinetostat.equilibrium.tangent import starts_of, tangent_matrices, within
+from kinetostat.equilibrium.tangent import over_motions, starts_of, tangent_matrices
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
@@ -144,7 +144,7 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
     sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
     for rows, basis in _allowed_motions(conditions, idle_conditions, starts, np.flatnonzero(sound)):
         stiff_within, mass_within, unit_within = (
-            _over_motions(matrix, rows, basis, starts)
+            _over_leg_bases(matrix, rows, basis, starts)
             for matrix in (stiff, mass, np.broadcast_to(np.eye(starts[-1]), mass.shape))
         )
         holds, factors = _inverse_factors(stiff_within)
@@ -249,14 +249,14 @@ def _places(basis: Sequence[Array]) -> Iterator[Integers]:
         yield np.concatenate([np.arange(common), np.arange(begin, end)])
 
 
-def _over_motions(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
+def _over_leg_bases(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
     """Return the symmetric part of a matrix, which couples no coordinates of different legs, over the motions."""
     places = list(_places(basis))
     size = 1 + max(place.max(initial=-1) for place in places)
     result = np.zeros((len(rows), size, size))
     ends = [0, *starts.tolist()]
     for part, place, (first, last) in zip(basis, places, pairwise(ends), strict=True):
-        result[:, place[:, None], place] += within(matrix[rows, first:last, first:last], part)
+        result[:, place[:, None], place] += over_motions(matrix[rows, first:last, first:last], part)
     return result
 
 

@@ -113,12 +113,12 @@ class BallLeg:
         end = goal - fixed
         square = _square(end)
         amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
-        moved = single.motion_by(amount)[1]
+        single_motion = single.motion_by(amount)[1]
         shrink = reciprocal(sqrt(square))
-        start = single.axis * self.aligned if self.aligned else (moved.apply(centre) - fixed) * shrink
+        start = single.axis * self.aligned if self.aligned else (single_motion.apply(centre) - fixed) * shrink
         turns, gap = self._pair(pair, start, end * shrink, centre - fixed)
-        pair_motion = _place(turns[1]).motion
-        arm = pair_motion @ moved
+        pair_motion = _placement_of(turns[1]).motion
+        arm = pair_motion @ single_motion
         amounts = [*turns, _with_placement(amount, single, pair_motion, arm)]
         return amounts, arm, Closure(self.leg, sqrt(square), *limits), gap
 
@@ -133,10 +133,10 @@ class BallLeg:
         shrink = reciprocal(sqrt(square))
         turns, gap = self._pair(pair, start * shrink, end * shrink, centre - fixed)
         amount = _opposite(backward_amount)
-        moved = single.motion_by(amount)[1]
-        turns = [_after(moved, turn) for turn in turns]
-        amounts = [_with_placement(amount, single, moved, moved), *turns]
-        return amounts, _place(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap
+        single_motion = single.motion_by(amount)[1]
+        turns = [_displaced_turn(single_motion, turn) for turn in turns]
+        amounts = [_with_placement(amount, single, single_motion, single_motion), *turns]
+        return amounts, _placement_of(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
         """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.
@@ -227,16 +227,16 @@ def _with_placement(amount: Scalar | Turn, joint: Joint, before: Displacement, a
     return replace(amount, placement=_place_at(joint.axis, joint.pivot, before, after))
 
 
-def _place(turn: Turn) -> RevolutePlace:
+def _placement_of(turn: Turn) -> RevolutePlace:
     if turn.placement is None:
         raise ValueError("a turn without a placement")
     return turn.placement
 
 
-def _after(moved: Displacement, turn: Turn) -> Turn:
+def _displaced_turn(single_motion: Displacement, turn: Turn) -> Turn:
     """A turn whose placement a joint before it has displaced."""
-    place = _place(turn)
-    return replace(turn, placement=_place_at(place.axis, place.point, moved, moved @ place.motion))
+    place = _placement_of(turn)
+    return replace(turn, placement=_place_at(place.axis, place.point, single_motion, single_motion @ place.motion))
 
 
 def _place_at(axis: Vector, point: Vector, before: Displacement, after: Displacement) -> RevolutePlace:
