@@ -241,7 +241,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
     if status is not Status.OK:
         names, facts = machine.family.component_names, _facts_without_answer(state, turn)
-        return Analysis(state, status, state.refusal, names, axes, **facts)
+        return Analysis(state=state, status=status, message=state.refusal, components=names, axes=axes, **facts)
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -397,8 +397,8 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
         return count_independent(wrenches, length, CLOSING_ROUND_OFF)
     sizes = [math.sqrt(size) for leg in response.legs for size in leg.load_squares]
     greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
-    springs = zip(statics.flexibility, statics.compliance, sizes, strict=True)
-    twists = [twist * (1.0 / (size * greatest)) for twist, s, size in springs if s > 0.0]
+    flexible = zip(statics.flexibility, statics.compliance, sizes, strict=True)
+    twists = [twist * (1.0 / (size * greatest)) for twist, s, size in flexible if s > 0.0]
     if not twists:
         return 0
     return int((np.linalg.svd(columns(twists, 1.0, 1.0 / length), compute_uv=False) > CLOSING_ROUND_OFF).sum())

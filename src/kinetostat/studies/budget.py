@@ -361,8 +361,8 @@ def _answer(
             f"{columns.unit_doubt if columns else ''}".rstrip()
         )
     pressed = np.concatenate(sums.pressed)
-    at_any = [part.path for number, part in enumerate(sums.parts) if pressed[:, number].any()]
-    at_all = [part.path for number, part in enumerate(sums.parts) if pressed[:, number].all()]
+    at_any = [part.path for place, part in enumerate(sums.parts) if pressed[:, place].any()]
+    at_all = [part.path for place, part in enumerate(sums.parts) if pressed[:, place].all()]
     answer = Budget(
         machine=sums.machine,
         tolerances=tuple(sums.lines.values()),

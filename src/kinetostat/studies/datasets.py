@@ -134,9 +134,9 @@ def evaluate(
 def as_dataset(answers: PoseAnswers) -> xr.Dataset:
     """Label answers: dimensions pose, and row and column of K and C."""
     poses = answers.poses
-    fields = {field.dimension: values for field, values in zip(poses.fields, poses.values, strict=True)}
-    values = {"status": answers.status, **{name: answers.values[name] for name in answers.names}, **fields}
-    values |= {matrix: answers.matrix(matrix) for matrix in answers.matrices}
+    fields = {field.dimension: column for field, column in zip(poses.fields, poses.values, strict=True)}
+    arrays = {"status": answers.status, **{name: answers.values[name] for name in answers.names}, **fields}
+    arrays |= {matrix: answers.matrix(matrix) for matrix in answers.matrices}
     layout = _layout if poses.count <= POSES_KEPT else _layout.__wrapped__
     empty = layout(
         Identical(answers.machine),
@@ -146,7 +146,7 @@ def as_dataset(answers: PoseAnswers) -> xr.Dataset:
         poses.count,
         answers.loads_left_out,
     )
-    dataset = empty.copy(data=values).set_coords(list(fields))
+    dataset = empty.copy(data=arrays).set_coords(list(fields))
     labels = {name: ("pose", label) for name, label in poses.labels.items()}
     return dataset.assign_coords(labels) if labels else dataset
 
@@ -310,8 +310,8 @@ def _evaluate_all(question: GridQuestion, progress: Progress, compute: Compute) 
         done += len(part.status)
         progress(done, question.grid.size)
     ordered = [parts[number] for number in range(work.count)]
-    values = {name: np.concatenate([part.values[name] for part in ordered]) for name in question.names}
-    return Evaluation(values, np.concatenate([part.status for part in ordered]))
+    columns = {name: np.concatenate([part.values[name] for part in ordered]) for name in question.names}
+    return Evaluation(columns, np.concatenate([part.status for part in ordered]))
 
 
 def field_of(coordinate: xr.DataArray) -> str:
@@ -383,9 +383,9 @@ def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float
     """Both ends of the range of a coordinate, SI: the farthest poses without a bad one before them."""
     (path,), value = parameter.leaves, float(values(machine)[parameter.path])
     steps = np.linspace(-reach, reach, 2 * PROBE_STEPS + 1)
-    answer = batch.evaluate(machine, PointTable({path: value + steps}), ["singularity_margin"])
-    singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
-    good = (answer.status == Status.OK) & (singularity_margin >= LEAST_MARGIN_SHARE * singularity_margin[PROBE_STEPS])
+    probe = batch.evaluate(machine, PointTable({path: value + steps}), ["singularity_margin"])
+    singularity_margin = np.nan_to_num(probe.values["singularity_margin"])
+    good = (probe.status == Status.OK) & (singularity_margin >= LEAST_MARGIN_SHARE * singularity_margin[PROBE_STEPS])
     bad = np.flatnonzero(~good)
     lowest = bad[bad < PROBE_STEPS].max(initial=-1) + 1
     highest = bad[bad > PROBE_STEPS].min(initial=len(steps)) - 1

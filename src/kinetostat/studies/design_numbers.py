@@ -112,7 +112,7 @@ def _matrix_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
         for name in COMPONENTS:
             entry = QUANTITIES[f"{group}_{name}"]
             numbers = tuple(_diagonal(analysis, group, name) for analysis in analyses)
-            yield DesignRow(group, f"{letter}_{name}", entry.unit, better, numbers)
+            yield DesignRow(group=group, name=f"{letter}_{name}", unit=entry.unit, better=better, values=numbers)
 
 
 def _index_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
@@ -126,7 +126,7 @@ def _index_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
     ]
     for name, unit, better, value in scalars:
         numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
-        yield DesignRow("indices", name, unit, better, numbers)
+        yield DesignRow(group="indices", name=name, unit=unit, better=better, values=numbers)
 
 
 def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
@@ -144,7 +144,7 @@ def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow
     ]
     for title, unit, better, name_of in rows:
         numbers = tuple(_at_pose(analysis.state, name_of(analysis.state.machine)) for analysis in analyses)
-        yield DesignRow("loads and vibration", title, unit, better, numbers)
+        yield DesignRow(group="loads and vibration", name=title, unit=unit, better=better, values=numbers)
 
 
 def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> Iterator[DesignRow]:
@@ -302,7 +302,7 @@ def rows_over(
         group = name.replace("compliance_", "C_") if name in GROUPS["compliance"] else name.replace("_", " ")
         for k, statistic in enumerate(("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")):
             values_of_designs = tuple(spread[name][k] if name in spread else None for spread in spreads)
-            rows.append(DesignRow(group, statistic, unit, better, values_of_designs))
+            rows.append(DesignRow(group=group, name=statistic, unit=unit, better=better, values=values_of_designs))
     return tuple(rows), tuple(counts)
 
 

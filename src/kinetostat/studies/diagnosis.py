@@ -89,12 +89,16 @@ class UnsoundError(Exception):
 def check_of(group: str, name: str, question: Callable[[], str], fix: str) -> InstallationCheck:
     """Ask a question and return its answer as a check; whatever it raises is a failure, as anything may be broken."""
     try:
-        return InstallationCheck(group, name, Soundness.SOUND, question())
+        return InstallationCheck(group=group, name=name, state=Soundness.SOUND, detail=question())
     except UnsoundError as wrong:
-        return InstallationCheck(group, name, Soundness.FAILED, str(wrong), fix)
+        return InstallationCheck(group=group, name=name, state=Soundness.FAILED, detail=str(wrong), fix=fix)
     except Exception as trouble:
         return InstallationCheck(
-            group, name, Soundness.FAILED, f"{type(trouble).__name__}: {_first_line(trouble)}", fix
+            group=group,
+            name=name,
+            state=Soundness.FAILED,
+            detail=f"{type(trouble).__name__}: {_first_line(trouble)}",
+            fix=fix,
         )
 
 
@@ -119,7 +123,9 @@ def diagnose(parts: Mapping[str, Checks]) -> Iterator[InstallationCheck]:
             yield from checks()
         except Exception as trouble:
             text = f"cannot be looked at, {type(trouble).__name__}: {_first_line(trouble)}"
-            yield InstallationCheck(group, group, Soundness.FAILED, text, reinstall(PACKAGE))
+            yield InstallationCheck(
+                group=group, name=group, state=Soundness.FAILED, detail=text, fix=reinstall(PACKAGE)
+            )
 
 
 def healthy(checks: Sequence[InstallationCheck]) -> bool:
@@ -140,16 +146,18 @@ def software_checks() -> Iterator[InstallationCheck]:
     """The package itself, Python, every package that it needs, and what every extra adds."""
     group = "software"
     try:
-        yield InstallationCheck(group, PACKAGE, Soundness.SOUND, version(PACKAGE))
+        yield InstallationCheck(group=group, name=PACKAGE, state=Soundness.SOUND, detail=version(PACKAGE))
     except PackageNotFoundError:
         text = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield InstallationCheck(group, PACKAGE, Soundness.FAILED, text, install_command([PACKAGE]))
+        yield InstallationCheck(
+            group=group, name=PACKAGE, state=Soundness.FAILED, detail=text, fix=install_command([PACKAGE])
+        )
         return
     python = f"{platform.python_version()} ({platform.python_implementation()})"
-    yield InstallationCheck(group, "python", Soundness.SOUND, python)
+    yield InstallationCheck(group=group, name="python", state=Soundness.SOUND, detail=python)
     for requirement in requirements():
         state, text, fix = _package_state(requirement)
-        yield InstallationCheck(group, requirement.name, state, text, fix)
+        yield InstallationCheck(group=group, name=requirement.name, state=state, detail=text, fix=fix)
     for extra in metadata(PACKAGE).get_all("Provides-Extra") or ():
         yield _extra_check(extra)
 
@@ -190,9 +198,11 @@ def _extra_check(extra: str) -> InstallationCheck:
     missing = [name for name, present in versions_by_name.items() if present is None]
     if missing:
         text = f"not installed ({', '.join(missing)})"
-        return InstallationCheck("extras", extra, Soundness.ABSENT, text, extra_command(extra))
+        return InstallationCheck(
+            group="extras", name=extra, state=Soundness.ABSENT, detail=text, fix=extra_command(extra)
+        )
     versions = ", ".join(f"{name} {present}" for name, present in versions_by_name.items())
-    return InstallationCheck("extras", extra, Soundness.SOUND, versions)
+    return InstallationCheck(group="extras", name=extra, state=Soundness.SOUND, detail=versions)
 
 
 def _installed_version(requirement: "Requirement") -> str | None:
@@ -205,12 +215,12 @@ def _installed_version(requirement: "Requirement") -> str | None:
 def machine_checks() -> Iterator[InstallationCheck]:
     """System, processor, its vectors, and memory."""
     group, system = "machine", f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield InstallationCheck(group, "system", Soundness.SOUND, system)
+    yield InstallationCheck(group=group, name="system", state=Soundness.SOUND, detail=system)
     yield check_of(group, "processor", _cores, reinstall("numpy"))
     yield check_of(group, "vectors", _vectors, reinstall("llvmlite"))
     memory = _memory_size()
     if memory is not None:
-        yield InstallationCheck(group, "memory", Soundness.SOUND, f"{memory / 2**30:.1f} GiB")
+        yield InstallationCheck(group=group, name="memory", state=Soundness.SOUND, detail=f"{memory / 2**30:.1f} GiB")
 
 
 def processor() -> str:

@@ -173,13 +173,13 @@ def elevation(
     upright = replace(changed(as_given, {**axis_of_gravity, GRAVITY_ANGLE: 0.0}), loaded=True)
     elevations = _elevations(over)
     count, angles = len(elevations), UPRIGHT - elevations
+    span = f"{GRAVITY_ANGLE}={float(angles[0])!r}:{float(angles[-1])!r}:{count}"
     steps = ANSWERS_BEFORE_REQUIREMENTS + (count if upright.requirements else 0)
     states = states_at(upright, {GRAVITY_ANGLE: angles}, count)
     numbers, statuses = loaded_numbers(states)
     progress(1, steps)
     frequency = evaluate(upright, PointTable({GRAVITY_ANGLE: angles}), [FREQUENCY]).values[FREQUENCY]
     progress(2, steps)
-    span = f"{GRAVITY_ANGLE}={float(angles[0])!r}:{float(angles[-1])!r}:{count}"
     corrections = correction_table(upright, span, tolerance)
     progress(3, steps)
     error_budget = budget(upright, ranges=[span]) if upright.tolerances else None
@@ -187,6 +187,10 @@ def elevation(
     driven = states.mechanism.driven
     loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
     at_rest = np.isfinite(loads).all(axis=1)
+
+    def requirements_done(judged: int) -> None:
+        progress(ANSWERS_BEFORE_REQUIREMENTS + judged, steps)
+
     return Elevation(
         state=state_of(upright),
         status=_overall_status(statuses),
@@ -203,15 +207,13 @@ def elevation(
         reversals=_reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
         budget=error_budget,
         corrections=corrections,
-        requirements=_requirements(
-            upright, angles, elevations, lambda done: progress(ANSWERS_BEFORE_REQUIREMENTS + done, steps)
-        ),
+        requirements=_requirements(upright, angles, elevations, requirements_done),
     )
 
 
-def _displacement(machine: Machine, whole: Array) -> Array:
+def _displacement(machine: Machine, twists: Array) -> Array:
     """The components of twists [n x 6] that the machine has, without what is round-off over all elevations."""
-    components = whole[:, list(machine.family.components)]
+    components = twists[:, list(machine.family.components)]
     rotations = np.array([name.startswith("r") for name in machine.family.component_names])
     for columns in (rotations, ~rotations):
         sizes = np.abs(components[:, columns])

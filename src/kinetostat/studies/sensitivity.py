@@ -297,8 +297,8 @@ def _influence(
 ) -> Influence:
     path, kind = parameter.path, parameter.quantity.kind
     if kind == "direction":
-        field = path.rpartition(".")[0]
-        size, measure = math.hypot(*(here[f"{field}.{i}"] for i in range(3))), "axis"
+        axis = path.rpartition(".")[0]
+        size, measure = math.hypot(*(here[f"{axis}.{i}"] for i in range(3))), "axis"
     else:
         size, measure = measure_of(kind, here[path], length)
     return Influence(

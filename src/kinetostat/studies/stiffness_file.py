@@ -184,7 +184,16 @@ def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> 
                 raise data.refusal(row, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
             component = name.removeprefix("deflection.")
             unit = "rad" if component.startswith("r") else "m"
-            entries.append(MeasuredEntry(f"deflection_{component}", unit, value, deviation, data.lines[row], row))
+            entries.append(
+                MeasuredEntry(
+                    name=f"deflection_{component}",
+                    unit=unit,
+                    value=value,
+                    sigma=deviation,
+                    line=data.lines[row],
+                    row=row,
+                )
+            )
     return MeasuredStiffness(str(path), tuple(entries), data)
 
 

@@ -277,8 +277,8 @@ def reprap_text(numbers: FirmwareNumbers) -> str:
     )
 
 
-def _letters(values: tuple[float, ...], digits: int) -> str:
-    return " ".join(f"{letter}{value + 0.0:.{digits}f}" for letter, value in zip("XYZ", values, strict=True))
+def _letters(numbers: tuple[float, ...], digits: int) -> str:
+    return " ".join(f"{letter}{number + 0.0:.{digits}f}" for letter, number in zip("XYZ", numbers, strict=True))
 
 
 def _scale_lines(numbers: FirmwareNumbers) -> list[str]:

@@ -272,7 +272,7 @@ def _tied_error(model: ErrorModel, name: str, terms: str) -> tuple[MachineError,
         )
     others = f" and {len(named) - 1} more as one" if len(named) > 1 else ""
     words = f"{name.replace('_', ' ')}: {named[0].words}{others}"
-    return MachineError(name, named[0].kind, "tied", words, ""), shares
+    return MachineError(path=name, kind=named[0].kind, group="tied", words=words, leg=""), shares
 
 
 def _plausible_size(unknown: MachineError) -> float:

@@ -36,7 +36,7 @@ def place_unknown(path: str) -> MachineError:
     place, name = path.split(".")
     turns = name in ROTATION
     words = f"{PLACES[place]}, {'turn about' if turns else 'shift along'} {name[-1]}"
-    return MachineError(path, "angle" if turns else "length", place, words, "")
+    return MachineError(path=path, kind="angle" if turns else "length", group=place, words=words, leg="")
 
 
 @former_names(chosen="error_numbers", members="error_mix", names="row_names", pose="row_poses", value="measured")

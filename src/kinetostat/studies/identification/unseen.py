@@ -32,7 +32,7 @@ LEAST_NAMED_PART = 0.05
 SAME_EFFECT = 1e-5
 """Share of the effect of a motion that errors of a leg may leave out and yet stand for it: where they can make the
 motion, round-off leaves out 1e-13."""
-NO_ERROR = MachineError("", "", "", "", "")
+NO_ERROR = MachineError(path="", kind="", group="", words="", leg="")
 """Stands for the error of a motion that is none of the machine's: `effects` reads only where motions are inserted."""
 SAME_SHARE = 1e-6
 """Relative difference below which two unknowns take part in combinations alike."""
