@@ -177,7 +177,7 @@ def greatest_gain(equations, gains):
 
 def twist_of(equations, gains):
     """The acceleration of the tool point from rest by those of the coordinates of the pose [6], rad/s² and m/s²."""
-    here = equations._machine_here
+    here = equations._at_pose
     still = dict.fromkeys(here.names, 0.0)
     twist = here.along(PoseRates(dict(zip(here.names, gains, strict=True)), still)).platform.twist
     size = float(here.rigid.length)

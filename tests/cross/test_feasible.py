@@ -45,7 +45,7 @@ def test_faces_bound_what_a_linear_programme_finds(name, count):
 
 
 def with_accelerations(equations):
-    return replace(equations.state.free, acceleration_loads=loads_by_acceleration(equations._machine_here))
+    return replace(equations.state.free, acceleration_loads=loads_by_acceleration(equations._at_pose))
 
 
 @pytest.mark.parametrize("name", MACHINES)
