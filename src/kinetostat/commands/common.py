@@ -41,6 +41,10 @@ _WORDS = re.compile(r"""(?:-[\w-]+ (?!-))?(?:[^\s"']|"[^"]*"|'[^']*')+""")
 """Words of a command: an option with its value, what stands in quotes, or any other word."""
 
 
+BESIDE_WORDS = 5
+"""Characters of a line of an example besides its words: three blanks before the last, and a blank and a backslash."""
+
+
 class Help(argparse.RawDescriptionHelpFormatter):
     """Help whose commands can be typed as they stand, broken between words, in examples by a backslash."""
 
@@ -62,7 +66,7 @@ def _lines_within(line: str, width: int) -> list[str]:
         return textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)
     lines = [""]
     for word in _WORDS.findall(line):
-        if lines[-1] and len(lines[-1]) + len(word) + 5 > width:
+        if lines[-1] and len(lines[-1]) + len(word) + BESIDE_WORDS > width:
             lines.append("   ")
         lines[-1] += f" {word}" if lines[-1] else word
     return [*(f"  {part} \\" for part in lines[:-1]), f"  {lines[-1]}"]
@@ -106,9 +110,9 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
     return command
 
 
-def takes_machine(command: Parser, what: str = MACHINE) -> None:
+def takes_machine(command: Parser, meaning: str = MACHINE) -> None:
     """Give a command the machine and `--set`."""
-    command.add_argument("machine", metavar="MACHINE", help=what)
+    command.add_argument("machine", metavar="MACHINE", help=meaning)
     takes_settings(command, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
     takes_units(command)
 
@@ -141,9 +145,9 @@ def takes_ranges(command: Parser, meaning: str) -> None:
     )
 
 
-def takes_output(command: Parser, what: str) -> None:
+def takes_output(command: Parser, contents: str) -> None:
     """Give a command `--output`, a folder."""
-    command.add_argument("-o", "--output", type=_folder, action=_Once, help=f"folder for {what}")
+    command.add_argument("-o", "--output", type=_folder, action=_Once, help=f"folder for {contents}")
 
 
 FILE_SUFFIXES = {".csv", ".html", ".json", ".nc", ".pdf", ".png", ".svg", ".toml"}
@@ -169,9 +173,9 @@ class _Once(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
-def takes_figures(command: Parser, what: str) -> None:
+def takes_figures(command: Parser, contents: str) -> None:
     """Give a command `--output` and `--formats`."""
-    takes_output(command, what)
+    takes_output(command, contents)
     command.add_argument(
         "--formats", metavar="LIST", type=_formats, default=("png",),
         help="formats of the figures, separated by commas: png, svg, pdf (default: png)",
@@ -324,14 +328,14 @@ def note_damage(folder: Path, repaired: str, unchecked: bool, changed: "Sequence
 
 
 @contextmanager
-def progress_bar(what: str) -> "Iterator[Progress]":
+def progress_bar(activity: str) -> "Iterator[Progress]":
     """Show a bar on stderr with the remaining time; show nothing where stderr is not a terminal."""
-    with search_bar(what) as update:
+    with search_bar(activity) as update:
         yield lambda done, total: update(done, total, "")
 
 
 @contextmanager
-def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
+def search_bar(activity: str) -> "Iterator[Callable[[int, int, str], None]]":
     """Show a bar that also has a few words on the state of the work: (done, total, words)."""
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -343,9 +347,9 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
     with Progress(
         *columns, console=Console(stderr=True), transient=True, speed_estimate_period=PROGRESS_SECONDS
     ) as bar:
-        task = bar.add_task(what, total=None)
+        task = bar.add_task(activity, total=None)
         yield lambda done, total, words: bar.update(
-            task, completed=done, total=total, description=f"{what} {words}".rstrip()
+            task, completed=done, total=total, description=f"{activity} {words}".rstrip()
         )
 
 

@@ -193,7 +193,7 @@ class MapRequest:
 
 
 def quantity_map(request: MapRequest) -> dict[str, Array] | str:
-    """Evaluate a quantity at 41 x 41 points, with all others of `map_quantities` that cost nothing more.
+    """Evaluate a quantity at `MAP_POINTS` each way, with all others of `map_quantities` that cost nothing more.
 
     A program is compiled once and must then serve while the designer moves the machine. Therefore all coordinates of
     the pose are its inputs, also those that do not vary over the map, and the load is left out where it has no effect.

@@ -191,14 +191,14 @@ def principal_table(analysis: Analysis) -> FittedTable:
     table = numeric_table(f"Principal stiffnesses ({display.names(['N/m', 'N·m/rad'])})", "", columns)
     indices = analysis.indices
     free, guided = (indices.free or {}, indices.guided or {}) if indices else ({}, {})
-    for what, blocks, block, unit in (
+    for name, blocks, block, unit in (
         ("force", free, "translation", "N/m"),
         ("force, rotations held", guided, "translation", "N/m"),
         ("moment", free, "rotation", "N·m/rad"),
         ("moment, point held", guided, "rotation", "N·m/rad"),
     ):
         if block in blocks:
-            table.add_row(what, *_ellipsoid(blocks[block], unit, display))
+            table.add_row(name, *_ellipsoid(blocks[block], unit, display))
     return table
 
 

@@ -32,14 +32,18 @@ MOST_BARS = 15
 """Single tolerances that have bars, at most: as many as a page has lines beside the other panels."""
 LEAST_LABEL_WIDTH = 4.0
 """Least room for the labels of bars, inches: most paths fit."""
+BARS_WIDTH, ROW_HEIGHT, ROOM_FOR_TITLE = 2.4, 0.24, 1.4
+"""Width of the panels of bars beside their labels, height of a row, and of title, scale and notes, inches."""
 BAR_HEIGHT = 0.8
 """Height of all bars of a row together, as a share of the distance between rows."""
+BAR_SHARE = 0.92
+"""Height of a bar as a share of its place in a row: a line of white parts it from the next."""
 
 
 def ranked_by(answer: Budget) -> list[str]:
     """Return the measures whose shares are listed, the leading one first."""
-    turned = "rotation" if "rotation" in answer.measures else "rz"
-    return [name for name in ("along", "position", turned) if name in answer.measures]
+    rotation = "rotation" if "rotation" in answer.measures else "rz"  # of a planar machine
+    return [name for name in ("along", "position", rotation) if name in answer.measures]
 
 
 def varied_fields(answer: Budget) -> dict[str, tuple[Any, str]]:
@@ -147,7 +151,7 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
     label_width = max(LEAST_LABEL_WIDTH, layout.width_of(label for bars in panels.values() for label in bars))
     many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
     with figures.new_figure(
-        (label_width + 2.4, 1.4 + 0.24 * sum(heights)), title.format(budget.machine.name), many
+        (label_width + BARS_WIDTH, ROOM_FOR_TITLE + ROW_HEIGHT * sum(heights)), title.format(budget.machine.name), many
     ) as figure:
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
         for panel, (name, bars) in zip(axes, panels.items(), strict=True):
@@ -168,7 +172,9 @@ def _bars(panel: "Axes", title: str, bars: dict[str, list[float]], names: list[s
     places, height = np.arange(len(bars)), BAR_HEIGHT / len(names)
     for number, (name, colour) in enumerate(zip(names, figures.COLOURS, strict=False)):
         widths = [100.0 * shares[number] for shares in bars.values()]
-        panel.barh(places + (number - 0.5 * (len(names) - 1)) * height, widths, 0.92 * height, color=colour, label=name)
+        panel.barh(
+            places + (number - 0.5 * (len(names) - 1)) * height, widths, BAR_SHARE * height, color=colour, label=name
+        )
     panel.set_yticks(places, list(bars))
     panel.set_ylim(len(bars) - 0.4, -0.6)
     panel.set_title(title, loc="left")

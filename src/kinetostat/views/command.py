@@ -78,9 +78,9 @@ def command_csv(answer: Command, corrections: bool = False) -> str:
         for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
             columns[f"{data_name(field.path)} [{field.unit}]"] = values
     tables = {"": answer.coordinates} | ({" correction": answer.corrections} if corrections else {})
-    for what, table in tables.items():
+    for suffix, table in tables.items():
         for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=True):
-            columns[f"{name}{what} [{unit}]"] = np.where(answer.settled, values, np.nan)
+            columns[f"{name}{suffix} [{unit}]"] = np.where(answer.settled, values, np.nan)
     return columns_csv(columns)
 
 

@@ -90,10 +90,13 @@ FORWARD = Description(
             "mode",
             (
                 Field("pose", axes=("coordinate",), column="*", long_name="coordinates of the pose, m and rad"),
-                Field("status", "status.word", long_name="status of the machine there"),
+                Field("status", "status.word", long_name="status of the machine at the pose"),
                 Field("residual", long_name="largest difference that is left, rad or in units of the machine's length"),
-                Field("present", long_name="whether the machine comes to it as its actuators move evenly"),
-                Field("by_pose", long_name="whether the machine at this pose has its actuators there"),
+                Field("present", long_name="whether the machine comes to the pose as its actuators move evenly"),
+                Field(
+                    "by_pose",
+                    long_name="whether the machine at the pose has its actuators at the coordinates that were given",
+                ),
                 Field("position", forms=("json",)),
                 Field("rotation", forms=("json",)),
             ),
