@@ -13,6 +13,7 @@ from kinetostat.engine.machine_functions import functions_of
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.elevation import _overall_status, _reversals
 from kinetostat.studies.vibration import modes
+from kinetostat.views.elevation import elevation_csv
 
 TELESCOPE = str(Path(__file__).parents[1] / "cases" / "telescope-weight.toml")
 
@@ -190,3 +191,10 @@ def test_it_is_said_that_nothing_loads_a_machine(capsys):
     answer = capsys.readouterr().out
     assert "Nothing loads the machine" in answer
     assert "Stability" not in answer
+
+
+def test_moments_have_one_unit_in_all_columns_of_a_file():
+    settings = ["tool.mass=1 kg", 'load.gravity=[0, 0, "-9.81 m/s**2"]']
+    text = elevation_csv(elevation(load("delta", settings), over="60 deg:90 deg:3", about=(1, 0, 0)))
+    heads = text.splitlines()[0].split(",")
+    assert {head.partition(" [")[2] for head in heads if "moment" in head or " load" in head} == {"N·m]"}
