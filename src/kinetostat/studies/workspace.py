@@ -212,7 +212,7 @@ def workspace(
     verdict = judge.verdicts(
         nodes["status"].values, {name: nodes[name].values for name in judge.quantities}, partial(_poses, question)
     )
-    inside = verdict == 0
+    inside = verdict == judge.labels.index(INSIDE)
     volume = _volume(judge, question, seed, lambda done, _: progress(question.grid.size + done, total))
     edges = borders(judge, question, verdict, _nearest(question))
     home = _home(question)

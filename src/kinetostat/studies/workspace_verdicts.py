@@ -80,7 +80,7 @@ class Judge:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """All verdicts; "inside" is the first."""
+        """All verdicts; the place of one is its code."""
         return (
             *STATUS_VERDICTS.values(),
             BEYOND,

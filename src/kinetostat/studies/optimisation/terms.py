@@ -25,7 +25,9 @@ from kinetostat.studies.optimisation.space import PoseSet
 from kinetostat.studies.quantities import refuse_absent
 
 _PERCENTILE = re.compile(r"percentile\s+(\d{1,2}(?:\.\d+)?|100)")
+"""Words of an aggregate that is a percentile, "percentile 95" for instance."""
 WORST, MEAN = "worst", "mean"
+"""Words of the other aggregates: the worst of all values, and their mean."""
 SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
 """Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""
 ALONG = {
@@ -37,7 +39,9 @@ ALONG = {
 """Terms along a direction (under a force) and about it (under a moment), with all other motions free: the letter before
 the components of C, whether the reciprocal is meant, and the SI unit."""
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
+"""Terms of all poses together: of the lengths of legs, and of the poses that are reached."""
 AXES = "xyz"
+"""Axes of the base, in the order of a direction's three numbers."""
 
 Goal: TypeAlias = Literal["minimize", "maximize"]
 
@@ -212,7 +216,7 @@ class PoseTerm:
 class StrokeTerm:
     """The extension that actuated legs, all made alike, need: from the shortest leg of all poses to the longest, m."""
 
-    label: str = "leg_stroke"
+    label: str = STROKE
     unit: str = "m"
     names: tuple[str, ...] = ("longest_leg", "shortest_leg")
     differentiable: bool = True
@@ -242,7 +246,7 @@ class VolumeTerm:
 
     box: float
     unit: str
-    label: str = "workspace_volume"
+    label: str = VOLUME
     names: tuple[str, ...] = ("aspect",)
     differentiable: bool = False
 
