@@ -8,10 +8,10 @@ from pymoo.indicators.hv import HV
 
 from kinetostat.studies.optimisation import slopes
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome
+from kinetostat.studies.optimisation.generations import Genetic
 from kinetostat.studies.optimisation.log import Log, front_of, knee_of, record_of
 from kinetostat.studies.optimisation.search import search
 from kinetostat.studies.optimisation.slopes import Surveyor
-from kinetostat.studies.optimisation.steps import Genetic
 from studies import FEW, best, problem, solved, written
 
 REGION = "zhang-gosselin-region"

@@ -18,10 +18,11 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
+from kinetostat.studies.optimisation.descents import Gradient
+from kinetostat.studies.optimisation.generations import Genetic
 from kinetostat.studies.optimisation.log import ROWS, Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
-from kinetostat.studies.optimisation.steps import Genetic, Gradient
 from kinetostat.studies.study_folder import (
     DATA,
     Record,

@@ -16,7 +16,7 @@ from kinetostat.studies.comparison import Comparison
 from kinetostat.studies.design_numbers import DesignRow
 from kinetostat.studies.optimisation.assessment import COMMON_SHARE
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studio.design.progress import OBJECTIVE_DIGITS, SearchState
+from kinetostat.studio.design.progress import SearchState
 from kinetostat.studio.question_process import figure_html
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, titled_table
 from kinetostat.views.comparison import (
@@ -29,7 +29,7 @@ from kinetostat.views.comparison import (
     softest_texts,
     verdict_text,
 )
-from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, sensitivity_text
+from kinetostat.views.optimisation import LEAST_STIFFNESS_LEFT, OBJECTIVE_DIGITS, sensitivity_text
 
 
 def result_text(progress: SearchState) -> str:
