@@ -228,8 +228,8 @@ def leg_resistance(leg: LegScrews) -> Resistance:
 def _shares_by_modes(leg: LegScrews, modes: Modes) -> list[Action]:
     """The share s_e c_e c_e^T of each spring of a leg, whatever springs it has."""
     return [
-        (combine(modes.wrenches, [f * k for f, k in zip(row, modes.inverses, strict=True)]), s)
-        for row, s in zip(modes.loads, leg.compliance, strict=True)
+        (combine(modes.wrenches, [load * k for load, k in zip(row, modes.inverses, strict=True)]), compliance)
+        for row, compliance in zip(modes.loads, leg.compliance, strict=True)
     ]
 
 
@@ -247,13 +247,14 @@ def _by_springs(leg: LegScrews, modes: Modes) -> Resistance:
     independent = sine > DEPENDENT_LOADS
     alone = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [
-        (_either(independent, b, c), where(independent, reciprocal(compliance), s))
-        for b, compliance, (c, s) in zip(alone, leg.compliance, _shares_by_modes(leg, modes), strict=True)
+        (_either(independent, wrench, action[0]), where(independent, reciprocal(compliance), action[1]))
+        for wrench, compliance, action in zip(alone, leg.compliance, _shares_by_modes(leg, modes), strict=True)
     ]
-    rigid = [(w, where(d > 0.0, 0.0, INFINITE)) for w, d in zip(modes.wrenches, modes.compliance, strict=True)]
-    return Resistance(
-        shares, shares + [(_either(independent, NO_WRENCH, w), where(independent, 0.0, k)) for w, k in rigid]
-    )
+    rigid = [
+        (_either(independent, NO_WRENCH, wrench), where(independent, 0.0, where(compliance > 0.0, 0.0, INFINITE)))
+        for wrench, compliance in zip(modes.wrenches, modes.compliance, strict=True)
+    ]
+    return Resistance(shares, shares + rigid)
 
 
 def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:

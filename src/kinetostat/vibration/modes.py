@@ -293,8 +293,8 @@ def motions_left_out(equations: Balance, mass: Array) -> Array:
     result = np.zeros((len(equations.residual), starts[-1] - starts[0], starts[-1]))
     parts = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
     for leg, terms, (first, last) in parts:
-        within_ways, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
-        out_of_plane = (within_ways <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
+        sizes_in_plane, sizes = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
+        out_of_plane = (sizes_in_plane <= UNRESISTED * sizes)[:, :, None] * np.eye(leg.size)
         idle = idle_motions(terms.rates, leg.springs) if leg.idle.any() else leg.idle
         of_idle = _without_momentum(idle, mass[:, first:last, first:last])
         result[:, first - starts[0] : last - starts[0], first:last] = of_idle + out_of_plane
