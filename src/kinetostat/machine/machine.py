@@ -261,7 +261,7 @@ class Machine(Immutable):
         family: the kind of machine.
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
-        written: the file it was read from; None where it was made of data. Comparisons (`Immutable`) leave it out.
+        written: the file it was read from; None where it was made of data. Comparisons leave it out.
         requirements: the requirements of its file's table [requirements], by name; they change no number
             (`studies.requirements`).
         tolerances: the tolerances of its file's table [tolerances], by what they are about; they change
