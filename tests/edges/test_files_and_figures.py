@@ -24,7 +24,7 @@ from kinetostat.views.figures import save_figure
 from kinetostat.views.grid_figures import contour_maps, grid_curves
 from kinetostat.views.guideline_figures import guideline_figures
 from kinetostat.views.layout import _CachedTightBox
-from kinetostat.views.map_scales import levels_of
+from kinetostat.views.map_scales import levels_of, usual_range
 from kinetostat.views.sensitivity import sensitivity_figure
 from refusals import refused
 
@@ -35,6 +35,14 @@ MACHINE = "zhang-gosselin-4dof"
 def section():
     ranges = ["pose.x=-20 cm:20 cm:5", "pose.z=60 cm:150 cm:4"]
     return evaluate_grid(load(MACHINE), ranges, ["compliance", "stiffness", "compliance_rx_z", "singularity_margin"])
+
+
+@pytest.mark.parametrize("powers", [3, 20, 29, 40])
+def test_levels_reach_both_ends_of_however_many_powers_of_ten(powers):
+    values = np.logspace(0.0, powers, 400)
+    (low, high), bounds = usual_range(values), levels_of(values).bounds
+    assert bounds[0] <= low
+    assert bounds[-1] >= high
 
 
 def test_a_dataset_is_labelled_with_names_units_and_origin(section):

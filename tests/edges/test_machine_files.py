@@ -6,7 +6,7 @@ from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec import document
-from kinetostat.spec.errors import shorten
+from kinetostat.spec.errors import first_mistakes, shorten
 
 LENGTH = ['e.g. "12 cm"', "bare number in m"]
 LINKS = '["68 cm", "68 cm"]'
@@ -151,6 +151,11 @@ def test_all_mistakes_are_told_at_once_up_to_five(written):
     message = refusal(written(bad))
     assert message.count("is not a unit of") == 5
     assert "(and 4 more)" in message
+
+
+def test_all_mistakes_are_counted_also_where_the_first_hundred_are_alike():
+    told = first_mistakes(["same"] * 100 + ["another"] * 3, lambda mistake: f"{mistake}.")
+    assert told == "same. (and 3 more)"
 
 
 SNEAKY = ['"\\u001b[31m red"', '"two\\nlines"', '"\\u202e reversed"', '"\\u0007"']

@@ -69,7 +69,7 @@ class Body:
     leg: str = ""
 
     def every(self) -> list["Body"]:
-        """Return the body and all bodies that hang on it, the nearer ones first."""
+        """Return the body and all bodies that hang on it, each before those that hang on it itself."""
         return [self, *(body for child in self.children for body in child.every())]
 
 

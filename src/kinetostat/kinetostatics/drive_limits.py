@@ -1,4 +1,4 @@
-"""Limits of drives, as a machine file gives them: least and greatest loads, greatest speeds, lost motion.
+"""Limits of drives as a machine file gives them, with the lost motion and the compliance of their joints.
 
 What drives can do within them is in `feasible`. Over scalars.
 """
@@ -16,7 +16,7 @@ from kinetostat.machine.machine import Configuration, Machine
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """Greatest loads and speed of a drive.
+    """Loads and speed that a drive may have, and how exactly its joint follows it.
 
     Attributes:
         spring: the spring of its actuator.
@@ -48,20 +48,29 @@ def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveL
         lower, upper = -most if is_set(most) else -math.inf, most
         if spring.acts:
             least = load.min_tension if is_set(load.min_tension) else 0.0
-            greatest = load.max_tension if is_set(load.max_tension) else most
-            if is_set(most) and is_set(load.max_tension):
-                greatest = smaller(most, load.max_tension)
+            greatest = most
+            if is_set(load.max_tension):
+                greatest = smaller(most, load.max_tension) if is_set(most) else load.max_tension
             lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
-        speed = limits.actuator_speed if slides else limits.actuator_turning_speed
-        lost, soft = lost_motion(machine, spring), softness(machine, spring)
-        result.append(DriveLimits(spring, lower, upper, speed, lost, soft))
+        result.append(
+            DriveLimits(
+                spring=spring,
+                lower=lower,
+                upper=upper,
+                speed=limits.actuator_speed if slides else limits.actuator_turning_speed,
+                lost_motion=lost_motion(machine, spring),
+                softness=softness(machine, spring),
+            )
+        )
     return tuple(result)
 
 
 def lost_motion(machine: Machine, spring: Spring) -> Scalar:
-    """Lost motion of the joint of a drive between both senses: play, friction of its rotor, and of its guide.
+    """Return how far the joint of a drive stays behind where the sense of its motion changes.
 
-    No integral part of its loop must remove the friction of the rotor. That of guide or bearing is a load on the joint.
+    The play counts as far as the encoder does not see it, and the friction of the rotor only where the servo loop has
+    no integral part, which would remove it. The friction of a guide or a bearing is a load on the joint, once in each
+    sense.
 
     Args:
         machine: the machine with its tables [drives] and [servo].
@@ -72,20 +81,20 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
 
     Source: theory (105).
     """
-    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
-    slides, lost = spring.joint.point is None, play(machine, spring)
-    rubs = drive.guide_friction if slides else drive.bearing_friction
-    if not is_zero(rubs):
-        lost = lost + softness(machine, spring) * (2.0 * rubs)
+    drive, servo = _tables_of(machine, spring)
+    slides, distance = spring.joint.point is None, play(machine, spring)
+    friction = drive.guide_friction if slides else drive.bearing_friction
+    if not is_zero(friction):
+        distance = distance + softness(machine, spring) * (2.0 * friction)
     if is_zero(drive.rotor_friction) or not (_is_closed(servo) and is_zero(servo.integral_time)):
-        return lost
-    stiff = servo.velocity_gain * servo.position_gain
-    return lost + 2.0 * drive.rotor_friction * _travel_per_radian(drive, slides) * _inverse(stiff)
+        return distance
+    angle = 2.0 * drive.rotor_friction * _inverse(_loop_stiffness(servo))
+    return distance + angle * _travel_per_radian(drive, slides)
 
 
 def play(machine: Machine, spring: Spring) -> Scalar:
     """The play of a drive as far as its encoder does not see it, m or rad."""
-    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
+    drive, servo = _tables_of(machine, spring)
     backlash = drive.backlash if spring.joint.point is None else drive.angular_backlash
     return (1.0 - servo.position_at_load) * backlash
 
@@ -99,19 +108,33 @@ def softness(machine: Machine, spring: Spring) -> Scalar:
 
     Source: theory (102).
     """
-    drive, servo = (numbers_of_drive(machine, table, spring) for table in ("drives", "servo"))
+    drive, servo = _tables_of(machine, spring)
     transmission = reciprocal(spring.stiffness)
     if not _is_closed(servo):
         return transmission
-    soft, stiff = transmission * (1.0 - servo.position_at_load), servo.velocity_gain * servo.position_gain
+    loop, compliance = _loop_stiffness(servo), transmission * (1.0 - servo.position_at_load)
     travel = _travel_per_radian(drive, spring.joint.point is None)
     if is_zero(servo.integral_time) and not is_zero(travel):
-        soft = soft + travel * travel * _inverse(stiff)
-    return where(stiff > 0.0, soft, transmission)
+        compliance = compliance + travel * travel * _inverse(loop)
+    return where(loop > 0.0, compliance, transmission)
+
+
+def _tables_of(machine: Machine, spring: Spring) -> tuple[Any, Any]:
+    """The tables [drives] and [servo] as this drive has them."""
+    return numbers_of_drive(machine, "drives", spring), numbers_of_drive(machine, "servo", spring)
+
+
+def _loop_stiffness(servo: Any) -> Scalar:
+    """Torque of the rotor per angle by which it is off its set point at rest, N·m/rad, without an integral part."""
+    return servo.velocity_gain * servo.position_gain
 
 
 def _travel_per_radian(drive: Any, slides: bool) -> Scalar:
-    """Travel of the joint per radian of its rotor, m/rad or 1; 0 without lead or ratio, as without a rotor."""
+    """Travel of the joint per radian of its rotor, m/rad or 1.
+
+    It is 0 without a lead or a ratio, where `machine.actuators.rotor_turns`, the reciprocal, refuses a rotor: here such
+    a drive is as one without a rotor.
+    """
     return drive.lead * (0.5 / math.pi) if slides else _inverse(drive.ratio)
 
 

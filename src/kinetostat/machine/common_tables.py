@@ -235,8 +235,8 @@ def table_of_one_drive(path: str, fields: Sequence[str]) -> type:
 
 FRICTION_OF_JOINTS = ("damping.hinge_friction", "damping.slide_friction")
 """Paths of the Coulomb friction of passive joints."""
-VIBRATION_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
-"""Beginnings of the paths of fields on which only vibrations depend."""
+DYNAMIC_FIELDS = ("tool.inertia", "tool.payload_inertia", "drives.", "servo.", "damping.", "cutting.")
+"""Beginnings of the paths of fields that count only where something moves: in vibrations, motions and lost motion."""
 
 
 def check_inertia(tables: Mapping[str, Any], origin: str) -> None:

@@ -84,5 +84,5 @@ def _next(name: str) -> str | None:
 def first_mistakes(mistakes: Sequence[Mistake], sentence: Callable[[Mistake], str]) -> str:
     """Return a sentence for each of the first different mistakes of a file, and how many more there are."""
     sentences = list(dict.fromkeys(sentence(mistake) for mistake in mistakes[:WORDED_MISTAKES]))
-    hidden = len(sentences) - SHOWN_MISTAKES + max(len(mistakes) - WORDED_MISTAKES, 0)
-    return " ".join(sentences[:SHOWN_MISTAKES]) + (f" (and {hidden} more)" if hidden > 0 else "")
+    hidden = len(sentences[SHOWN_MISTAKES:]) + len(mistakes[WORDED_MISTAKES:])
+    return " ".join(sentences[:SHOWN_MISTAKES]) + (f" (and {hidden} more)" if hidden else "")

@@ -25,7 +25,7 @@ from kinetostat.kinetostatics.quantities import (
     rest_numbers,
 )
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.common_tables import VIBRATION_FIELDS
+from kinetostat.machine.common_tables import DYNAMIC_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, data_name, parameters, values
 from kinetostat.spec.arguments import checked
@@ -265,7 +265,7 @@ def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here:
     inertial = any(quantity.modal for quantity in quantities) or needs_masses(names)
     if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in quantities):
         return here[path] != 0.0
-    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(VIBRATION_FIELDS) and not inertial):
+    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(DYNAMIC_FIELDS) and not inertial):
         return False
     if parameter.quantity.kind == "inertia":
         return inertial

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.frozen import dataclass
-from kinetostat.machine.common_tables import VIBRATION_FIELDS
+from kinetostat.machine.common_tables import DYNAMIC_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import AXES, VECTORS, Parameter, parameters, values
 from kinetostat.spec.document import parse
@@ -31,7 +31,7 @@ USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI: between soft bearings and stiff links."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
-OF_MASSES = (*VIBRATION_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
+OF_MASSES = (*DYNAMIC_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
 """Beginnings of the fields in the panel Mass, which also has all fields whose kind is an amount of matter."""
 LARGEST_MASS = 1000.0
 """Upper end of the range of a mass that is zero, in kg per square of the machine's length: 10 kg for one of 10 cm."""

@@ -14,7 +14,7 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, 
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
-from kinetostat.machine.common_tables import VIBRATION_FIELDS
+from kinetostat.machine.common_tables import DYNAMIC_FIELDS
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.views.scene.anatomy import anatomy
@@ -208,7 +208,7 @@ def _pose(machine: Machine) -> dict[str, str]:
 
 def _geometry(machine: Machine, leg: str) -> dict[str, str]:
     """Return the lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
-    other_tables = ("pose.", "tool.", "load.", "limits.", "sections.", *VIBRATION_FIELDS)
+    other_tables = ("pose.", "tool.", "load.", "limits.", "sections.", *DYNAMIC_FIELDS)
     written = machine.family.chains is not None
     mine = (f"legs.{leg}.", "geometry.")
     return _fields(machine, lambda path: not path.startswith(other_tables) and (not written or path.startswith(mine)))

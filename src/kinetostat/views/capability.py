@@ -214,7 +214,9 @@ def _finite(value: float) -> float | None:
 
 
 SETS = (
-    Field("set", "name", long_name="force, moment, speed, rate or acceleration", column="quantity"),
+    Field(
+        "set", "name", long_name="force, moment, speed, rate, acceleration or angular acceleration", column="quantity"
+    ),
     Field("unit"),
     Field("least", lambda part: _finite(part.least), long_name="amount that is allowed in whichever direction, SI"),
     Field(

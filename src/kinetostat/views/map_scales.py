@@ -103,7 +103,7 @@ def _round_powers(low: float, high: float) -> Array:
         chosen = candidates[inner[0] - 1 : inner[-1] + 2]  # with the next one on either side
         if len(chosen) <= LEVELS + 2:
             return np.array(chosen)
-    return np.array(chosen[:: -(-len(chosen) // LEVELS)])
+    return np.array([*chosen[: -1 : -(-len(chosen) // LEVELS)], chosen[-1]])
 
 
 def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) -> None:

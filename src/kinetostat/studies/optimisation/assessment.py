@@ -69,7 +69,7 @@ class Outcome(Immutable):
     Attributes:
         objectives: SI, with the sign of the quantity [designs x objectives]; NaN where a design cannot be judged.
         constraints: values of their terms, SI [designs x constraints].
-        violation: 0 for a feasible design; below the number of constraints where some are violated, more beyond
+        violation: 0 for a feasible design; at most the number of constraints where some are violated, more beyond
             [designs].
         verdict: `DesignVerdict` codes [designs].
     """
