@@ -109,7 +109,8 @@ DEPENDENT = 1e-6
 NEGLIGIBLE_COMPONENT = 1e-9
 """Share of a screw's largest component below which another one is round-off and is not written out."""
 PARALLEL_AXES = 1e-12
-"""Sine of the angle between axes up to which they are parallel as written in a file."""
+"""Sine of the angle between axes up to which they are parallel as written in a file. Where a cosine is compared with 1,
+which has half of the digits, axes are parallel up to a sine of 1.4e-6: there it says only what a number is called."""
 ONE_PLACE = 1e-12
 """Share of the distance of joints from the origin of the base below which they lie at the platform point P: what is
 left of points that coincide, once they have been turned."""

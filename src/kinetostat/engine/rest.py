@@ -241,7 +241,9 @@ class StatePrograms:
             return program_of(recipe, self._native)
 
     def rest_coordinates(self, fixed: Array, program_inputs: Sequence[Array], count: int) -> list[Array]:
-        """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.
+        """Find the states of rest: a row of points for each coordinate.
+
+        A point without one nearby has NaN, or the coordinates of the last step where its steps do not settle.
 
         Args:
             fixed: values of the parameters that are the same at all points.

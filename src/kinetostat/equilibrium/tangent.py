@@ -226,8 +226,8 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     """Solve the linear equations at a state for right sides [n x unknowns x k].
 
     Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg made only of rigid parts has
-    no finite stiffness, and a very stiff leg drowns the digits of a soft one. Poses with such legs are solved over the
-    motions that keep all legs closed.
+    no finite stiffness: where one has none at any of the poses, all of them are solved over the motions that keep all
+    legs closed. A very stiff leg drowns the digits of a soft one; poses with such a leg are solved so one by one.
 
     Args:
         equations: the equations at the state.
@@ -256,7 +256,7 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
 
 
 def _eliminated_legs(equations: Balance, right: Array, loaded: bool) -> list[Array] | None:
-    """The unknowns of each leg by the right sides and by the platform's twist; None where a leg is rigid, or nearly so.
+    """The unknowns of each leg by the right sides and by the platform's twist; None if a leg is rigid, or nearly so.
 
     Returns:
         For each leg, a column for each right side and then one for each way of the platform [n x unknowns of the leg x

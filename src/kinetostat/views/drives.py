@@ -1,4 +1,4 @@
-"""Drives along a motion: the question, the description of its answer, and its figures. Nothing is computed here."""
+"""Drives along a motion: the question, the description of its answer, and its figures."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
