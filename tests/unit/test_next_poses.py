@@ -1,5 +1,6 @@
 """Where the next poses to measure are looked for: within the limits of the machine's file, or where it has been."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.studies.identification.identification import identification_of
-from kinetostat.studies.identification.next_poses import LONGEST_RAY, RAY_STEPS, unit_of, within_limits
+from kinetostat.studies.identification.next_poses import LONGEST_RAY, RAY_STEPS, _alike, unit_of, within_limits
 from machines import load_without_limits
 from synthetic_measurements import measured, posed, truth_of
 
@@ -47,6 +48,17 @@ def test_limits_let_them_go_farther_than_what_was_measured_and_make_them_worth_m
         assert high <= column.max()
     assert within.sharper > 1.2 * without.sharper
     assert "sets no [limits]" in without.within
+
+
+def test_distances_are_measured_from_where_a_file_measures_them_also_if_few_of_its_lines_do():
+    model, poses = posed(load("hexapod"), 8)
+    data = measured(model, poses, truth_of(model))
+    station = np.array([0.3, -0.2, 1.1])
+    origins = np.full((8, 3), np.nan)
+    origins[:2] = station
+    proposed = _alike(replace(data, origins=origins), poses, 4)
+    np.testing.assert_array_equal(proposed.origins, np.tile(station, (4, 1)))
+    np.testing.assert_array_equal(_alike(data, poses, 4).origins, np.zeros((4, 3)))
 
 
 def test_rays_end_at_the_strokes_of_slides():

@@ -185,7 +185,8 @@ def _candidates(
 def _alike(data: Measurements, pose: Poses, count: int) -> Measurements:
     """Measurements of the same quantities at other poses, with typical deviations, load and origin; values are zero."""
     loads = data.wrenches[np.flatnonzero(data.wrenches.any(axis=1))[:1]]
-    origin = np.nan_to_num(np.nanmedian(np.nan_to_num(data.origins), axis=0))
+    written = data.origins[np.isfinite(data.origins).all(axis=1)]  # a file without distances has none
+    origin = np.median(written, axis=0) if len(written) else np.zeros(3)
     return replace(
         data,
         lines=tuple(range(count)),
