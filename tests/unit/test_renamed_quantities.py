@@ -22,6 +22,14 @@ def test_a_former_name_of_a_quantity_still_works_and_warns(old, new):
         assert parse_condition(f"{old} > 0.5", COMPONENTS).quantity == new
 
 
+def test_the_warning_of_a_former_name_points_to_the_line_that_uses_it():
+    with pytest.warns(DeprecationWarning, match="singularity_margin") as of_a_list:
+        resolve_quantities(["regularity"])
+    with pytest.warns(DeprecationWarning, match="aspect") as of_a_condition:
+        parse_condition("side > 0.5", COMPONENTS)
+    assert [warning.filename for warning in (*of_a_list, *of_a_condition)] == [__file__, __file__]
+
+
 def test_the_former_attribute_of_a_response_still_works_and_warns():
     response = respond(load("hexapod"))
     with pytest.warns(DeprecationWarning, match="singularity_margin"):

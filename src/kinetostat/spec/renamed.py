@@ -3,12 +3,16 @@
 An old word keeps working for one version. To rename one, add it to `RENAMED`; nothing else needs to know the old word.
 """
 
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+
+PACKAGE = __name__.partition(".")[0]
+"""The name with which all modules of kinetostat begin."""
 
 RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -113,5 +117,8 @@ def _with_old(value: Any, former: Mapping[str, str], used: dict[str, str]) -> An
 
 
 def _warn(fact: str) -> None:
-    # Three levels up: this function, the function or property of this module, and the line that used the old word.
-    warnings.warn(f"{fact} The old name will go in the next version.", DeprecationWarning, stacklevel=3)
+    # Python shows such a warning only to the program whose own line it names, so every frame of kinetostat is passed.
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == PACKAGE:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(f"{fact} The old name will go in the next version.", DeprecationWarning, stacklevel=level)
