@@ -275,6 +275,11 @@ def test_what_only_pulls_does_not_push():
             'type = "cable"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nstiffness = 1e5\nslack = 1',
             "slack is not known; a cable has",
         ),
+        (  # of several, the first of the alphabet, whatever the hash seed of the process
+            'type = "cable"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nstiffness = 1e5\n'
+            "slack = 1\nrope = 1\nwire = 1\ncord = 1\nbelt = 1\nchain = 1\nloose = 1\ntight = 1",
+            "belt is not known; a cable has",
+        ),
     ],
 )
 def test_a_cable_that_is_not_one_is_refused(line, pattern):

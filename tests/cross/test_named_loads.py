@@ -152,6 +152,7 @@ def test_a_centre_of_mass_travels_with_its_link():
         ("centre_of_mass = [0, 0, 0]", 'link "upper" has centre_of_mass, but no mass'),
         ("mass = -1", "cannot be negative"),
         ("mas = 1", "mas is not known; a link has model, section, up, compliance, mass, centre_of_mass and inertia"),
+        ("h = 1, g = 1, f = 1, e = 1, d = 1, c = 1, b = 1, a = 1", "a is not known"),  # the first of the alphabet
         ("mass = 1, inertia = [1, 1, 1, 0, 0, 0]", "has inertia, but no centre_of_mass"),
         ("mass = 1, centre_of_mass = [0, 0, 0], inertia = [1, 1, 3, 0, 0, 0]", r"legs\.arm\.upper\.inertia .* no body"),
         ("mass = 0, centre_of_mass = [0, 0, 0], inertia = [1, 1, 1, 0, 0, 0]", r"but legs\.arm\.upper\.mass is 0"),

@@ -53,7 +53,7 @@ CABLE_KEYS = ("from", "to", "stiffness", "preload")
 """Fields of a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""
 
 LARGEST_NUMBER = 1e100
-"""Size of numbers in a matrix beyond which they are a slip: their products would overflow."""
+"""Size of numbers in a matrix or a direction from which they are a slip: below it, products of three stay finite."""
 
 
 def by_name(document: Document, origin: str) -> Document:
@@ -78,7 +78,7 @@ def by_name(document: Document, origin: str) -> Document:
 def _cable(leg: dict[str, Any], where: str, planar: bool) -> dict[str, Any]:
     """The joints of a leg that is written as a cable: two ends, and between them an actuator that only pulls."""
     choice(leg.get("type"), (CABLE,), f"{where}: type")
-    for key in leg.keys() - {"type", *CABLE_KEYS, *COPY_KEYS, "name"}:
+    for key in sorted(leg.keys() - {"type", *CABLE_KEYS, *COPY_KEYS, "name"}):
         raise InputError(f"{where}: {key} is not known; a cable has {', '.join(CABLE_KEYS)}, and may have copies.")
     missing = [key for key in CABLE_KEYS[:3] if key not in leg]
     if missing:
@@ -119,7 +119,7 @@ def with_parts(document: Document, origin: str) -> Document:
         InputError: a part that is not one; names leg and joint.
     """
     for name, leg in _checked_legs(document["legs"], origin).items():
-        for key, part in leg.items() if isinstance(leg, dict) else ():
+        for key, part in leg.items():
             if isinstance(part, dict) and is_series(part.get("stiffness")):
                 part["stiffness"] = parts(part["stiffness"], f'"{origin}": leg "{name}", joint "{key}": stiffness')
     return document
@@ -237,7 +237,7 @@ def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tu
 def _leg(name: str, leg: dict[str, Any], legs: Mapping[str, Any], where: str, shapes: Mapping[str, str]) -> LegPlan:
     joints = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" not in part}
     links = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" in part}
-    for key in leg.keys() - joints.keys() - links.keys():
+    for key in sorted(leg.keys() - joints.keys() - links.keys()):
         raise InputError(f"{where}: {key} is {shorten(leg[key])}; a leg holds joints and links, each a table.")
     if not 1 <= len(joints) <= MOST_JOINTS:
         raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
@@ -370,7 +370,7 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         raise InputError(
             f'{where}: model = "matrix" needs compliance, and no other model may have it; add it or leave it out.'
         )
-    for key in part.keys() - WEIGHT.keys():
+    for key in sorted(part.keys() - WEIGHT.keys()):
         *first, last = WEIGHT
         raise InputError(
             f"{where}: {key} is not known; a link has model, section, up, compliance, {', '.join(first)} and {last}."
