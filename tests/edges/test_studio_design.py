@@ -237,6 +237,22 @@ def test_a_study_file_is_taken_or_refused():
     on_page(steps)
 
 
+@pytest.mark.parametrize("written", ['path = "platform_radius"', 'paths = ["geometry.platform_radius", "base_radius"]'])
+def test_a_number_that_a_study_file_varies_is_not_offered_a_second_time(written):
+    varied = SMALL.replace('path = "platform_radius"', written)
+    if "paths" in written:
+        varied = varied.replace('path = "base_radius"', 'path = "passive_leg_offset"')
+
+    async def steps(page):
+        await design(page)
+        assert "geometry.platform_radius" in page.one("study-add-variable").options
+        await page.upload("varied.toml", varied.encode(), "study-upload")
+        assert page.one("study-problem").text == ""
+        assert not page.one("study-add-variable").options.keys() & {"geometry.platform_radius", "geometry.base_radius"}
+
+    on_page(steps)
+
+
 def test_favourites_are_kept_loaded_compared_and_deleted(tmp_path):
     async def steps(page):
         await design(page)

@@ -171,7 +171,7 @@ class StudyForm:
         return {control.path: control for control in controls(machine, length)}
 
     def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:
-        paths = [str(path) for path in table.get("paths") or [table["path"]]]
+        paths = _paths_of(table)
         parameter = find(self._machine.family, paths[0])
         control = known.get(parameter.path)
         title = (full_label(control.parameter) if control else paths[0]) + (" and others" if paths[1:] else "")
@@ -206,7 +206,8 @@ class StudyForm:
 
     def _more_variables(self, known: dict[str, Control]) -> None:
         """Offer the other numbers of the machine; loads and limits are not part of a design."""
-        used_paths = {str(table.get("path")) for table in self.draft.variables}
+        written = [path for table in self.draft.variables for path in _paths_of(table)]
+        used_paths = {find(self._machine.family, path).path for path in written}
         free = [c for path, c in known.items() if c.slides and path not in used_paths and c.panel != "Load"]
         offered = {control.path: full_label(control.parameter) for control in free if not control.joined}
         if offered:
@@ -364,3 +365,8 @@ def _number(text: str) -> int | float | str:
         except ValueError:
             continue
     return text
+
+
+def _paths_of(variable: dict[str, Any]) -> list[str]:
+    """Return the fields that a variable changes, as its table names them: one, or several that are tied together."""
+    return [str(path) for path in variable.get("paths") or [variable["path"]]]
