@@ -1,5 +1,6 @@
 """Sweeps in other processes: the same bits as in one, also when a worker dies; what is missing or lost is said."""
 
+import argparse
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from kinetostat.cli import main
+from kinetostat.commands.asking import _workers
 from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
@@ -190,3 +192,9 @@ def test_bad_crews_are_refused(how, message, capsys):
         main([*WORDS, *how])
     assert stop.value.code == BAD_INPUT
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["000001024999", "1" * 5000])
+def test_a_number_of_processes_is_compared_as_a_whole(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="give 1 to 1024"):
+        _workers(text)  # alone: a command that took it would start a million processes

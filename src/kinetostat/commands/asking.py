@@ -269,7 +269,7 @@ def _add_grid_options(command: Parser) -> None:
 
 
 def _workers(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_WORKERS:
+    if not text.isdecimal() or len(text) > LONGEST_COUNT or not 1 <= int(text) <= MOST_WORKERS:
         raise argparse.ArgumentTypeError(f"{text} is not a number of processes; give 1 to {MOST_WORKERS}")
     return int(text)
 
