@@ -10,6 +10,7 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import NO_ANSWER
 from kinetostat.kinematics.status import Status
+from kinetostat.machine import loading
 from kinetostat.machine.file_schema import machine_schema
 from kinetostat.machine.loading import build, bundled, load, template
 from kinetostat.spec import document
@@ -153,6 +154,13 @@ def test_a_pose_that_says_too_little_is_refused():
 
 def test_the_template_is_a_file_that_loads():
     assert build(document.parse(template("legs"), "new"), "new").family.name == "legs"
+
+
+def test_the_template_has_joints_however_the_shortest_file_writes_its_cables(monkeypatch):
+    joints, cables = bundled()["tripteron"], bundled()["cogiro"].replace('type      = "cable"', 'type = "cable"')
+    assert len(cables) < len(joints)
+    monkeypatch.setattr(loading, "bundled", lambda: {"cables": cables, "joints": joints})
+    assert template("legs") == joints
 
 
 @pytest.fixture(scope="module")

@@ -387,11 +387,14 @@ def template(family: str) -> str:
     if family in bundled() and family not in families():
         return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
-    only_cables = f'type      = "{CABLE}"'  # which show one kind of leg, and no joint
-    simplest = sorted(bundled().items(), key=lambda item: (only_cables in item[1], len(item[0])))
-    texts = [text for _, text in simplest if documents.parse(text, "")["family"] == wanted]
-    if not texts:
+    read = [(text, documents.parse(text, "")) for text in bundled().values()]
+    candidates = [(_has_cables(document), len(text), text) for text, document in read if document["family"] == wanted]
+    if not candidates:
         raise InputError(
             f'kinetostat has no example file of the family "{wanted}"; look in the package that registers it.'
         )
-    return texts[0]
+    return min(candidates)[-1]  # a machine of cables shows no joint, and the shortest text is the simplest machine
+
+
+def _has_cables(document: Document) -> bool:
+    return any(leg.get("type") == CABLE for leg in document.get("legs", []))
