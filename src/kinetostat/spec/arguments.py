@@ -220,7 +220,7 @@ def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
             return misfit
         keys = (_misfit(key, str, f"a key of {name}") for key in value)
         return _first(keys) or _first(_misfit(entry, inside[1], f"{name}[{key!r}]") for key, entry in value.items())
-    if kind is not bool and (isinstance(value, bool) or type(value).__name__ == "bool_"):
+    if kind is not bool and isinstance(value, bool):
         return misfit
     return None if isinstance(value, ACCEPTED.get(kind, kind)) else misfit
 

@@ -54,7 +54,7 @@ class Allocation(ImmutableAnswer):
 
 
 def reach_of(inputs: RandomInputs, measures: Measures, measure: str) -> dict[str, Array]:
-    """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add errors up.
+    """Motion of the tool by the limits of each part alone [n x parts]: its square, m², for "rss"; m for "worst".
 
     A joint that a load presses to one side counts with its whole clearance, twice the limit to one side.
     """

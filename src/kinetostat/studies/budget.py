@@ -276,7 +276,7 @@ class _Sums:
     Attributes:
         pressed: whether the load presses each part at each pose, a table for each addition [poses x parts].
         spreads: for each addition, at which of its poses there are results [poses], and these.
-        reach: for each addition, how far each part moves the leading measure, see `allocation.reach_of`.
+        reach: for each addition, how far each part moves the leading measure, m or m², see `allocation.reach_of`.
         largest: the largest error of each drawn machine over all poses [machines x measures].
         squares: variances of the measures by part, all poses together [measures x parts].
     """

@@ -14,6 +14,7 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, 
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.closing import rotation_between
 from kinetostat.machine.common_tables import DYNAMIC_FIELDS
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -224,11 +225,10 @@ def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
 
 
 def _motion(configuration: Configuration, goal: Displacement, length: float) -> Array:
-    """Motion of a platform to a goal: translation in units of the machine's length, then the turn, rad (small)."""
+    """Return the motion from a goal to the platform: translation in units of the machine's length, small turn."""
     platform = configuration.platform
     offset = (platform.translation - goal.translation) * (1.0 / length)
-    now, wanted = platform.rotation, goal.rotation
-    turn = (wanted.x.cross(now.x) + wanted.y.cross(now.y) + wanted.z.cross(now.z)) * 0.5
+    turn = rotation_between(goal.rotation, platform.rotation)
     return np.array([*offset.components(), *turn.components()], dtype=float)
 
 

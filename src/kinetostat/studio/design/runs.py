@@ -89,16 +89,8 @@ class Runs:
             self._spare = _started_worker()
 
     def every(self) -> list[Run]:
-        """Return all searches, the latest first.
-
-        Raises:
-            InputError: the folder of all searches cannot be read.
-        """
-        try:
-            folders = numbered_entries(self._folder)
-        except OSError as error:
-            raise InputError(f'the searches in "{self._folder}" cannot be read: {error.strerror}.') from None
-        listed = (self._entry(number, path) for number, path in folders.items())
+        """Return all searches, the latest first; none from a folder that cannot be read."""
+        listed = (self._entry(number, path) for number, path in numbered_entries(self._folder).items())
         return [run for run in listed if run is not None]
 
     def of(self, number: int) -> Run:
