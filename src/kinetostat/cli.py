@@ -8,9 +8,10 @@ import errno
 import io
 import os
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kinetostat.commands.asking import add_grid_commands, add_other_questions
 from kinetostat.commands.common import (
@@ -70,6 +71,8 @@ EXAMPLES = """examples:
 
 exit codes: 0 done, 1 the question has no answer or a requirement is not met, 2 bad input, 130 stopped by Ctrl-C
 """
+PYTHON_WARNING = warnings.formatwarning
+"""Python's own text of a warning, for those that are not of old names."""
 
 
 class Overview(Help):
@@ -130,15 +133,23 @@ def _prepare_process() -> None:
     """Make printing and drawing work everywhere.
 
     A closed stream becomes the null device, characters that a terminal lacks become "?", and Matplotlib draws without
-    a window system, because figures are only written to files.
+    a window system, because figures are only written to files. What has a new name is said in a sentence, without the
+    line of the script that started the command.
     """
     os.environ["MPLBACKEND"] = "agg"
+    warnings.formatwarning = _sentence_of_warning
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - open until the end
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _sentence_of_warning(message: Warning | str, category: type[Warning], *place: Any) -> str:
+    if issubclass(category, DeprecationWarning):
+        return f"kinetostat: {message}\n"
+    return PYTHON_WARNING(message, category, *place)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -281,6 +281,13 @@ def test_the_list_reads_no_file_as_a_whole():
     assert not {"pydantic", "kinetostat.spec.study", "kinetostat.kinematics"} & {*output.split("LOADED")[1].split()}
 
 
+def test_an_old_name_is_told_in_a_sentence():
+    words = ["sweep", "tripteron", "--vary", "x=50:51 cm:2", "--quantity", "regularity"]
+    done = subprocess.run([sys.executable, "-m", "kinetostat", *words], capture_output=True, text=True, check=True)
+    new = 'The quantity "regularity" is now called "singularity_margin". The old name will go in the next version.'
+    assert done.stderr == f"kinetostat: {new}\n"
+
+
 def test_the_package_runs_as_the_command(capsys):
     main(["--version"])
     ran = subprocess.run([sys.executable, "-m", "kinetostat", "--version"], capture_output=True, text=True, check=True)
