@@ -11,7 +11,7 @@ import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from kinetostat.commands.asking import add_grid_commands, add_other_questions
 from kinetostat.commands.common import (
@@ -146,10 +146,12 @@ def _prepare_process() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _sentence_of_warning(message: Warning | str, category: type[Warning], *place: Any) -> str:
+def _sentence_of_warning(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, line: str | None = None
+) -> str:
     if issubclass(category, DeprecationWarning):
         return f"kinetostat: {message}\n"
-    return PYTHON_WARNING(message, category, *place)
+    return PYTHON_WARNING(message, category, filename, lineno, line)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
