@@ -23,8 +23,9 @@ SAME = 1e-10
 """Between two routes that only order operations otherwise: some thousand roundings, times the condition of W."""
 ROUNDED = 1e-20
 """A derivative that is but the rounding of zero."""
-STEP = np.longdouble(1e-5)
-"""Share of a size, or of the machine's length, or rad."""
+STEP = np.longdouble(1e-6)
+"""Share of a size, or of the machine's length, or rad. What differences miss falls with the fourth power of it: where a
+leg is nearly folded, ten times as much leaves a millionth of the derivative. Round-off is far below that here."""
 AT = np.array([-2, -1, 1, 2], dtype=np.longdouble)
 WEIGHTS = np.array([1, -8, 8, -1], dtype=np.longdouble) / 12
 """Central differences of fourth order."""
