@@ -221,7 +221,9 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
     machine = functions.machine
     columns = sample_points(functions)
     points = np.array(list(columns.values())).T
-    rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
+    rest = None
+    if functions.rests:
+        rest = {"states": functions.states, "steps": MOST_NEWTON_STEPS, "away": ONE_STEP_AWAY}
     forward = {"steps": STEPS_FORWARD, "shortest": SHORTEST_SHARE, "closed": CLOSED}
     return {
         "name": machine.name,
@@ -234,7 +236,7 @@ def _data(functions: MachineFunctions, stem: str) -> dict[str, Any]:
         "components": machine.family.components,
         "length": functions.length,
         "forward": forward if functions.square else None,
-        "rest": rest if functions.rests else None,
+        "rest": rest,
         "springs": asdict(functions.mode_counts) | asdict(functions.springs) if functions.mode_counts else None,
         "samples": [_sample(functions, row.tolist()) for row in points],
         "file": as_toml(machine),
