@@ -387,13 +387,15 @@ def template(family: str) -> str:
     if family in bundled() and family not in families():
         return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
-    read = [(text, documents.parse(text, "")) for text in bundled().values()]
-    candidates = [(_has_cables(document), len(text), text) for text, document in read if document["family"] == wanted]
+    read = [(name, text, documents.parse(text, "")) for name, text in bundled().items()]
+    candidates = [
+        (_has_cables(document), len(name), text) for name, text, document in read if document["family"] == wanted
+    ]
     if not candidates:
         raise InputError(
             f'kinetostat has no example file of the family "{wanted}"; look in the package that registers it.'
         )
-    return min(candidates)[-1]  # a machine of cables shows no joint, and the shortest text is the simplest machine
+    return min(candidates)[-1]  # a machine of cables shows no joint, and variants of a machine add words to its name
 
 
 def _has_cables(document: Document) -> bool:
