@@ -311,7 +311,7 @@ def _facts_without_answer(state: MachineState, turn: Rotation) -> dict[str, Any]
 
 
 def _singular_matrices(state: MachineState, turn: Rotation) -> dict[str, Any]:
-    """K, and C with NaN for what is not finite, of a singular pose; nothing where K is not finite either."""
+    """Return K and C of a singular pose, with NaN for entries of C that are not finite; nothing if K is not finite."""
     length, kept = float(state.free.configuration.length), list(state.machine.family.components)
     whole = _stiffness_by_legs(state.free, turn, length)
     if whole is None:

@@ -43,9 +43,12 @@ ROOM_BEYOND_BARS = 0.18
 """Room to both sides of bars for the numbers at their ends, as a share of the range of the bars."""
 ROOM_ABOVE_HISTOGRAM = 1.4
 """Height of a panel over that of its tallest bar: the legend with three values stands above the bars."""
-COMPARISON_WIDTH, LINE_HEIGHT, ROOM_FOR_TITLE = 7.2, 0.3, 0.9
-"""Width of the comparison of two designs; height of a direction or a variable in it; and room for title and labels;
-inches."""
+COMPARISON_WIDTH = 7.2
+"""Width of the figure that compares two designs, inches."""
+LINE_HEIGHT = 0.3
+"""Height of a line of that figure, a direction or a variable, inches."""
+ROOM_FOR_TITLE = 0.9
+"""Height that its title and its labels take, inches."""
 WIDTH_ALONE, WIDTH_AMONG_OTHERS, FRONT_HEIGHT = 4.2, 3.1, 3.2
 """Width of the panel of a pair of objectives, alone and among others, and its height, inches."""
 PALE_GREY = "#cccccc"

@@ -41,7 +41,7 @@ WORST_POSES = 24
 MOST_ROUNDS = 5
 """Greatest number of descents with newly chosen worst poses."""
 LEAST_GAIN = 1e-7
-"""Relative gain of a round from which on another one is tried."""
+"""Least relative gain of a round of descents after which another round is tried."""
 BLOCKED = 1e6
 """Value that counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
 there."""

@@ -38,7 +38,7 @@ LARGEST_RIDGE_CHANGE = 1e-6
 SETTLING_STEPS = 3
 """Newton's steps across a ridge after each step along it: from so near, each doubles the digits."""
 LEAST_RIDGE = 0.1
-"""Length of a ridge, in steps, up to which it is a point; also that of a step that leads no further."""
+"""Length, in steps along a ridge, below which the ridge is a point, and below which a step gets no further."""
 LEAST_MOVE_SHARE = 0.02
 """A variable belongs to a ridge if it moves by more than this share of the variable that moves most."""
 
